@@ -1,0 +1,132 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+
+/// The DDS client that other programs link. Units as on the wire: mm, rad. No Fast DDS type appears here.
+namespace trammel::client {
+
+struct SessionOptions {
+  std::uint32_t domain = 0;
+  std::vector<std::uint16_t> server_ports = {17500};  ///< on 127.0.0.1, one a replica
+  std::chrono::milliseconds timeout{5000};            ///< of one call, discovery included
+};
+
+/// What a call is about; must fit what the model was trained on.
+struct CallContext {
+  std::string cell;
+  std::string tool;     ///< empty: the cell's only one
+  std::string payload;  ///< empty: the cell's only one
+  bool controller_compensates = false;
+  std::string model;    ///< empty: the model in force; else `@version` or a model id that must be the one in force
+};
+
+struct PoseMm {
+  double x_mm = 0, y_mm = 0, z_mm = 0;
+  double qw = 1, qx = 0, qy = 0, qz = 0;
+};
+
+/// Which model answered.
+struct ModelInfo {
+  std::string cell, id, hash, level, batch_id;
+  int version = 0;
+  std::int64_t trained_at_unix_s = 0;
+  double data_age_s = 0;
+  int training_poses = 0;
+  double validation_rms_mm = 0;
+  bool in_force = false;
+};
+
+struct PredictedError {
+  PoseMm nominal, predicted;  ///< X_BT
+  double dx_mm = 0, dy_mm = 0, dz_mm = 0;
+  double sx_mm = 0, sy_mm = 0, sz_mm = 0;
+  bool in_domain = false;
+};
+
+struct TargetMm {
+  PoseMm pose;                    ///< ignored for a joint target
+  std::vector<double> seed_rad;   ///< empty when `conf` says the branch
+  std::optional<int> conf;
+  bool joint_target = false;
+};
+
+struct CorrectedTarget {
+  std::string status;  ///< `ok`, `out_of_domain`, ... as in files
+  PoseMm commanded;
+  std::vector<double> q_rad;
+  double error_before_mm = 0, error_after_mm = 0, sigma_mm = 0;
+  int iterations = 0;
+  std::string message;
+};
+
+template <typename T>
+struct Answer {
+  ModelInfo model;  ///< all items come from this one
+  std::vector<T> items;
+};
+
+struct JobStatus {
+  std::int64_t job = 0;
+  std::string cell, stage, what;  ///< stage: `queued training storing done failed`
+  double share = 0;
+  int model_version = 0;
+  bool in_force = false;
+};
+
+struct ServerStatus {
+  std::string server_id, version, state;
+  std::vector<std::string> cells;
+  std::uint64_t requests = 0, refused = 0;
+  double uptime_s = 0;
+  int queued_jobs = 0;
+};
+
+/// One participant, its own reply partition. Thread-safe; calls from several threads overlap. Errors: kUnreachable when no
+/// server answered in time, else what the server said, with its code.
+class Session {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Session>> open(const SessionOptions& options);
+  ~Session();
+
+  /// Rows of joint vectors, rad.
+  [[nodiscard]] Result<Answer<PredictedError>> predict_error(const CallContext& context,
+                                                             const std::vector<std::vector<double>>& joints_rad);
+  [[nodiscard]] Result<Answer<CorrectedTarget>> correct_targets(const CallContext& context,
+                                                                const std::vector<TargetMm>& targets);
+  /// The CSV as it is on disk. Returns the job. A repeat after a lost answer is the same request to the server.
+  [[nodiscard]] Result<std::int64_t> submit_measurements(const std::string& cell, const std::string& batch_id,
+                                                         const std::string& csv);
+  [[nodiscard]] Result<std::int64_t> train(const std::string& cell, const std::vector<std::string>& batch_ids,
+                                           const std::string& level, const std::string& bias);
+  [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
+  /// Returns the version now in force.
+  [[nodiscard]] Result<int> activate(const std::string& cell, int version);
+  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// The model file's text. version 0 = in force.
+  [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version);
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
+
+  /// Last state published, waiting up to the timeout for a server to appear.
+  [[nodiscard]] Result<std::vector<ServerStatus>> servers();
+  /// Models in force, of every cell, from ModelStatus.
+  [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
+  /// Calls `listener` for the job's progress until it is done or failed (its last state is returned) or `limit` is over
+  /// (kUnreachable).
+  [[nodiscard]] Result<JobStatus> wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
+                                               const std::function<void(const JobStatus&)>& listener);
+
+ private:
+  struct Participant;
+  explicit Session(std::unique_ptr<Participant> participant);
+  std::unique_ptr<Participant> participant_;
+};
+
+}  // namespace trammel::client

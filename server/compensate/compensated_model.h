@@ -1,0 +1,127 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/bias/bias_model.h"
+#include "server/calibrate/calibrate.h"
+
+namespace trammel {
+
+/// Error figures of a set of poses: |measured - predicted|, m.
+struct ErrorFigures {
+  double rms = 0, mean = 0, p997 = 0, max = 0;
+  Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
+};
+
+/// The three levels of one model on one set of poses.
+struct Evaluation {
+  int poses = 0;
+  ErrorFigures nominal, calibrated, compensated;
+  double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
+  int in_domain = 0;
+};
+
+/// The error expected at one joint vector, all in B.
+struct ErrorPrediction {
+  Pose X_BT_nominal;    ///< where the controller believes the tool to be
+  Pose X_BT_predicted;  ///< where it will be
+  Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
+  Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
+  bool in_domain = false;              ///< false: error_B is the calibrated model's, without learned bias
+};
+
+enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
+/// As files and the wire spell it: `ok`, `out_of_domain`, ...
+[[nodiscard]] std::string_view to_string(CorrectionStatus status);
+
+/// A tool pose that is wanted, or the joints that a program commands.
+struct Target {
+  Pose X_BT = Pose::Identity();
+  std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
+  std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
+  bool joint_target = false;        ///< X_BT is unset: the pose wanted is the nominal one of `seed`
+};
+
+struct Correction {
+  CorrectionStatus status = CorrectionStatus::kRefused;
+  Pose X_BT_wanted = Pose::Identity();
+  Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
+  JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
+  double error_before = 0;                 ///< m, expected |error| without correction
+  double error_after = 0;                  ///< m, what the iteration left
+  double stddev = 0;                       ///< m, root sum of squares of the three axes, of the tool position reached
+  int iterations = 0;
+  std::string message;                     ///< why not ok
+};
+
+struct CorrectOptions {
+  double tolerance = 1e-7;  ///< m, last step (1e-4 mm)
+  int max_iterations = 10;
+};
+
+/// Where a model comes from.
+struct ModelProvenance {
+  std::string id;            ///< first 12 characters of the hash
+  std::string hash;          ///< SHA-256 of the model's content
+  std::string level;         ///< source names joined by commas
+  std::string batch_id;
+  std::string batch_hash;    ///< of the batch text
+  std::int64_t trained_at = 0;  ///< Unix time, s
+  int training_poses = 0;
+  std::uint64_t seed = 0;
+  std::string program_version;
+};
+
+/// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap to
+/// copy, thread-safe.
+class CompensatedModel {
+ public:
+  struct Parts {
+    PhysicalModel physics;
+    std::vector<IdentifiedParameter> parameters;
+    std::vector<UnidentifiableCombination> unidentifiable;
+    int rank = 0;
+    double condition_number = 0;
+    double discrepancy = 0;           ///< m per axis, see CalibrationResult
+    std::optional<BiasState> bias;
+    JointVector q_min, q_max;         ///< range of the training poses, rad
+    double prior_share_limit = 0;     ///< in domain: prior share not above this
+    ModelProvenance provenance;       ///< id and hash are filled in by make()
+    std::optional<Evaluation> validation;  ///< on poses held out from training
+    double training_rms = 0;               ///< m, calibrated
+  };
+  [[nodiscard]] static Result<CompensatedModel> make(Parts parts);
+
+  [[nodiscard]] const Parts& parts() const { return inside_->parts; }
+  [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
+  [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
+
+  /// q is checked by the caller for size; tool and payload as resolve_tool() gives them.
+  [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
+                                        const std::string& payload) const;
+  /// Target correction, source section 3.4.1.
+  [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
+                                   const CorrectOptions& options = {}) const;
+  /// Measured against predicted, pose by pose.
+  [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
+
+ private:
+  struct Inside {
+    Parts parts;
+    std::optional<BiasModel> bias;
+  };
+  explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+  std::shared_ptr<const Inside> inside_;
+};
+
+/// The model as text (JSON, one object) and back. load refuses a text whose hash does not fit its content.
+[[nodiscard]] std::string serialize(const CompensatedModel& model);
+[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where);
+[[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
+
+}  // namespace trammel

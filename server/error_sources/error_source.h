@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/arm_state.h"
+#include "server/robot/cell.h"
+#include "server/robot/pose_context.h"
+
+namespace trammel {
+
+/// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people read it.
+struct Parameter {
+  std::string name;         ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
+  std::string unit;         ///< for people: `mm`, `rad`, `rad/Nmm`
+  double scale = 1;         ///< value for people = scale * SI value
+  double prior = 0;         ///< what it is believed to be before any data, SI
+  double prior_scale = 1;   ///< how far from there it may reasonably be (one standard deviation), SI
+  double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
+};
+
+/// One physical cause of error: its parameters and what they do to the arm. Immutable; thread-safe.
+class ErrorSource {
+ public:
+  virtual ~ErrorSource() = default;
+  /// As spelled in a cell file: the cause, then `:joint` where it concerns one.
+  [[nodiscard]] virtual std::string name() const = 0;
+  [[nodiscard]] virtual const std::vector<Parameter>& parameters() const = 0;
+  /// What a report says of it in one sentence.
+  [[nodiscard]] virtual std::string explanation() const = 0;
+  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given, its
+  /// columns first_column... receive the exact derivative, and sources that depend on the state pass the derivatives
+  /// of earlier sources on.
+  virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+                     StateJacobian* jacobian, int first_column) const = 0;
+};
+
+using ErrorSourcePtr = std::shared_ptr<const ErrorSource>;
+
+/// The source that `spec` names (`geometry`, `gear_transmission:3`) for this cell. Refuses an unknown name or joint.
+[[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
+
+/// Expands a level into source names: `M0`..`M3`, a list, or a level and more: `M2,gear_transmission:3`.
+[[nodiscard]] Result<std::vector<std::string>> parse_level(const std::string& level);
+
+}  // namespace trammel

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/error_sources/error_source.h"
+
+namespace trammel {
+
+/// Nominal chain + error sources with a value for each parameter: where the tool really is, by physics alone.
+/// An immutable value once built; thread-safe.
+struct PhysicalModel {
+  std::shared_ptr<const Cell> cell;
+  Pose X_WB = Pose::Identity();       ///< nominal base: the cell's, or found from data where the cell says unknown
+  std::map<std::string, Pose> tools;  ///< X_FT likewise
+  std::vector<ErrorSourcePtr> sources;
+  Eigen::VectorXd values;  ///< SI, the parameters of all sources one after the other
+
+  [[nodiscard]] int parameter_count() const;
+  /// Of all sources in order.
+  [[nodiscard]] std::vector<Parameter> parameters() const;
+  [[nodiscard]] Eigen::VectorXd prior_values() const;
+
+  /// X_WT of the chain alone: no error source.
+  [[nodiscard]] Pose nominal_pose_W(const PoseContext& context) const;
+  /// X_WT with every source.
+  [[nodiscard]] Pose pose_W(const PoseContext& context) const;
+  /// X_WT and the 6 x P derivative [dp; rotation vector] in W by the parameters, at `parameter_values`.
+  Pose pose_W(const PoseContext& context, const Eigen::VectorXd& parameter_values, Eigen::MatrixXd* jacobian) const;
+
+ private:
+  [[nodiscard]] ArmState nominal_state(const PoseContext& context) const;
+};
+
+/// A model of `cell` with the sources that `specs` name, at their prior values. An unknown base or tool is identity until
+/// it is found.
+[[nodiscard]] Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell,
+                                                        const std::vector<std::string>& specs);
+
+}  // namespace trammel

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// A model with its place in the cell's history.
+struct ServedModel {
+  std::string cell;
+  int version = 0;
+  CompensatedModel model;
+};
+
+/// The model in force for each cell. Thread-safe: a reader gets the whole model or the one before, and keeps it for as
+/// long as it holds the pointer. Readers never wait for training.
+class ModelRegistry {
+ public:
+  /// Null when the cell has no model in force.
+  [[nodiscard]] std::shared_ptr<const ServedModel> in_force(const std::string& cell) const;
+  void publish(std::shared_ptr<const ServedModel> model);
+  [[nodiscard]] std::vector<std::shared_ptr<const ServedModel>> all() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<const ServedModel>> models_;  // guarded by mutex_
+};
+
+}  // namespace trammel

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/arm_state.h"
+#include "server/robot/chain.h"
+
+/// A cell as its owner describes it: the robot, where it stands, what it carries and who measures it.
+namespace trammel {
+
+struct Tracker {
+  double sigma = 13e-6;                ///< m, one measurement, one axis
+  double sigma_rotation = 61e-6;       ///< rad, one measurement, one axis
+  std::optional<Vector3> p_W;          ///< where it stands, for visibility
+  std::optional<double> aperture;      ///< rad, half angle in which the target is seen
+};
+
+/// What to identify and what to learn. Sources as spelled on the command line: `geometry`, `gear_transmission:3`.
+struct ModelSpec {
+  std::vector<std::string> error_sources = {"base", "geometry", "compliance"};
+  std::string bias = "se";
+};
+
+/// Closed box in B, m.
+struct Workspace {
+  Vector3 lower, upper;
+};
+
+struct Cell {
+  std::string name;
+  Chain robot;
+  std::optional<Pose> X_WB;                          ///< nominal base; empty = unknown, found from data
+  Vector3 gravity_W = -Vector3::UnitZ();             ///< unit vector
+  std::map<std::string, std::optional<Pose>> tools;  ///< X_FT; empty = unknown, found from data
+  std::map<std::string, Payload> payloads;
+  Tracker tracker;
+  ModelSpec model;
+  std::vector<std::pair<double, double>> joint_ranges;  ///< rad, of this cell; empty = the robot's limits
+  std::optional<Workspace> workspace;
+  std::string cell_yaml;   ///< the texts it was read from, kept so that a stored model is whole
+  std::string robot_yaml;
+};
+
+/// Reads the two texts (DESIGN section 3); `where` names the cell file in errors. Refuses unknown keys, wrong types,
+/// non-unit quaternions, missing rows, each with file, key and limit.
+[[nodiscard]] Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml,
+                                      const std::string& where);
+/// Reads a cell file and the robot file it names, relative to itself.
+[[nodiscard]] Result<Cell> read_cell(const std::string& path);
+/// Reads a robot file. `where` names it in errors.
+[[nodiscard]] Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where);
+[[nodiscard]] Result<Chain> read_robot(const std::string& path);
+
+/// The tool a request means: `requested`, or the only one when that is empty. Refuses an unknown name, or none of several.
+[[nodiscard]] Result<std::string> resolve_tool(const Cell& cell, const std::string& requested);
+/// The same for payloads; a cell without payloads has the one called "" (nothing carried).
+[[nodiscard]] Result<std::string> resolve_payload(const Cell& cell, const std::string& requested);
+
+}  // namespace trammel

@@ -1,0 +1,86 @@
+#include "server/robot/chain.h"
+
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/robot/arm_state.h"
+
+namespace trammel {
+
+Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vector<Coupling> couplings) {
+  const int n = static_cast<int>(joints.size());
+  if (n == 0) return refused("robot {}: no joints", name);
+  Chain chain;
+  chain.transmission_ = Eigen::MatrixXd::Zero(n, n);
+  for (int i = 0; i < n; ++i) {
+    const Joint& joint = joints[static_cast<std::size_t>(i)];
+    if (!(joint.lower < joint.upper)) {
+      return refused("robot {} joint {}: lower limit {} is not below upper limit {}", name, i + 1, joint.lower,
+                     joint.upper);
+    }
+    if (std::abs(joint.sign) != 1.0) {
+      return refused("robot {} joint {}: sign is {}, only 1 and -1 are allowed", name, i + 1, joint.sign);
+    }
+    chain.transmission_(i, i) = joint.sign;
+  }
+  for (const Coupling& coupling : couplings) {
+    if (coupling.joint < 0 || coupling.joint >= n || coupling.follows < 0 || coupling.follows >= n ||
+        coupling.joint == coupling.follows) {
+      return refused("robot {}: coupling of joint {} to joint {} in a robot of {} joints", name, coupling.joint + 1,
+                     coupling.follows + 1, n);
+    }
+    chain.transmission_(coupling.joint, coupling.follows) += coupling.ratio;
+  }
+  if (std::abs(chain.transmission_.determinant()) < 1e-6) return refused("robot {}: couplings cannot be inverted", name);
+  chain.name_ = std::move(name);
+  chain.joints_ = std::move(joints);
+  return chain;
+}
+
+std::vector<LinkGeometry> Chain::links_at(const JointVector& q) const {
+  TRAMMEL_CHECK(q.size() == size());
+  const Eigen::VectorXd value = transmission_ * q;
+  std::vector<LinkGeometry> links;
+  links.reserve(joints_.size());
+  for (int i = 0; i < size(); ++i) {
+    LinkGeometry link = joint(i).link;
+    (joint(i).type == JointType::kRevolute ? link.theta : link.d) += value(i);
+    links.push_back(link);
+  }
+  return links;
+}
+
+namespace {
+
+ArmState bare_arm(const Chain& chain, const JointVector& q) {
+  ArmState state;
+  state.chain = &chain;
+  state.links = chain.links_at(q);
+  return state;
+}
+
+}  // namespace
+
+Pose Chain::flange_pose(const JointVector& q) const { return ArmKinematics(bare_arm(*this, q)).tool_pose_W(); }
+
+Eigen::MatrixXd Chain::jacobian(const JointVector& q, const Vector3& p_F) const {
+  ArmState state = bare_arm(*this, q);
+  state.X_FT.translation() = p_F;
+  const Eigen::MatrixXd all = ArmKinematics(state).pose_jacobian();
+  const StateRows rows(size());
+  Eigen::MatrixXd per_joint(6, size());
+  for (int i = 0; i < size(); ++i) {
+    per_joint.col(i) = all.col(joint(i).type == JointType::kRevolute ? rows.theta(i) : rows.d(i));
+  }
+  return per_joint * transmission_;
+}
+
+std::optional<int> Chain::joint_outside_limits(const JointVector& q, double tolerance) const {
+  TRAMMEL_CHECK(q.size() == size());
+  for (int i = 0; i < size(); ++i) {
+    if (!(q(i) >= joint(i).lower - tolerance && q(i) <= joint(i).upper + tolerance)) return i;
+  }
+  return std::nullopt;
+}
+
+}  // namespace trammel

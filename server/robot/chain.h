@@ -1,0 +1,75 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/pose.h"
+
+/// The nominal robot: a serial chain of n joints, one DH or Hayati row for each.
+namespace trammel {
+
+enum class JointType { kRevolute, kPrismatic };
+
+/// The five numbers of a link. Link i is Tz(d) Rz(theta) Tx(a) Rx(alpha), eq. (3.3), or, where the axis is parallel
+/// to the next one, Rz(theta) Tx(a) Rx(alpha) Ry(beta), eq. (3.4). m, rad.
+struct LinkGeometry {
+  double theta = 0;
+  double d = 0;
+  double a = 0;
+  double alpha = 0;
+  double beta = 0;
+};
+
+/// One joint and the link that follows it.
+struct Joint {
+  JointType type = JointType::kRevolute;
+  LinkGeometry link;    ///< nominal; theta (revolute) or d (prismatic) is the offset at joint value 0
+  bool hayati = false;  ///< beta is a parameter of this link and d is not
+  double sign = 1;      ///< +1 or -1: the controller's sense of this joint against the right-hand rule
+  double lower = -std::numeric_limits<double>::infinity();  ///< rad (m), of the commanded value
+  double upper = std::numeric_limits<double>::infinity();
+  double gear_ratio = 0;             ///< motor turns per joint turn; 0 when unknown
+  double compliance_prior = 0;       ///< rad/Nm
+  std::optional<double> max_speed;   ///< rad/s (m/s)
+};
+
+/// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its own (0-based).
+struct Coupling {
+  int joint = 0;
+  int follows = 0;
+  double ratio = 0;
+};
+
+/// A robot as its maker describes it. An immutable value.
+class Chain {
+ public:
+  Chain() = default;
+  /// Refuses: no joints, an empty or reversed limit, a coupling of a joint that does not exist or with itself.
+  [[nodiscard]] static Result<Chain> make(std::string name, std::vector<Joint> joints,
+                                          std::vector<Coupling> couplings = {});
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] int size() const { return static_cast<int>(joints_.size()); }
+  [[nodiscard]] const Joint& joint(int i) const { return joints_[static_cast<std::size_t>(i)]; }
+  /// n x n: d(kinematic joint value)/d(commanded joint value): signs and couplings.
+  [[nodiscard]] const Eigen::MatrixXd& transmission() const { return transmission_; }
+
+  /// The nominal links with the joints at the commanded `q`.
+  [[nodiscard]] std::vector<LinkGeometry> links_at(const JointVector& q) const;
+  /// X_BF at the commanded `q` (size n), eq. (3.2) without base and tool.
+  [[nodiscard]] Pose flange_pose(const JointVector& q) const;
+  /// 6 x n geometric Jacobian of the point `p_F` (m, in F): [dp; rotation vector] in B per commanded joint, eq. (3.7).
+  [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
+  /// Index of the first joint outside its limits (beyond `tolerance`), if any.
+  [[nodiscard]] std::optional<int> joint_outside_limits(const JointVector& q, double tolerance = 1e-9) const;
+
+ private:
+  std::string name_;
+  std::vector<Joint> joints_;
+  Eigen::MatrixXd transmission_;
+};
+
+}  // namespace trammel
