@@ -23,7 +23,9 @@ class ModelRegistry {
  public:
   /// Null when the cell has no model in force.
   [[nodiscard]] std::shared_ptr<const ServedModel> in_force(const std::string& cell) const;
+  /// Puts it in the place of its cell's model; those who hold the one before keep it.
   void publish(std::shared_ptr<const ServedModel> model);
+  /// Of every cell that has one in force, by cell name.
   [[nodiscard]] std::vector<std::shared_ptr<const ServedModel>> all() const;
 
  private:

@@ -14,10 +14,11 @@ namespace trammel {
 
 struct StoredBatch {
   std::string cell;
-  std::string id;          ///< unique within the cell, for ever
-  std::string csv;         ///< as it came
-  std::string hash;        ///< SHA-256 of csv
-  std::string request_id;  ///< client and sequence number of the request that brought it: a repeat of it is not a conflict
+  std::string id;    ///< unique within the cell, for ever
+  std::string csv;   ///< as it came
+  std::string hash;  ///< SHA-256 of csv
+  std::string
+      request_id;  ///< client and sequence number of the request that brought it: a repeat of it is not a conflict
   std::int64_t accepted_at = 0;  ///< Unix time, s
   int poses = 0;
 };
@@ -31,9 +32,10 @@ struct StoredJob {
   std::vector<std::string> batch_ids;  ///< trained together, in this order
   std::string level, bias;             ///< empty: as the cell file says
   JobState state = JobState::kQueued;
-  std::string message;                 ///< why it failed, or what it made: `version 3, in force`
-  std::int64_t created_at = 0;
-  int model_version = 0;               ///< 0 until done
+  std::string message;          ///< why it failed, or what became of its model
+  std::int64_t created_at = 0;  ///< Unix time, s
+  int model_version = 0;        ///< 0 until done
+  int attempts = 0;             ///< times it was begun without being finished or put back
 };
 
 /// A line of a cell's model history.
@@ -41,23 +43,25 @@ struct StoredModel {
   std::string cell;
   int version = 0;  ///< 1, 2, 3... within the cell
   std::string id, hash, level, batch_id;
-  std::int64_t created_at = 0;
+  std::int64_t created_at = 0;  ///< Unix time of its being stored, s
   int training_poses = 0;
   double validation_rms = 0;  ///< m; 0 when nothing was held out
   bool in_force = false;
 };
 
 /// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, on disk when
-/// it returns.
+/// it returns. What the disk or the database refuses is kInternal and names the file.
 class Store {
  public:
-  /// Creates the file where there is none. Refuses a file of another program or of a newer schema, and a second writer
-  /// process on the same file.
+  /// Creates the file where there is none. Refuses (kRefused) a file of another program or of a newer schema,
+  /// (kConflict) a second writer on the same file, (kInternal) a damaged file. Beside the file stands `<file>.lock`
+  /// with the writer's process id.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
   ~Store();
 
-  /// Accepts the batch and queues its training job in one transaction; returns the job. The same request again returns
-  /// the job it made then. Refuses (kConflict) an id that this cell already has.
+  /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. The
+  /// same request with the same content again returns the job it made then. Refuses (kConflict) an id that this cell
+  /// already has otherwise.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
   /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job);
@@ -68,17 +72,26 @@ class Store {
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
   /// Queued and running ones of all cells, oldest first: what a restart must finish.
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;
+  /// These refuse (kNotFound) a job that is done or failed already. Running counts an attempt; queued takes it back.
   [[nodiscard]] Status set_job_running(std::int64_t id);
+  [[nodiscard]] Status set_job_queued(std::int64_t id);
   [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message);
 
-  /// Stores the model as the cell's next version, marks `job` (0 = none) done and, if asked, puts it in force: one
-  /// transaction. Returns the version.
+  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and, if asked, puts the
+  /// model in force: one transaction. Returns the version.
   [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
                                       bool put_in_force, const std::string& message);
-  /// Puts a stored version in force. Refuses (kNotFound) an unknown one.
+  /// Puts a stored version in force; nothing changes when it is already. Refuses (kNotFound) an unknown one.
+  ///
+  /// The rule of going back: an activation remembers the one that it replaced. Rolling back restores that one together
+  /// with what it remembers, so rolling back again goes further back and never forth: after 1, 2, 3 it gives 2, then 1,
+  /// then kNotFound. Activating anew remembers what was in force at that moment, however that came to be.
   [[nodiscard]] Status activate(const std::string& cell, int version);
-  /// The version that was in force before the present one; kNotFound when there is none.
+  /// The version that rollback() would restore; kNotFound when there is none.
   [[nodiscard]] Result<int> previous_in_force(const std::string& cell) const;
+  /// Puts the version of previous_in_force() in force; returns it.
+  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
   /// Version in force; empty when none is.

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -9,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/base/bounded_queue.h"
 #include "server/registry/model_registry.h"
@@ -19,6 +19,7 @@ namespace trammel {
 
 struct TrainerOptions {
   int queue_capacity = 16;        ///< jobs waiting; one more is refused (kBusy) and nothing is stored
+  int max_poses = 5000;           ///< of one training, all its batches together; memory grows with the square
   double validation_share = 0.2;  ///< of the rows of a batch without `set` column
   double accept_ratio = 1.02;     ///< put in force only if held-out rms <= this times that of the model in force
   std::uint64_t seed = 1;
@@ -38,44 +39,70 @@ struct JobProgress {
 };
 
 /// The queue of trainings and the one thread that works on it. Everything accepted is in the store before it is
-/// acknowledged; what a crash interrupts is taken up again at the next start. Thread-safe.
+/// acknowledged; what a crash interrupts is taken up again at the next start, at most three times. Thread-safe, start()
+/// and stop() excepted.
+///
+/// Which rows are held out is drawn batch by batch: a row held out once is held out in every training of that batch, so
+/// that the model in force and its successor are compared on poses that neither was trained on.
 class Trainer {
  public:
-  using ProgressListener = std::function<void(const JobProgress&)>;          ///< called from the worker thread
-  using ModelListener = std::function<void(const ServedModel&, bool in_force)>;  ///< a model was stored or put in force
+  /// Called by whichever thread changes the job; for one job never by two at a time.
+  using ProgressListener = std::function<void(const JobProgress&)>;
+  /// A model was stored (in_force: and put in force). Called in the order of the changes, while no other can happen: it
+  /// must not call back into what changes models.
+  using ModelListener = std::function<void(const ServedModel&, bool in_force)>;
 
+  /// `store` and `registry` outlive it.
   Trainer(std::map<std::string, std::shared_ptr<const Cell>> cells, Store& store, ModelRegistry& registry,
           TrainerOptions options);
   ~Trainer();  ///< stops as stop()
 
   /// Set before start().
   void set_listeners(ProgressListener progress, ModelListener model);
-  /// Publishes the models in force from the store, queues unfinished jobs, starts the worker.
-  [[nodiscard]] Status start();
+  /// Publishes the models in force from the store, queues unfinished jobs, starts the worker. Returns what could not be
+  /// taken up, for the log: a model that does not load or was trained for another robot, a job of a cell not served
+  /// here, a job that was interrupted too often and is now failed.
+  [[nodiscard]] Result<std::vector<std::string>> start();
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
   [[nodiscard]] const std::map<std::string, std::shared_ptr<const Cell>>& cells() const { return cells_; }
 
-  /// Checks the batch against its cell, stores it with its job, queues it. Returns the job id.
+  /// Checks the batch against its cell, stores it with its job, queues it. Returns the job id; the same request again
+  /// returns the same. Refuses what the batch reader and the cell refuse, an unknown cell (kNotFound), an id that the
+  /// cell already has (kConflict), too many poses (kTooLarge) and, while the queue is full, everything new (kBusy).
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
-  /// Trains again from stored batches; none named = the newest batch.
+  /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias);
   /// Puts a stored version in force and publishes it.
   [[nodiscard]] Status activate(const std::string& cell, int version);
   /// Back to the version in force before; returns it.
   [[nodiscard]] Result<int> rollback(const std::string& cell);
-  /// Takes a model file from elsewhere into the history, not in force. Refuses one of another cell.
+  /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
+  /// same model is there already. Refuses one of another cell or robot.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
 
-  /// Of a job that this process knows, else from the store.
+  /// Of an unfinished job as it goes on, of a finished one from the store.
   [[nodiscard]] Result<JobProgress> progress(std::int64_t job) const;
+  /// Waiting, without the one being trained.
+  [[nodiscard]] int queued_jobs() const;
 
  private:
+  [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const std::string& name) const;
+  [[nodiscard]] Status check_room() const;
+  void enqueue(const StoredJob& job);
+
+  [[nodiscard]] Status publish_from_store(const std::string& cell);
+  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
+  void put_in_force(std::shared_ptr<const ServedModel> model);
+
   void work(const std::stop_token& stop);
   void run(std::int64_t job, const std::stop_token& stop);
+  [[nodiscard]] Status attempt(std::int64_t job, const std::stop_token& stop);
+  [[nodiscard]] Result<MeasurementBatch> load_batches(const StoredJob& job, const Cell& cell) const;
+  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress);
   void report(const JobProgress& progress);
 
   const std::map<std::string, std::shared_ptr<const Cell>> cells_;
@@ -84,10 +111,11 @@ class Trainer {
   const TrainerOptions options_;
   ProgressListener on_progress_;
   ModelListener on_model_;
-  BoundedQueue<std::int64_t> queue_;
+  std::unique_ptr<BoundedQueue<std::int64_t>> queue_;
+  std::mutex submit_mutex_;      // one at a time between the look at the queue's room and the push: who may push
   std::mutex activation_mutex_;  // one change of what is in force at a time
   mutable std::mutex progress_mutex_;
-  std::map<std::int64_t, JobProgress> progress_;  // guarded by progress_mutex_
+  std::map<std::int64_t, JobProgress> progress_;  // guarded by progress_mutex_: unfinished jobs
   std::jthread worker_;
 };
 

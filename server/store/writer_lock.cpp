@@ -1,0 +1,50 @@
+#include "server/store/writer_lock.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+namespace trammel {
+namespace {
+
+std::string holder_of(int descriptor) {
+  std::array<char, 32> text{};
+  const ssize_t size = ::pread(descriptor, text.data(), text.size() - 1, 0);
+  const std::string pid(text.data(), size > 0 ? static_cast<std::size_t>(size) : 0);
+  return pid.substr(0, pid.find('\n'));
+}
+
+}  // namespace
+
+Result<WriterLock> WriterLock::take(const std::string& file) {
+  std::error_code unknown;
+  const auto real = std::filesystem::weakly_canonical(file, unknown);
+  const std::string path = (unknown ? file : real.string()) + ".lock";
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor < 0) return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, std::strerror(errno));
+  WriterLock lock(descriptor);
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) {
+      return failure(ErrorCode::kInternal, "{}: cannot be locked: {}", path, std::strerror(errno));
+    }
+    return failure(ErrorCode::kConflict, "{} is being written by process {} (lock {}); one writer at a time", file,
+                   holder_of(descriptor), path);
+  }
+  const std::string pid = std::to_string(::getpid()) + "\n";
+  if (::ftruncate(descriptor, 0) != 0 || ::pwrite(descriptor, pid.data(), pid.size(), 0) < 0) {
+    return failure(ErrorCode::kInternal, "{}: cannot be written: {}", path, std::strerror(errno));
+  }
+  return lock;
+}
+
+WriterLock::~WriterLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+}  // namespace trammel

@@ -1,0 +1,477 @@
+#include "server/trainer/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <set>
+#include <utility>
+
+#include "server/base/check.h"
+#include "server/base/hash.h"
+#include "server/base/units.h"
+#include "server/error_sources/error_source.h"
+#include "server/measurement/measurement.h"
+
+namespace trammel {
+namespace {
+
+constexpr int kMaxAttempts = 3;                           // of one job that takes the process down
+constexpr std::size_t kMaxBatchId = 128;                  // bytes
+constexpr std::chrono::milliseconds kReportInterval{50};  // of a running training, for its watchers
+
+std::int64_t now() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Status check_batch_id(const std::string& id) {
+  if (id.empty()) return refused("a batch needs an id");
+  if (id.size() > kMaxBatchId) return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId);
+  const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
+  if (!printable) return refused("batch id {:?} has control characters", id);
+  return {};
+}
+
+/// Whether a model of one serves the other: the kinematics count, names and priors do not.
+bool same_robot(const Chain& a, const Chain& b) {
+  if (a.size() != b.size() || a.transmission() != b.transmission()) return false;
+  for (int i = 0; i < a.size(); ++i) {
+    const Joint& one = a.joint(i);
+    const Joint& other = b.joint(i);
+    const auto numbers = [](const LinkGeometry& l) { return std::array{l.theta, l.d, l.a, l.alpha, l.beta}; };
+    if (one.type != other.type || numbers(one.link) != numbers(other.link)) return false;
+  }
+  return true;
+}
+
+/// Makes the drawing of the rows held out a property of the batch: see the class.
+void mark_held_out(MeasurementBatch& batch, double share, std::uint64_t seed) {
+  std::set<int> held_out;
+  for (const Measurement& m : split_batch(batch, share, seed).validation.measurements) held_out.insert(m.row);
+  for (Measurement& m : batch.measurements) {
+    m.set = held_out.contains(m.row) ? MeasurementSet::kValidation : MeasurementSet::kTrain;
+  }
+}
+
+/// Appends `next` in time. Pose ids stay unique; extra columns, which no training reads, are left behind.
+void append(MeasurementBatch& all, MeasurementBatch next) {
+  for (Measurement& m : next.measurements) {
+    m.pose_id = next.id + "/" + m.pose_id;
+    m.context.index = static_cast<int>(all.measurements.size());
+    m.extra.clear();
+    all.measurements.push_back(std::move(m));
+  }
+  all.id += (all.id.empty() ? "" : "+") + next.id;
+  all.source_text += next.source_text;
+}
+
+MeasurementBatch held_out_of(const MeasurementBatch& batch) {
+  MeasurementBatch held_out;
+  held_out.id = batch.id;
+  std::copy_if(batch.measurements.begin(), batch.measurements.end(), std::back_inserter(held_out.measurements),
+               [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
+  return held_out;
+}
+
+/// Whether a new model takes the place of the one in force, and why.
+struct Verdict {
+  bool put_in_force = false;
+  std::string message;
+};
+
+/// Against the nominal model: the first one of a cell, or the first after its tools have changed.
+Verdict judge_alone(const Evaluation& candidate) {
+  const bool better = candidate.compensated.rms < candidate.nominal.rms;
+  return {better,
+          fmt::format("{}: held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", better ? "in force" : "not in force",
+                      to_mm(candidate.compensated.rms), to_mm(candidate.nominal.rms), candidate.poses)};
+}
+
+Verdict judge_against(const Evaluation& candidate, const Evaluation& present, int present_version,
+                      double accept_ratio) {
+  const bool good = candidate.compensated.rms <= accept_ratio * present.compensated.rms;
+  return {good, fmt::format("{}: held-out rms {:.4f} mm, limit {} x {:.4f} mm of version {}, {} poses",
+                            good ? "in force" : "not in force", to_mm(candidate.compensated.rms), accept_ratio,
+                            to_mm(present.compensated.rms), present_version, candidate.poses)};
+}
+
+Verdict judge(const CompensatedModel& candidate, const ServedModel* present, const MeasurementBatch& held_out,
+              double accept_ratio) {
+  if (held_out.measurements.empty()) {
+    return {false, "not in force: no pose was held out to judge it; activate it if it is wanted"};
+  }
+  const Evaluation evaluation = candidate.evaluate(held_out);
+  if (!std::isfinite(evaluation.compensated.rms)) return {false, "not in force: its held-out rms is not finite"};
+  if (present == nullptr || !check_against_cell(held_out, present->model.cell())) return judge_alone(evaluation);
+  return judge_against(evaluation, present->model.evaluate(held_out), present->version, accept_ratio);
+}
+
+JobStage stage_of(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return JobStage::kQueued;
+    case JobState::kRunning:
+      return JobStage::kTraining;
+    case JobState::kDone:
+      return JobStage::kDone;
+    case JobState::kFailed:
+      return JobStage::kFailed;
+  }
+  return JobStage::kFailed;
+}
+
+JobProgress progress_of(const StoredJob& job) {
+  JobProgress progress;
+  progress.job = job.id;
+  progress.cell = job.cell;
+  progress.stage = stage_of(job.state);
+  progress.what = job.message;
+  progress.share = job.state == JobState::kDone ? 1 : 0;
+  progress.model_version = job.model_version;
+  return progress;
+}
+
+}  // namespace
+
+Trainer::Trainer(std::map<std::string, std::shared_ptr<const Cell>> cells, Store& store, ModelRegistry& registry,
+                 TrainerOptions options)
+    : cells_(std::move(cells)),
+      store_(store),
+      registry_(registry),
+      options_(options),
+      queue_(std::make_unique<BoundedQueue<std::int64_t>>(static_cast<std::size_t>(options.queue_capacity))) {}
+
+Trainer::~Trainer() { stop(); }
+
+void Trainer::set_listeners(ProgressListener progress, ModelListener model) {
+  TRAMMEL_CHECK(!worker_.joinable());
+  on_progress_ = std::move(progress);
+  on_model_ = std::move(model);
+}
+
+Result<std::vector<std::string>> Trainer::start() {
+  TRAMMEL_CHECK(!worker_.joinable());
+  std::vector<std::string> notices;
+  for (const auto& [name, cell] : cells_) {
+    if (auto published = publish_from_store(name); !published) notices.push_back(published.error().message);
+  }
+  auto unfinished = store_.unfinished_jobs();
+  if (!unfinished) return tl::make_unexpected(unfinished.error());
+  // Accepted is accepted: those of before may be more than the queue takes now.
+  queue_ = std::make_unique<BoundedQueue<std::int64_t>>(
+      std::max(static_cast<std::size_t>(options_.queue_capacity), unfinished->size()));
+  for (StoredJob& job : *unfinished) {
+    if (!cells_.contains(job.cell)) {
+      notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
+    } else if (job.state == JobState::kRunning && job.attempts >= kMaxAttempts) {
+      const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
+      if (auto failed = store_.set_job_failed(job.id, why); !failed) return tl::make_unexpected(failed.error());
+      notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
+    } else {
+      job.state = JobState::kQueued;
+      enqueue(job);
+    }
+  }
+  worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  return notices;
+}
+
+void Trainer::stop() {
+  if (!worker_.joinable()) return;
+  worker_.request_stop();
+  worker_.join();
+}
+
+Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
+                                     const std::string& request_id) {
+  const auto cell_found = cell(cell_name);
+  if (!cell_found) return tl::make_unexpected(cell_found.error());
+  if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
+  auto parsed = parse_batch_csv(csv, "batch " + batch_id);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  parsed->id = batch_id;
+  const auto checked = check_against_cell(std::move(*parsed), **cell_found);
+  if (!checked) return tl::make_unexpected(checked.error());
+  const int poses = static_cast<int>(checked->measurements.size());
+  if (poses > options_.max_poses) {
+    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses);
+  }
+
+  const std::lock_guard lock(submit_mutex_);
+  const bool repeated = store_.batch(cell_name, batch_id).has_value();
+  if (!repeated) {
+    if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
+  }
+  StoredJob job;
+  job.cell = cell_name;
+  job.batch_ids = {batch_id};
+  job.created_at = now();
+  const auto accepted =
+      store_.add_batch({cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses}, job);
+  if (!accepted) return tl::make_unexpected(accepted.error());
+  if (!repeated) enqueue(*accepted);
+  return accepted->id;
+}
+
+Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
+                                      const std::string& level, const std::string& bias) {
+  const auto cell_found = cell(cell_name);
+  if (!cell_found) return tl::make_unexpected(cell_found.error());
+  if (!level.empty()) {
+    const auto specs = parse_level(level);
+    if (!specs) return tl::make_unexpected(specs.error());
+    for (const std::string& spec : *specs) {
+      if (auto source = make_error_source(spec, **cell_found); !source) return tl::make_unexpected(source.error());
+    }
+  }
+  const auto stored = store_.batches(cell_name);
+  if (!stored) return tl::make_unexpected(stored.error());
+  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name);
+
+  StoredJob job;
+  job.cell = cell_name;
+  job.batch_ids = batch_ids.empty() ? std::vector{stored->back().id} : batch_ids;
+  job.level = level;
+  job.bias = bias;
+  job.created_at = now();
+  const std::set<std::string> wanted(job.batch_ids.begin(), job.batch_ids.end());
+  if (wanted.size() != job.batch_ids.size()) return refused("a batch is named twice; each counts once in a training");
+  std::int64_t poses = 0;
+  for (const StoredBatch& batch : *stored) poses += wanted.contains(batch.id) ? batch.poses : 0;
+  if (poses > options_.max_poses) {
+    return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses);
+  }
+
+  const std::lock_guard lock(submit_mutex_);
+  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
+  const auto accepted = store_.add_job(job);
+  if (!accepted) return tl::make_unexpected(accepted.error());
+  enqueue(*accepted);
+  return accepted->id;
+}
+
+Status Trainer::activate(const std::string& cell_name, int version) {
+  if (auto found = cell(cell_name); !found) return tl::make_unexpected(found.error());
+  const std::lock_guard lock(activation_mutex_);
+  auto model = load_for_service(cell_name, version);
+  if (!model) return tl::make_unexpected(model.error());
+  if (auto activated = store_.activate(cell_name, version); !activated) return activated;
+  put_in_force(std::make_shared<const ServedModel>(ServedModel{cell_name, version, std::move(*model)}));
+  return {};
+}
+
+Result<int> Trainer::rollback(const std::string& cell_name) {
+  if (auto found = cell(cell_name); !found) return tl::make_unexpected(found.error());
+  const std::lock_guard lock(activation_mutex_);
+  const auto version = store_.previous_in_force(cell_name);
+  if (!version) return version;
+  auto model = load_for_service(cell_name, *version);
+  if (!model) return tl::make_unexpected(model.error());
+  if (auto restored = store_.rollback(cell_name); !restored) return restored;
+  put_in_force(std::make_shared<const ServedModel>(ServedModel{cell_name, *version, std::move(*model)}));
+  return version;
+}
+
+Result<int> Trainer::import_model(const std::string& cell_name, const std::string& text) {
+  const auto cell_found = cell(cell_name);
+  if (!cell_found) return tl::make_unexpected(cell_found.error());
+  const auto model = deserialize(text, "imported model");
+  if (!model) return tl::make_unexpected(model.error());
+  if (model->cell().name != cell_name) {
+    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell_name);
+  }
+  if (!same_robot(model->cell().robot, (*cell_found)->robot)) {
+    return refused("imported model {} was trained for another robot than cell {} has", model->provenance().id,
+                   cell_name);
+  }
+  const std::lock_guard lock(activation_mutex_);
+  const auto present = store_.models(cell_name);
+  if (!present) return tl::make_unexpected(present.error());
+  for (const StoredModel& stored : *present) {
+    if (stored.hash == model->provenance().hash) return stored.version;
+  }
+  const auto version = store_.add_model(cell_name, *model, 0, false, "");
+  if (version && on_model_) on_model_({cell_name, *version, *model}, false);
+  return version;
+}
+
+Result<JobProgress> Trainer::progress(std::int64_t job) const {
+  {
+    const std::lock_guard lock(progress_mutex_);
+    if (const auto found = progress_.find(job); found != progress_.end()) return found->second;
+  }
+  const auto stored = store_.job(job);
+  if (!stored) return tl::make_unexpected(stored.error());
+  JobProgress progress = progress_of(*stored);
+  const auto present = registry_.in_force(stored->cell);
+  progress.in_force = present && stored->model_version != 0 && present->version == stored->model_version;
+  return progress;
+}
+
+int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
+
+Result<std::shared_ptr<const Cell>> Trainer::cell(const std::string& name) const {
+  const auto found = cells_.find(name);
+  if (found == cells_.end()) return failure(ErrorCode::kNotFound, "cell {} is not served here", name);
+  return found->second;
+}
+
+Status Trainer::check_room() const {
+  if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
+  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}; try again later", queue_->size(),
+                 options_.queue_capacity);
+}
+
+void Trainer::enqueue(const StoredJob& job) {
+  report(progress_of(job));  // before the push: the worker's reports come after it
+  TRAMMEL_CHECK(queue_->try_push(std::int64_t{job.id}));
+}
+
+Status Trainer::publish_from_store(const std::string& cell_name) {
+  const std::lock_guard lock(activation_mutex_);
+  const auto version = store_.version_in_force(cell_name);
+  if (!version) return tl::make_unexpected(version.error());
+  if (!*version) return {};
+  auto model = load_for_service(cell_name, **version);
+  if (!model) return tl::make_unexpected(model.error());
+  put_in_force(std::make_shared<const ServedModel>(ServedModel{cell_name, **version, std::move(*model)}));
+  return {};
+}
+
+Result<CompensatedModel> Trainer::load_for_service(const std::string& cell_name, int version) const {
+  auto model = store_.model(cell_name, version);
+  if (model && !same_robot(model->cell().robot, cells_.at(cell_name)->robot)) {
+    return refused("version {} of cell {} was trained for another robot than the cell has now", version, cell_name);
+  }
+  return model;
+}
+
+/// Of a model that the store has put in force; activation_mutex_ is held.
+void Trainer::put_in_force(std::shared_ptr<const ServedModel> model) {
+  registry_.publish(model);
+  if (on_model_) on_model_(*model, true);
+}
+
+void Trainer::work(const std::stop_token& stop) {
+  while (const auto job = queue_->pop(stop)) run(*job, stop);
+}
+
+void Trainer::run(std::int64_t job, const std::stop_token& stop) {
+  const Status outcome = [&]() -> Status {
+    try {
+      return attempt(job, stop);
+    } catch (const std::exception& error) {  // out of memory, for one: this training ends, the service goes on
+      return failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
+    }
+  }();
+  if (outcome) return;
+  JobProgress progress;
+  progress.job = job;
+  if (const auto stored = store_.job(job)) progress = progress_of(*stored);
+  if (stop.stop_requested()) {
+    // Should the store refuse, the job counts as interrupted and is taken up all the same.
+    static_cast<void>(store_.set_job_queued(job));
+    progress.stage = JobStage::kQueued;
+    return report(progress);
+  }
+  const Status failed = store_.set_job_failed(job, outcome.error().message);
+  if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
+  progress.stage = JobStage::kFailed;
+  progress.what = outcome.error().message;
+  report(progress);
+}
+
+Status Trainer::attempt(std::int64_t id, const std::stop_token& stop) {
+  const auto job = store_.job(id);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto cell_found = cell(job->cell);
+  if (!cell_found) return tl::make_unexpected(cell_found.error());
+  if (auto running = store_.set_job_running(id); !running) return running;
+
+  JobProgress progress = progress_of(*job);
+  progress.stage = JobStage::kTraining;
+  report(progress);
+  const auto batch = load_batches(*job, **cell_found);
+  if (!batch) return tl::make_unexpected(batch.error());
+
+  TrainOptions options;
+  if (!job->level.empty()) options.level = job->level;
+  if (!job->bias.empty()) options.bias = job->bias;
+  options.validation_share = options_.validation_share;
+  options.seed = options_.seed;
+  options.trained_at = now();
+  auto reported = std::chrono::steady_clock::time_point::min();
+  options.progress = [&](const std::string& stage, double share) {
+    const auto time = std::chrono::steady_clock::now();
+    if (time >= reported + kReportInterval) {
+      reported = time;
+      progress.what = stage;
+      progress.share = share;
+      report(progress);
+    }
+    return !stop.stop_requested();
+  };
+  const auto model = train(*cell_found, *batch, options);
+  if (!model) return tl::make_unexpected(model.error());
+  return keep(*model, *batch, progress);
+}
+
+Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell& cell) const {
+  std::vector<MeasurementBatch> batches;
+  for (const std::string& id : job.batch_ids) {
+    const auto stored = store_.batch(job.cell, id);
+    if (!stored) return tl::make_unexpected(stored.error());
+    auto parsed = parse_batch_csv(stored->csv, "batch " + id);
+    if (!parsed) return parsed;
+    parsed->id = id;
+    auto checked = check_against_cell(std::move(*parsed), cell);
+    if (!checked) return checked;
+    mark_held_out(*checked, options_.validation_share, options_.seed);
+    batches.push_back(std::move(*checked));
+  }
+  if (batches.size() == 1) return std::move(batches.front());
+  MeasurementBatch all;
+  for (MeasurementBatch& batch : batches) append(all, std::move(batch));
+  return all;
+}
+
+Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress) {
+  progress.stage = JobStage::kStoring;
+  progress.what.clear();
+  progress.share = 1;
+  report(progress);
+  {
+    const std::lock_guard lock(activation_mutex_);
+    const Verdict verdict =
+        judge(model, registry_.in_force(progress.cell).get(), held_out_of(batch), options_.accept_ratio);
+    const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
+    if (!version) return tl::make_unexpected(version.error());
+    const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});
+    if (verdict.put_in_force) {
+      put_in_force(served);
+    } else if (on_model_) {
+      on_model_(*served, false);
+    }
+    progress.what = verdict.message;
+    progress.model_version = *version;
+    progress.in_force = verdict.put_in_force;
+  }
+  progress.stage = JobStage::kDone;
+  report(progress);
+  return {};
+}
+
+void Trainer::report(const JobProgress& progress) {
+  {
+    const std::lock_guard lock(progress_mutex_);
+    const bool finished = progress.stage == JobStage::kDone || progress.stage == JobStage::kFailed;
+    if (finished) {
+      progress_.erase(progress.job);
+    } else {
+      progress_[progress.job] = progress;
+    }
+  }
+  if (on_progress_) on_progress_(progress);
+}
+
+}  // namespace trammel
