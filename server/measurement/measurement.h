@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,36 +17,41 @@ enum class MeasurementSet { kUnassigned, kTrain, kValidation };
 struct Measurement {
   std::string pose_id;
   PoseContext context;
-  Vector3 p_W = Vector3::Zero();    ///< tool point as measured, m
-  std::optional<Matrix3> R_WT;      ///< tool orientation as measured, active W <- T
-  std::optional<double> sigma;      ///< m, of one axis of this point
+  Vector3 p_W = Vector3::Zero();  ///< tool point as measured, m
+  std::optional<Matrix3> R_WT;    ///< tool orientation as measured, active W <- T
+  std::optional<double> sigma;    ///< m, of one axis of this point
   MeasurementSet set = MeasurementSet::kUnassigned;
-  int row = 0;                      ///< line in its file, for messages
-  std::vector<std::string> extra;   ///< values of the batch's extra columns
+  int row = 0;                     ///< line in its file, for messages
+  std::vector<std::string> extra;  ///< values of the batch's extra columns
 };
 
 /// Measurements taken together. The order is the order in time.
 struct MeasurementBatch {
-  std::string id;                   ///< name given by whoever submits it, else the file's name without its ending
+  std::string id;     ///< name given by whoever submits it, else the file's name without its ending
+  std::string where;  ///< the file as messages name it; empty = not from a file
   std::vector<Measurement> measurements;
+  std::vector<JointType> joint_types;      ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
   std::vector<std::string> extra_columns;  ///< header names of columns that Trammel does not know, kept
-  std::string source_text;          ///< the CSV as it came
+  std::string source_text;                 ///< the CSV as it came
 };
 
 /// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit: an empty file, a
-/// missing or doubled column, a short row, a number that is not finite, a quaternion that is not a unit one (limit 1e-3),
-/// a sigma that is not positive, a direction outside -1, 0, +1, two rows with one pose_id. Joints are counted, not
-/// checked against a robot.
+/// missing or doubled column, a row of another length, a number that is not finite, a quaternion that is not a unit one
+/// (limit 1e-3), a sigma that is not positive, a direction outside -1, 0, +1, two rows with one pose_id. In an optional
+/// column an empty field means that nothing was recorded. Joints are counted, not checked against a robot.
 [[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);
+/// The batch as parse_batch_csv() reads it; optional columns only where a row has them.
 [[nodiscard]] std::string to_csv(const MeasurementBatch& batch);
 
-/// The batch made ready for `cell`: tool and payload ids resolved; refused when the number of joints, a joint limit, an
-/// unknown tool or payload, or several candidates of either stand against it, or when the joints look like radians.
+/// The batch made ready for `cell`: tool and payload ids resolved. Refused when the number or kind of joints, a joint
+/// limit, an unknown tool or payload, or several candidates of either stand against it; when the joints look like
+/// radians; when positions spread over far more or far less than the robot's own motion does (metres for millimetres).
 [[nodiscard]] Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& cell);
 
 /// Rows for training and rows for validation: by the `set` column where the batch has one, else by drawing
-/// `validation_share` of the rows with `seed`. Reproducible: same rows, seed and share, same split.
+/// `validation_share` of the rows with `seed` (one row at least stays for training). Order, indices and source text
+/// stay. Reproducible: same rows, seed and share, same split.
 struct BatchSplit {
   MeasurementBatch train;
   MeasurementBatch validation;

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/cell.h"
+#include "server/robot/pose_context.h"
+
+namespace trammel {
+
+/// A pose that is to be, or was, commanded: no measurement yet.
+struct CommandedPose {
+  std::string pose_id;
+  PoseContext context;
+  int row = 0;  ///< line in its file, for messages
+};
+
+/// Poses in order: a measuring plan, or joints to predict for.
+struct JointList {
+  std::string where;                   ///< the file as messages name it
+  std::vector<JointType> joint_types;  ///< as the columns say: `q1_deg` or, of a rail, `q7_mm`
+  std::vector<CommandedPose> poses;
+};
+
+/// Reads a CSV with `q1_deg` ... `qn_deg` and any of the optional columns of a batch; all others are passed over.
+/// Refuses as parse_batch_csv() does.
+[[nodiscard]] Result<JointList> parse_joint_csv(const std::string& text, const std::string& where);
+[[nodiscard]] Result<JointList> read_joint_csv(const std::string& path);
+/// The list as parse_joint_csv() reads it.
+[[nodiscard]] std::string to_csv(const JointList& list);
+
+/// The list made ready for `cell`, as batches are: joints counted and held against the robot's limits, tool and payload
+/// ids resolved.
+[[nodiscard]] Result<JointList> check_against_cell(JointList list, const Cell& cell);
+
+}  // namespace trammel

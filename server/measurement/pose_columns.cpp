@@ -1,0 +1,144 @@
+#include "server/measurement/pose_columns.h"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <string_view>
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+struct JointColumn {
+  int number = 0;  // from 1
+  JointType type = JointType::kRevolute;
+};
+
+/// `q12_deg` -> 12, revolute; nothing for any other name.
+std::optional<JointColumn> as_joint_column(std::string_view name) {
+  if (!name.starts_with('q')) return std::nullopt;
+  JointColumn column;
+  const auto [end, error] = std::from_chars(name.data() + 1, name.data() + name.size(), column.number);
+  const std::string_view unit(end, static_cast<std::size_t>(name.data() + name.size() - end));
+  if (error != std::errc() || column.number < 1 || (unit != "_deg" && unit != "_mm")) return std::nullopt;
+  column.type = unit == "_deg" ? JointType::kRevolute : JointType::kPrismatic;
+  return column;
+}
+
+/// An optional column's number in this row; empty field = nothing recorded.
+Result<std::optional<double>> optional_number(const CsvTable& table, std::size_t row,
+                                              const std::optional<std::size_t>& column) {
+  if (!column || table.field(row, *column).empty()) return std::optional<double>();
+  return table.number(row, *column).map([](double value) { return std::optional(value); });
+}
+
+}  // namespace
+
+Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
+  PoseColumns found;
+  std::map<int, std::pair<std::size_t, JointType>> joints;
+  for (std::size_t i = 0; i < table.columns().size(); ++i) {
+    const auto joint = as_joint_column(table.columns()[i]);
+    if (joint && !joints.emplace(joint->number, std::pair(i, joint->type)).second) {
+      return refused("{}: two columns for joint {}: {} and {}", table.where(), joint->number,
+                     table.columns()[joints[joint->number].first], table.columns()[i]);
+    }
+  }
+  std::vector<std::string> direction_names;
+  for (const auto& [number, column] : joints) {
+    if (number != static_cast<int>(found.joints_.size()) + 1) {
+      return refused("{}: missing column q{}_deg before {}", table.where(), found.joints_.size() + 1,
+                     table.columns()[column.first]);
+    }
+    found.joints_.push_back(column.first);
+    found.joint_types_.push_back(column.second);
+    direction_names.push_back(fmt::format("dir{}", number));
+  }
+  Result<std::vector<std::size_t>> directions = table.all_or_none(direction_names);
+  if (!directions) return tl::make_unexpected(directions.error());
+  found.directions_ = std::move(*directions);
+  found.time_ = table.find("time_s");
+  found.temperature_ = table.find("temperature_c");
+  found.tool_ = table.find("tool_id");
+  found.payload_ = table.find("payload_id");
+  found.pose_id_ = table.find("pose_id");
+  return found;
+}
+
+Status PoseColumns::require_joints(const CsvTable& table) const {
+  if (!joints_.empty()) return {};
+  return tl::make_unexpected(table.require("q1_deg").error());
+}
+
+Result<JointVector> PoseColumns::joints(const CsvTable& table, std::size_t row) const {
+  JointVector q(static_cast<Eigen::Index>(joints_.size()));
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const Result<double> value = table.number(row, joints_[j]);
+    if (!value) return tl::make_unexpected(value.error());
+    q(static_cast<Eigen::Index>(j)) = joint_types_[j] == JointType::kRevolute ? from_deg(*value) : from_mm(*value);
+  }
+  return q;
+}
+
+bool PoseColumns::joints_empty(const CsvTable& table, std::size_t row) const {
+  return std::all_of(joints_.begin(), joints_.end(),
+                     [&](std::size_t column) { return table.field(row, column).empty(); });
+}
+
+Result<PoseContext> PoseColumns::circumstances(const CsvTable& table, std::size_t row) const {
+  PoseContext context;
+  const auto time = optional_number(table, row, time_);
+  if (!time) return tl::make_unexpected(time.error());
+  const auto temperature = optional_number(table, row, temperature_);
+  if (!temperature) return tl::make_unexpected(temperature.error());
+  context.time = *time;
+  context.temperature = *temperature;
+  for (const std::size_t column : directions_) {
+    const Result<int> direction = table.field(row, column).empty() ? 0 : table.integer(row, column, -1, 1);
+    if (!direction) return tl::make_unexpected(direction.error());
+    context.direction.push_back(*direction);
+  }
+  if (tool_) context.tool = table.field(row, *tool_);
+  if (payload_) context.payload = table.field(row, *payload_);
+  context.index = static_cast<int>(row);
+  return context;
+}
+
+Result<PoseContext> PoseColumns::read(const CsvTable& table, std::size_t row) const {
+  Result<JointVector> q = joints(table, row);
+  if (!q) return tl::make_unexpected(q.error());
+  return circumstances(table, row).map([&](PoseContext context) {
+    context.q = std::move(*q);
+    return context;
+  });
+}
+
+std::string PoseColumns::pose_id(const CsvTable& table, std::size_t row) const {
+  if (pose_id_ && !table.field(row, *pose_id_).empty()) return table.field(row, *pose_id_);
+  return fmt::format("{}", row + 1);
+}
+
+std::vector<std::size_t> PoseColumns::used() const {
+  std::vector<std::size_t> used = joints_;
+  used.insert(used.end(), directions_.begin(), directions_.end());
+  for (const auto& column : {time_, temperature_, tool_, payload_, pose_id_}) {
+    if (column) used.push_back(*column);
+  }
+  return used;
+}
+
+std::string joint_column(int joint, JointType type) {
+  return fmt::format("q{}_{}", joint + 1, type == JointType::kRevolute ? "deg" : "mm");
+}
+
+double joint_to_column(double value, JointType type) {
+  return type == JointType::kRevolute ? to_deg(value) : to_mm(value);
+}
+
+std::string joint_text(double value, JointType type) {
+  return fmt::format("{:.6g} {}", joint_to_column(value, type), type == JointType::kRevolute ? "deg" : "mm");
+}
+
+}  // namespace trammel

@@ -1,0 +1,220 @@
+#include "server/measurement/measurement.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+#include "server/base/units.h"
+
+namespace trammel {
+namespace {
+
+Joint make_joint(double theta_deg, double d, double a, double alpha_deg, double lower_deg, double upper_deg) {
+  Joint joint;
+  joint.link = {from_deg(theta_deg), d, a, from_deg(alpha_deg), 0};
+  joint.lower = from_deg(lower_deg);
+  joint.upper = from_deg(upper_deg);
+  return joint;
+}
+
+/// Six joints of a robot with 2.7 m reach, its base somewhere in W.
+Cell make_cell(std::optional<Pose> X_FT) {
+  Cell cell;
+  cell.name = "cell-7";
+  cell.robot = Chain::make("six axes", {make_joint(0, .78, .32, -90, -170, 170), make_joint(-90, 0, 1.28, 0, -65, 85),
+                                        make_joint(0, 0, .2, -90, -180, 70), make_joint(180, 1.142, 0, -90, -300, 300),
+                                        make_joint(0, 0, 0, 90, -120, 120), make_joint(0, .2, 0, 0, -360, 360)})
+                   .value();
+  cell.tools["spindle"] = std::move(X_FT);
+  cell.payloads["spindle"] = Payload{};
+  return cell;
+}
+
+Cell make_cell() { return make_cell(make_pose(Matrix3::Identity(), Vector3(.06, -.19, .17))); }
+
+/// What a tracker sees of `poses` random poses whose joints fill `share` of a quarter turn each.
+MeasurementBatch make_batch(const Cell& cell, int poses, double share, const Vector3& p_FT) {
+  MeasurementBatch batch;
+  batch.id = "lt-07";
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> angle(-share * kPi / 3, share * kPi / 3);
+  const Pose X_WB = make_pose(rotation_exp(Vector3(.1, .2, 2)), Vector3(3, -2, .5));
+  for (int i = 0; i < poses; ++i) {
+    Measurement m;
+    m.pose_id = fmt::format("{}", i + 1);
+    m.row = i + 2;
+    m.context.q = JointVector::NullaryExpr(6, [&](Eigen::Index) { return angle(random); });
+    m.p_W = X_WB * (cell.robot.flange_pose(m.context.q) * p_FT) + Vector3(.002, -.001, .001);
+    batch.measurements.push_back(m);
+  }
+  return batch;
+}
+
+const Vector3 kTool(.06, -.19, .17);
+
+std::string refusal(const MeasurementBatch& batch, const Cell& cell) {
+  const auto checked = check_against_cell(batch, cell);
+  return checked ? "accepted" : checked.error().message;
+}
+
+MeasurementBatch in_radians(MeasurementBatch batch) {
+  for (Measurement& m : batch.measurements) m.context.q *= from_deg(1);  // radians read as degrees
+  return batch;
+}
+
+MeasurementBatch scaled(MeasurementBatch batch, double factor) {
+  for (Measurement& m : batch.measurements) m.p_W *= factor;
+  return batch;
+}
+
+TEST(CheckAgainstCell, ResolvesTheOnlyToolAndPayload) {
+  const Cell cell = make_cell();
+  const auto checked = check_against_cell(make_batch(cell, 20, 1, kTool), cell);
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_EQ(checked->measurements[0].context.tool, "spindle");
+  EXPECT_EQ(checked->measurements[0].context.payload, "spindle");
+}
+
+TEST(CheckAgainstCell, RefusesABatchWithoutMeasurements) {
+  EXPECT_EQ(refusal(MeasurementBatch{}, make_cell()), "batch : no measurements, at least 1 is needed");
+}
+
+TEST(CheckAgainstCell, RefusesAnotherNumberOfJoints) {
+  const auto batch = parse_batch_csv("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,x_mm,y_mm,z_mm\n1,2,3,4,5,6,7,8\n", "b.csv");
+  EXPECT_EQ(refusal(batch.value(), make_cell()), "b.csv: 5 joint columns, robot six axes has 6");
+}
+
+TEST(CheckAgainstCell, RefusesAJointOutsideItsLimitsWithRowValueAndLimit) {
+  const Cell cell = make_cell();
+  MeasurementBatch batch = make_batch(cell, 20, 1, kTool);
+  batch.measurements[10].context.q(2) = from_deg(241.2);
+  EXPECT_EQ(refusal(batch, cell), "batch lt-07 row 12: joint 3 is 241.2 deg, limit 70 deg");
+  batch.where = "data/lt-07.csv";
+  EXPECT_EQ(refusal(batch, cell), "data/lt-07.csv row 12: joint 3 is 241.2 deg, limit 70 deg");
+}
+
+TEST(CheckAgainstCell, ToleratesALimitThatTheFileRounded) {
+  const Cell cell = make_cell();
+  MeasurementBatch batch = make_batch(cell, 1, 1, kTool);
+  batch.measurements[0].context.q(2) = from_deg(70.00001);
+  EXPECT_EQ(refusal(batch, cell), "accepted");
+}
+
+TEST(CheckAgainstCell, RefusesUnknownAndUndecidedTools) {
+  Cell cell = make_cell();
+  MeasurementBatch batch = make_batch(cell, 3, 1, kTool);
+  cell.tools["probe"] = Pose::Identity();
+  EXPECT_EQ(refusal(batch, cell), "batch lt-07 row 2: cell cell-7: no tool named, and the cell has 2: probe, spindle");
+  for (Measurement& m : batch.measurements) m.context.tool = "spindle";
+  EXPECT_EQ(refusal(batch, cell), "accepted");
+  batch.measurements[1].context.tool = "saw";
+  EXPECT_EQ(refusal(batch, cell), "batch lt-07 row 3: cell cell-7: unknown tool 'saw'; known: probe, spindle");
+  batch.measurements[1].context.tool = "spindle";
+  batch.measurements[2].context.payload = "anvil";
+  EXPECT_EQ(refusal(batch, cell), "batch lt-07 row 4: cell cell-7: unknown payload 'anvil'; known: spindle");
+}
+
+TEST(CheckAgainstCell, TakesJointsInRadiansForWhatTheyAreAndNamesBothSpreads) {
+  const Cell cell = make_cell();
+  const std::string message = refusal(in_radians(make_batch(cell, 50, 1, kTool)), cell);
+  EXPECT_NE(message.find("are the joints radians?"), std::string::npos) << message;
+  EXPECT_TRUE(message.starts_with("batch lt-07: measured positions spread over 1")) << message;
+  EXPECT_NE(message.find("move the tool over"), std::string::npos) << message;
+}
+
+TEST(CheckAgainstCell, FindsRadiansInASmallRangeAndWithAnUnknownTool) {
+  const Cell cell = make_cell();
+  EXPECT_NE(refusal(in_radians(make_batch(cell, 50, .1, kTool)), cell).find("radians?"), std::string::npos);
+  const Cell unknown_tool = make_cell(std::nullopt);
+  EXPECT_NE(refusal(in_radians(make_batch(cell, 50, 1, kTool)), unknown_tool).find("radians?"), std::string::npos);
+}
+
+TEST(CheckAgainstCell, FindsMetresForMillimetres) {
+  const Cell cell = make_cell();
+  const MeasurementBatch batch = make_batch(cell, 50, 1, kTool);
+  for (const double factor : {1e-3, 1e3}) {
+    const std::string message = refusal(scaled(batch, factor), cell);
+    EXPECT_NE(message.find("Are positions mm, joints degrees"), std::string::npos) << message;
+    EXPECT_EQ(message.find("radians"), std::string::npos) << message;
+  }
+}
+
+TEST(CheckAgainstCell, AcceptsSmallAndUniformBatches) {
+  const Cell cell = make_cell();
+  for (const int poses : {1, 2, 3, 10}) {
+    for (const double share : {1., .05, .01, 0.}) {
+      const MeasurementBatch batch = make_batch(cell, poses, share, kTool);
+      EXPECT_EQ(refusal(batch, cell), "accepted") << poses << " poses, share " << share;
+      EXPECT_EQ(refusal(batch, make_cell(std::nullopt)), "accepted") << poses << " poses, share " << share;
+    }
+  }
+}
+
+TEST(CheckAgainstCell, AcceptsAnUnknownToolThatTurnsAboutAFixedPoint) {
+  // Pivoting: the flange moves on a sphere about the tool point, which stays. No spread is measured.
+  Cell cell = make_cell(std::nullopt);
+  Joint turn;
+  turn.link = {0, 0, 0, from_deg(90), 0};
+  const Vector3 p_FT(0, 0, -.4);
+  Joint last = turn;
+  last.link = {0, .4, 0, 0, 0};
+  cell.robot = Chain::make("wrist", {turn, turn, turn, turn, turn, last}).value();
+  EXPECT_EQ(refusal(make_batch(cell, 50, 1, p_FT), cell), "accepted");
+}
+
+TEST(CheckAgainstCell, AcceptsOneGrossOutlierAmongMany) {
+  const Cell cell = make_cell();
+  MeasurementBatch batch = make_batch(cell, 100, 1, kTool);
+  batch.measurements[7].p_W += Vector3(5, 0, 0);
+  EXPECT_EQ(refusal(batch, cell), "accepted");
+}
+
+std::vector<std::string> ids(const MeasurementBatch& batch) {
+  std::vector<std::string> ids;
+  for (const Measurement& m : batch.measurements) ids.push_back(m.pose_id);
+  return ids;
+}
+
+TEST(SplitBatch, DrawsTheSameRowsForTheSameSeedAndOthersForAnother) {
+  const MeasurementBatch batch = make_batch(make_cell(), 100, 1, kTool);
+  const BatchSplit split = split_batch(batch, 0.2, 7);
+  EXPECT_EQ(split.validation.measurements.size(), 20u);
+  EXPECT_EQ(split.train.measurements.size(), 80u);
+  EXPECT_EQ(ids(split_batch(batch, 0.2, 7).validation), ids(split.validation));
+  EXPECT_NE(ids(split_batch(batch, 0.2, 8).validation), ids(split.validation));
+  std::set<std::string> all;
+  for (const auto& id : ids(split.train)) all.insert(id);
+  for (const auto& id : ids(split.validation)) all.insert(id);
+  EXPECT_EQ(all.size(), 100u);
+}
+
+TEST(SplitBatch, KeepsTheOrderInTimeAndIndices) {
+  MeasurementBatch batch = make_batch(make_cell(), 50, 1, kTool);
+  for (int i = 0; i < 50; ++i) batch.measurements[static_cast<std::size_t>(i)].context.index = i;
+  const BatchSplit split = split_batch(batch, 0.5, 1);
+  for (const MeasurementBatch* part : {&split.train, &split.validation}) {
+    for (std::size_t i = 1; i < part->measurements.size(); ++i) {
+      EXPECT_LT(part->measurements[i - 1].context.index, part->measurements[i].context.index);
+    }
+  }
+}
+
+TEST(SplitBatch, FollowsTheSetColumnWhereThereIsOne) {
+  MeasurementBatch batch = make_batch(make_cell(), 4, 1, kTool);
+  batch.measurements[0].set = MeasurementSet::kTrain;
+  batch.measurements[2].set = MeasurementSet::kValidation;
+  const BatchSplit split = split_batch(batch, 0.9, 1);
+  EXPECT_EQ(ids(split.validation), std::vector<std::string>{"3"});
+  EXPECT_EQ(ids(split.train), (std::vector<std::string>{"1", "2", "4"}));
+}
+
+TEST(SplitBatch, LeavesARowForTraining) {
+  const MeasurementBatch batch = make_batch(make_cell(), 3, 1, kTool);
+  EXPECT_EQ(split_batch(batch, 1, 1).train.measurements.size(), 1u);
+  EXPECT_EQ(split_batch(batch, 0, 1).validation.measurements.size(), 0u);
+  EXPECT_EQ(split_batch(MeasurementBatch{}, 0.5, 1).train.measurements.size(), 0u);
+}
+
+}  // namespace
+}  // namespace trammel
