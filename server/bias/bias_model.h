@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -22,8 +21,8 @@ struct BiasProblem {
 };
 
 struct BiasOptions {
-  std::string kernel = "se";    ///< `se`, `matern52`, `none`, ... as spelled in the cell file
-  int starts = 20;              ///< of the hyperparameter search, log-uniform
+  std::string kernel = "se";  ///< `se`, `matern52`, `none`, ... as spelled in the cell file
+  int starts = 20;            ///< of the hyperparameter search, log-uniform
   std::uint64_t seed = 1;
   /// Called between steps with the share done in [0, 1]; return false to give up.
   std::function<bool(double)> progress;
@@ -31,9 +30,9 @@ struct BiasOptions {
 
 /// At one joint vector, for the three coordinates in B.
 struct BiasPrediction {
-  Vector3 mean_B = Vector3::Zero();            ///< m
-  Vector3 stddev_B = Vector3::Zero();          ///< m, of the function itself
-  Vector3 measured_stddev_B = Vector3::Zero(); ///< m, of one noisy measurement of it
+  Vector3 mean_B = Vector3::Zero();             ///< m
+  Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
+  Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one noisy measurement of it
   double prior_share = 1.0;  ///< posterior variance of the function / prior variance, largest coordinate, in [0, 1]
 };
 
@@ -43,6 +42,7 @@ struct BiasState {
   Eigen::MatrixXd q;                ///< N x n, rad
   Eigen::MatrixXd residual_B;       ///< N x 3, m
   Eigen::VectorXd sigma;            ///< N, m
+  Eigen::VectorXd offset;           ///< per output, m: the mean residual, what the model says far from all data
   Eigen::MatrixXd hyperparameters;  ///< one column per output; rows as the kernel orders them, natural logarithms
 };
 
@@ -67,6 +67,8 @@ class BiasModel {
   [[nodiscard]] BiasPrediction predict(const JointVector& q) const;
   /// The mean alone: what an iteration needs.
   [[nodiscard]] Vector3 mean_B(const JointVector& q) const;
+  /// M x 3, m: the means alone of many; rows of `q` are joint vectors.
+  [[nodiscard]] Eigen::MatrixXd mean_all_B(const Eigen::MatrixXd& q) const;
   /// Many at once; rows of `q` are joint vectors.
   [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q) const;
 

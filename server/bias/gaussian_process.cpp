@@ -1,0 +1,219 @@
+#include "server/bias/gaussian_process.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "server/base/check.h"
+#include "server/bias/numerics.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kTile = 64;
+constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
+constexpr double kLogParameterMax = 40.0;
+constexpr double kLogRatioMin =
+    -20.0;  // below it thousands of smooth points are no longer positive definite in doubles
+
+const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
+
+FeatureBlock rows_of(const MatrixXd& features, Index first, Index count) {
+  return {features.data() + first, count, features.rows()};
+}
+
+// Leading dimensions that are multiples of 4 KiB would put whole rows into the same few cache sets.
+Index leading_dimension(Index rows) { return rows % 64 == 0 ? rows + kTargetBlock : rows; }
+
+// [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
+void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& features, double ratio,
+                        const VectorXd& noise_shape, const MatrixXd& y, MatrixXd* matrix) {
+  const Index n = noise_shape.size();
+  const Index ld = matrix->rows();
+  for (Index j = 0; j < n; j += kTile) {
+    const Index cols = std::min(kTile, n - j);
+    for (Index i = j; i < n; i += 4 * kTile) {
+      kernel.tile(parameters, rows_of(features, i, std::min(4 * kTile, n - i)), rows_of(features, j, cols),
+                  matrix->data() + i + j * ld, ld);
+    }
+  }
+  for (Index j = 0; j < n; ++j) {
+    (*matrix)(j, j) += ratio * noise_shape[j];
+    matrix->col(j).segment(n, y.cols()) = y.row(j);
+    matrix->col(j).tail(ld - n - y.cols()).setZero();
+  }
+  matrix->rightCols(matrix->cols() - n).setZero();
+}
+
+MatrixXd augmented_storage(Index n, Index outputs) {
+  const Index rows = padded_rows(n + outputs);
+  return MatrixXd::Zero(leading_dimension(rows), rows);
+}
+
+}  // namespace
+
+ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior)
+    : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)) {
+  TRAMMEL_CHECK(data_.y.rows() == size() && data_.noise_shape.size() == size());
+  matrix_ = augmented_storage(size(), data_.y.cols());
+  work_.resize(numerics().work_size(size() + data_.y.cols()));
+}
+
+bool ProfiledLikelihood::evaluate(const VectorXd& parameters, Evaluation* out) {
+  const Index n = size();
+  const Index outputs = data_.y.cols();
+  const Index count = parameters.size() - 1;
+  if (!parameters.allFinite() || parameters.cwiseAbs().maxCoeff() > kLogParameterMax) return false;
+  if (parameters[count] < kLogRatioMin) return false;
+  const double log_ratio = parameters[count];
+  const double ratio = std::exp(log_ratio);
+
+  const VectorXd kernel_parameters = parameters.head(count);
+  features_ = kernel_->features(kernel_parameters, data_.q);
+  assemble_augmented(*kernel_, kernel_parameters, features_, ratio, data_.noise_shape, data_.y, &matrix_);
+  double log_det = 0;
+  if (!numerics().sweep(n, outputs, matrix_.data(), matrix_.rows(), work_.data(), &log_det)) return false;
+
+  alpha_ = MatrixXd::Zero(padded_rows(n), outputs);
+  alpha_.topRows(n) = matrix_.block(n, 0, outputs, n).transpose();
+  const auto points = static_cast<double>(n);
+  signal_variance_.resize(outputs);
+  VectorXd weights(outputs);
+  out->value = 0.5 * static_cast<double>(outputs) * log_det;
+  double noise_slope = 0;  // of the noise prior, along log η at fixed σ_f²
+  for (Index d = 0; d < outputs; ++d) {
+    const double quadratic = data_.y.col(d).dot(alpha_.col(d).head(n));
+    const double variance = std::max(quadratic, 0.0) / points + kSmallestSignal * kSmallestSignal;
+    signal_variance_[d] = variance;
+    out->value += 0.5 * points * (std::log(variance) + 1.0 + kLogTwoPi);
+    // The noise prior sees log σ_n = ½ (log η + log σ_f²), and σ_f² moves with the parameters too.
+    const double below = std::min(0.5 * (log_ratio + std::log(variance)) - std::log(prior_.noise_stddev), 0.0);
+    out->value += 0.5 * std::pow(below / prior_.noise_spread, 2);
+    const double slope = below / (prior_.noise_spread * prior_.noise_spread);
+    noise_slope += 0.5 * slope;
+    weights[d] = (1.0 + slope / points) / variance;
+  }
+
+  out->gradient = contract(kernel_parameters, ratio, weights);
+  out->gradient[count] += noise_slope;
+  for (Index p = 0; p <= count; ++p) {
+    const double centre = p < count ? prior_.parameter_centre[p] : prior_.log_ratio_centre;
+    const double spread = p < count ? prior_.parameter_spread : prior_.log_ratio_spread;
+    const double away = (parameters[p] - centre) / spread;
+    out->value += 0.5 * away * away;
+    out->gradient[p] += away / spread;
+  }
+  return std::isfinite(out->value) && out->gradient.allFinite();
+}
+
+// ½ tr(G dM), G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, over the lower triangle: off the diagonal once, on it half.
+VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, const VectorXd& output_weights) {
+  const Index n = size();
+  const Index ld = matrix_.rows();
+  const auto outputs = static_cast<double>(data_.y.cols());
+  VectorXd gradient = VectorXd::Zero(parameters.size() + 1);
+  MatrixXd g(kTile, kTile);
+  VectorXd column_weights(output_weights.size());
+  for (Index j = 0; j < n; j += kTile) {
+    const Index cols = std::min(kTile, n - j);
+    for (Index i = j; i < n; i += kTile) {
+      const Index rows = std::min(kTile, n - i);
+      for (Index c = 0; c < cols; ++c) {
+        column_weights = output_weights.cwiseProduct(alpha_.row(j + c).transpose());
+        numerics().weight_column(rows, -outputs, matrix_.data() + i + (j + c) * ld, column_weights.size(),
+                                 alpha_.data() + i, alpha_.rows(), column_weights.data(), g.col(c).data());
+        g.col(c).tail(kTile - rows).setZero();
+        if (i > j) continue;
+        g.col(c).head(c).setZero();
+        g(c, c) *= 0.5;
+        gradient[parameters.size()] += ratio * data_.noise_shape[j + c] * g(c, c);
+      }
+      kernel_->tile_gradient(parameters, rows_of(features_, i, rows), rows_of(features_, j, cols), g.data(), kTile,
+                             gradient.data());
+    }
+  }
+  return gradient;
+}
+
+double ProfiledLikelihood::leave_one_out_rms() const {
+  double total = 0;
+  for (Index i = 0; i < size(); ++i) total += alpha_.row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
+  return std::sqrt(total / static_cast<double>(size()));
+}
+
+std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const Kernel> kernel, const MatrixXd& q,
+                                                          const VectorXd& y, const VectorXd& noise_shape,
+                                                          const GpHyperparameters& hyperparameters) {
+  const Index n = q.rows();
+  GaussianProcess gp;
+  gp.kernel_ = std::move(kernel);
+  gp.parameters_ = hyperparameters.kernel;
+  gp.size_ = n;
+  gp.features_ = gp.kernel_->features(gp.parameters_, q);
+  gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
+  gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
+  const double ratio = gp.noise_variance_ / gp.signal_variance_;
+
+  MatrixXd matrix = augmented_storage(n, 1);
+  VectorXd work(numerics().work_size(n + 1));
+  assemble_augmented(*gp.kernel_, gp.parameters_, gp.features_, ratio, noise_shape, y, &matrix);
+  VectorXd prior(n);
+  for (Index i = 0; i < n; ++i) prior[i] = matrix(i, i) - ratio * noise_shape[i];
+  double log_det = 0;
+  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &log_det)) return std::nullopt;
+
+  gp.weights_ = VectorXd::Zero(padded_rows(n));
+  gp.weights_.head(n) = -matrix.row(n).head(n).transpose();
+  gp.root_.resize(static_cast<std::size_t>(numerics().packed_size(n)));
+  numerics().pack_lower(n, matrix.data(), matrix.rows(), gp.root_.data());
+
+  const auto points = static_cast<double>(n);
+  gp.log_likelihood_ = -0.5 * (y.dot(gp.weights_.head(n)) / gp.signal_variance_ + log_det +
+                               points * (std::log(gp.signal_variance_) + kLogTwoPi));
+  gp.leave_one_out_mean_.resize(n);
+  gp.leave_one_out_share_.resize(n);
+  for (Index i = 0; i < n; ++i) {
+    const double inverse_diagonal = matrix.col(i).segment(i, n - i).squaredNorm();  // of M⁻¹ = L⁻ᵀ L⁻¹
+    gp.leave_one_out_mean_[i] = y[i] - gp.weights_[i] / inverse_diagonal;
+    const double share = (1.0 / inverse_diagonal - ratio * noise_shape[i]) / prior[i];
+    gp.leave_one_out_share_[i] = std::clamp(share, 0.0, 1.0);
+  }
+  return gp;
+}
+
+void GaussianProcess::mean(const MatrixXd& q, double* out) const {
+  const MatrixXd targets = kernel_->features(parameters_, q);
+  kernel_->weighted_sum(parameters_, rows_of(features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(), out);
+}
+
+std::vector<GaussianProcess::Variance> GaussianProcess::variance(const MatrixXd& q) const {
+  const MatrixXd targets = kernel_->features(parameters_, q);
+  const Index block = q.rows() == 1 ? 1 : kTargetBlock;
+  const Index ld = padded_rows(size_);
+  MatrixXd cross = MatrixXd::Zero(ld, block);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> interleaved(size_, block);
+  std::vector<Variance> variances(static_cast<std::size_t>(q.rows()));
+  for (Index first = 0; first < q.rows(); first += block) {
+    const Index count = std::min(block, q.rows() - first);
+    kernel_->tile(parameters_, rows_of(features_, 0, size_), rows_of(targets, first, count), cross.data(), ld);
+    interleaved = cross.topRows(size_);
+    double explained[kTargetBlock];
+    numerics().square_norms(size_, root_.data(), block, interleaved.data(), explained);
+    for (Index j = 0; j < count; ++j) {
+      double padded[kRowPadding];
+      const FeatureBlock target = rows_of(targets, first + j, 1);
+      kernel_->tile(parameters_, target, target, padded, kRowPadding);
+      const double prior = signal_variance_ * padded[0];
+      const double posterior = std::clamp(prior - signal_variance_ * explained[j], 0.0, prior);
+      variances[static_cast<std::size_t>(first + j)] = {posterior, prior};
+    }
+  }
+  return variances;
+}
+
+}  // namespace trammel

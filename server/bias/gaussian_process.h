@@ -1,0 +1,113 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "server/bias/bfgs.h"
+#include "server/bias/kernel.h"
+
+/// Exact Gaussian processes (source eqs. 3.15-3.26): K = σ_f² R(parameters) + σ_n² diag(w) = σ_f² M, M = R + η diag(w).
+namespace trammel {
+
+/// What a process learns from. All outputs share the joint vectors.
+struct GpData {
+  Eigen::MatrixXd q;            ///< N x n, rad
+  Eigen::MatrixXd y;            ///< N x outputs, m, mean removed
+  Eigen::VectorXd noise_shape;  ///< N, w: noise variance of each point relative to σ_n²
+};
+
+/// Weak log-normal priors; they decide only what the data leave open.
+struct GpPrior {
+  double noise_stddev = 1e-5;        ///< m, from metrology; below it the noise costs ½ (log ratio / spread)², above 0
+  double noise_spread = 0.7;         ///< in logs: half of metrology costs ½ nat per output
+  Eigen::VectorXd parameter_centre;  ///< of the kernel's log parameters
+  double parameter_spread = 3.0;     ///< in logs: keeps an idle joint's length scale from running away
+  double log_ratio_centre = -4.6;    ///< of log η
+  double log_ratio_spread = 5.0;
+};
+
+/// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over the outputs, with the
+/// σ_f² of each output at its best value y'M⁻¹y / N. Keeps its matrix between calls: one thread at a time.
+class ProfiledLikelihood {
+ public:
+  ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior);
+
+  /// False when M is not positive definite or the parameters are absurd.
+  [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, Evaluation* out);
+
+  /// Of the last successful evaluation: σ_f² of each output, m²; rms over the points of the Euclidean leave-one-out
+  /// error, m.
+  [[nodiscard]] const Eigen::VectorXd& signal_variance() const { return signal_variance_; }
+  [[nodiscard]] double leave_one_out_rms() const;
+
+  [[nodiscard]] Eigen::Index size() const { return data_.q.rows(); }
+  [[nodiscard]] const GpData& data() const { return data_; }
+
+ private:
+  void assemble(const Eigen::VectorXd& parameters, double ratio);
+  [[nodiscard]] Eigen::VectorXd contract(const Eigen::VectorXd& parameters, double ratio,
+                                         const Eigen::VectorXd& output_weights);
+
+  std::shared_ptr<const Kernel> kernel_;
+  GpData data_;
+  GpPrior prior_;
+  Eigen::MatrixXd matrix_;  // [M Yᵀ], then [-M⁻¹; Y M⁻¹]; lower triangle
+  Eigen::MatrixXd features_;
+  Eigen::MatrixXd alpha_;  // M⁻¹ Y, padded
+  Eigen::VectorXd work_;
+  Eigen::VectorXd signal_variance_;
+};
+
+/// One output's hyperparameters.
+struct GpHyperparameters {
+  Eigen::VectorXd kernel;    ///< log parameters
+  double log_signal_stddev;  ///< log σ_f, m
+  double log_noise_stddev;   ///< log σ_n, m
+};
+
+/// One output, conditioned on its data (eq. 3.17). Immutable, thread-safe.
+class GaussianProcess {
+ public:
+  /// Empty when the covariance is not positive definite.
+  [[nodiscard]] static std::optional<GaussianProcess> condition(std::shared_ptr<const Kernel> kernel,
+                                                                const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
+                                                                const Eigen::VectorXd& noise_shape,
+                                                                const GpHyperparameters& hyperparameters);
+
+  /// Posterior mean at `count` joint vectors (rows of `q`), m.
+  void mean(const Eigen::MatrixXd& q, double* out) const;
+
+  struct Variance {
+    double posterior;  ///< m², of the function
+    double prior;      ///< m²
+  };
+  [[nodiscard]] std::vector<Variance> variance(const Eigen::MatrixXd& q) const;
+
+  [[nodiscard]] double signal_variance() const { return signal_variance_; }
+  [[nodiscard]] double noise_variance() const { return noise_variance_; }
+  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
+
+  /// Mean of every training point from all the others, m; posterior / prior variance share of the function there
+  /// (Rasmussen & Williams, eqs. 5.10-5.12).
+  [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
+  [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
+
+ private:
+  GaussianProcess() = default;
+
+  std::shared_ptr<const Kernel> kernel_;
+  Eigen::VectorXd parameters_;
+  Eigen::Index size_ = 0;
+  Eigen::MatrixXd features_;
+  Eigen::VectorXd weights_;   // M⁻¹ y, padded
+  std::vector<double> root_;  // packed L⁻¹, M = L Lᵀ
+  double signal_variance_ = 0;
+  double noise_variance_ = 0;
+  double log_likelihood_ = 0;
+  Eigen::VectorXd leave_one_out_mean_;
+  Eigen::VectorXd leave_one_out_share_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "server/bias/gaussian_process.h"
+
+namespace trammel {
+
+struct SearchOptions {
+  int starts = 20;
+  std::uint64_t seed = 1;
+  std::function<bool(double)> progress;  ///< share done in [0, 1]; false gives up
+};
+
+struct SearchResult {
+  std::vector<GpHyperparameters> outputs;
+  int starts_at_best = 0;  ///< starts that ended within 0.1 nat of the best on the subset
+  int evaluations = 0;     ///< on all points
+  bool given_up = false;   ///< `progress` said so; nothing else is then meant
+};
+
+/// Most probable hyperparameters. Many starts on a small subset with shared length scales; the best three different
+/// optima are carried to more points and compared there by likelihood, checked by leave-one-out; the winner is refined
+/// for each output, on growing subsets and at last on all points. The same seed gives the same answer, bit for bit.
+/// Empty when no start gave a positive definite covariance.
+[[nodiscard]] std::optional<SearchResult> search_hyperparameters(const std::shared_ptr<const Kernel>& kernel,
+                                                                 const GpData& data, double metrology_stddev,
+                                                                 const SearchOptions& options);
+
+}  // namespace trammel

@@ -1,0 +1,259 @@
+#include "server/bias/bias_model.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/bias/bias_data.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+
+BiasModel fit(const BiasProblem& problem, const BiasOptions& options = {}) {
+  auto model = BiasModel::fit(problem, options);
+  if (!model) throw std::runtime_error(model.error().message);
+  return *std::move(model);
+}
+
+BiasProblem without(const BiasProblem& problem, Index row) {
+  const Index last = problem.q.rows() - 1;
+  BiasProblem rest{problem.q.topRows(last), problem.residual_B.topRows(last), problem.sigma.head(last)};
+  for (Index i = row; i < last; ++i) {
+    rest.q.row(i) = problem.q.row(i + 1);
+    rest.residual_B.row(i) = problem.residual_B.row(i + 1);
+    rest.sigma[i] = problem.sigma[i + 1];
+  }
+  return rest;
+}
+
+void expect_same_predictions(const BiasModel& a, const BiasModel& b) {
+  const Eigen::MatrixXd q = random_joints(50, 99);
+  const auto from_a = a.predict_all(q);
+  const auto from_b = b.predict_all(q);
+  for (std::size_t i = 0; i < from_a.size(); ++i) {
+    EXPECT_EQ(from_a[i].mean_B, from_b[i].mean_B);
+    EXPECT_EQ(from_a[i].stddev_B, from_b[i].stddev_B);
+    EXPECT_EQ(from_a[i].measured_stddev_B, from_b[i].measured_stddev_B);
+    EXPECT_EQ(from_a[i].prior_share, from_b[i].prior_share);
+  }
+}
+
+void expect_refused(const BiasProblem& problem, const BiasOptions& options, const std::string& message) {
+  const auto model = BiasModel::fit(problem, options);
+  ASSERT_FALSE(model.has_value());
+  EXPECT_EQ(model.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(model.error().message, message);
+}
+
+TEST(BiasModel, LearnsASmoothFunctionToTheNoise) {
+  const BiasModel model = fit(smooth_problem(400, 1));
+  const Eigen::MatrixXd q = random_joints(300, 2);
+  double total = 0;
+  for (Index i = 0; i < q.rows(); ++i) total += (model.mean_B(q.row(i)) - smooth_error_B(q.row(i))).squaredNorm();
+  EXPECT_LT(std::sqrt(total / 300), 12e-6) << "m, of errors of some 0.2 mm, learned with 10 µm of noise per axis";
+  EXPECT_LT(model.report().leave_one_out_rms, 1.25 * std::sqrt(3.0) * 10e-6);
+  for (int d = 0; d < 3; ++d) EXPECT_NEAR(model.report().noise_stddev[d], 10e-6, 2e-6);
+  EXPECT_GE(model.report().starts_at_best, 1);
+  EXPECT_GE(model.report().evaluations, 1);
+}
+
+TEST(BiasModel, LearnsWithMaternKernelsToo) {
+  for (const char* kernel : {"matern32", "matern52"}) {
+    BiasOptions options;
+    options.kernel = kernel;
+    options.starts = 5;
+    const BiasModel model = fit(smooth_problem(300, 1), options);
+    EXPECT_LT(model.report().leave_one_out_rms, 60e-6) << kernel;
+  }
+}
+
+TEST(BiasModel, SaysTheMeanResidualFarFromAllData) {
+  BiasProblem problem = smooth_problem(100, 3);
+  problem.residual_B.col(0).array() += 0.002;
+  const BiasModel model = fit(problem);
+  const BiasPrediction far = model.predict(JointVector::Constant(6, 1000.0));
+  EXPECT_NEAR(far.mean_B[0], problem.residual_B.col(0).mean(), 1e-9);
+  EXPECT_NEAR(far.prior_share, 1.0, 1e-9);
+}
+
+TEST(BiasModel, KnowsLessAwayFromTheData) {
+  const BiasModel model = fit(smooth_problem(200, 4));
+  JointVector q = JointVector::Zero(6);
+  BiasPrediction before = model.predict(q);
+  for (const double angle : {1.5, 3.0, 6.0}) {
+    q.setConstant(angle);
+    const BiasPrediction away = model.predict(q);
+    EXPECT_GT(away.prior_share, before.prior_share);
+    for (int d = 0; d < 3; ++d) EXPECT_GT(away.stddev_B[d], before.stddev_B[d]);
+    before = away;
+  }
+}
+
+TEST(BiasModel, IntervalsCoverFreshMeasurementsAsOftenAsTheySay) {
+  const BiasModel model = fit(smooth_problem(500, 5));
+  const BiasProblem fresh = smooth_problem(1500, 6);
+  const auto predictions = model.predict_all(fresh.q);
+  int inside = 0;
+  for (Index i = 0; i < fresh.q.rows(); ++i) {
+    const BiasPrediction& prediction = predictions[static_cast<std::size_t>(i)];
+    for (int d = 0; d < 3; ++d)
+      inside += std::abs(fresh.residual_B(i, d) - prediction.mean_B[d]) < 1.96 * prediction.measured_stddev_B[d];
+  }
+  EXPECT_NEAR(inside / 4500.0, 0.95, 0.02);
+}
+
+TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
+  const BiasProblem problem = smooth_problem(60, 7, 30e-6);
+  const BiasModel model = fit(problem);
+  const Eigen::MatrixXd left_out = model.leave_one_out_mean_B();
+  const Eigen::VectorXd share = model.leave_one_out_prior_share();
+  for (Index i = 0; i < problem.q.rows(); i += 7) {
+    BiasState state = model.state();
+    const BiasProblem rest = without(problem, i);
+    state.q = rest.q;
+    state.residual_B = rest.residual_B;
+    state.sigma = rest.sigma;
+    const auto other = BiasModel::restore(state);
+    ASSERT_TRUE(other.has_value());
+    const BiasPrediction prediction = other->predict(problem.q.row(i));
+    EXPECT_LT((left_out.row(i).transpose() - prediction.mean_B).norm(), 1e-11);
+    EXPECT_NEAR(share[i], prediction.prior_share, 1e-8);
+  }
+}
+
+TEST(BiasModel, RestoresBitForBit) {
+  const BiasModel model = fit(smooth_problem(120, 8));
+  const auto restored = BiasModel::restore(model.state());
+  ASSERT_TRUE(restored.has_value());
+  expect_same_predictions(model, *restored);
+  EXPECT_EQ(model.leave_one_out_mean_B(), restored->leave_one_out_mean_B());
+}
+
+TEST(BiasModel, GivesTheSameModelForTheSameSeed) {
+  const BiasModel model = fit(smooth_problem(320, 9));
+  const BiasModel again = fit(smooth_problem(320, 9));
+  EXPECT_EQ(model.state().hyperparameters, again.state().hyperparameters);
+  expect_same_predictions(model, again);
+}
+
+TEST(BiasModel, PredictsOneAsItPredictsMany) {
+  const BiasModel model = fit(smooth_problem(100, 10));
+  const Eigen::MatrixXd q = random_joints(21, 11);
+  const auto many = model.predict_all(q);
+  for (Index i = 0; i < q.rows(); ++i) {
+    const BiasPrediction one = model.predict(q.row(i));
+    EXPECT_LT((one.mean_B - many[static_cast<std::size_t>(i)].mean_B).norm(), 1e-15);
+    EXPECT_LT((one.stddev_B - many[static_cast<std::size_t>(i)].stddev_B).norm(), 1e-12);
+    EXPECT_EQ(one.mean_B, model.mean_B(q.row(i)));
+  }
+}
+
+TEST(BiasModel, KeepsTheNoiseNearMetrologyWhenTheDataHaveNone) {
+  BiasProblem problem = smooth_problem(80, 12, 0.0);
+  problem.sigma.setConstant(10e-6);
+  const BiasModel model = fit(problem);
+  for (int d = 0; d < 3; ++d) EXPECT_GT(model.report().noise_stddev[d], 0.1e-6);
+}
+
+TEST(BiasModel, TrustsAPointOfLargerSigmaLess) {
+  BiasProblem problem = smooth_problem(100, 13);
+  problem.sigma.head(20).setConstant(30e-6);
+  const BiasModel model = fit(problem);
+  const BiasPrediction vague = model.predict(problem.q.row(0));
+  BiasState state = model.state();
+  state.sigma.setConstant(10e-6);
+  const auto equal = BiasModel::restore(state);
+  ASSERT_TRUE(equal.has_value());
+  EXPECT_GT(vague.stddev_B[0], equal->predict(problem.q.row(0)).stddev_B[0]);
+}
+
+TEST(BiasModel, SurvivesAJointThatNeverMovesAndAnOutputThatIsZero) {
+  BiasProblem problem = smooth_problem(80, 14);
+  problem.q.col(5).setConstant(0.3);
+  problem.residual_B.col(2).setZero();
+  const BiasModel model = fit(problem);
+  const BiasPrediction prediction = model.predict(problem.q.row(3));
+  EXPECT_TRUE(prediction.mean_B.allFinite());
+  EXPECT_NEAR(prediction.mean_B[2], 0.0, 1e-12);
+}
+
+TEST(BiasModel, SurvivesPosesThatWereMeasuredTwice) {
+  BiasProblem problem = smooth_problem(60, 15);
+  problem.q.bottomRows(30) = problem.q.topRows(30);
+  EXPECT_TRUE(BiasModel::fit(problem, {}).has_value());
+}
+
+TEST(BiasModel, WithoutAKernelSaysZeroAndTheSpreadOfTheResidual) {
+  BiasOptions options;
+  options.kernel = "none";
+  const BiasProblem problem = smooth_problem(50, 16);
+  const BiasModel model = fit(problem, options);
+  const BiasPrediction prediction = model.predict(problem.q.row(0));
+  EXPECT_EQ(prediction.mean_B, Vector3::Zero());
+  EXPECT_NEAR(prediction.stddev_B[1], std::sqrt(problem.residual_B.col(1).squaredNorm() / 50), 1e-15);
+  EXPECT_EQ(prediction.prior_share, 1.0);
+  EXPECT_EQ(model.leave_one_out_mean_B(), Eigen::MatrixXd::Zero(50, 3));
+  EXPECT_TRUE(BiasModel::restore(model.state()).has_value());
+}
+
+TEST(BiasModel, ReportsProgressAndStopsWhenToldTo) {
+  double last = 0;
+  BiasOptions options;
+  options.progress = [&last](double share) {
+    EXPECT_GE(share, last);
+    EXPECT_LE(share, 1.0);
+    last = share;
+    return true;
+  };
+  EXPECT_TRUE(BiasModel::fit(smooth_problem(60, 17), options).has_value());
+  EXPECT_DOUBLE_EQ(last, 1.0);
+  options.progress = [](double share) { return share < 0.2; };
+  expect_refused(smooth_problem(60, 17), options, "bias fit: given up on request");
+}
+
+TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
+  const BiasProblem good = smooth_problem(20, 18);
+  expect_refused(smooth_problem(9, 18), {}, "bias data: 9 observations, at least 10");
+
+  BiasProblem bad = good;
+  bad.q(3, 1) = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(bad, {}, "bias data row 4: joint 2 is nan, not finite");
+
+  bad = good;
+  bad.residual_B(0, 2) = std::numeric_limits<double>::infinity();
+  expect_refused(bad, {}, "bias data row 1: residual z is inf, not finite");
+
+  bad = good;
+  bad.sigma[6] = -0.001;
+  expect_refused(bad, {}, "bias data row 7: sigma is -1 mm, should be finite and not negative");
+
+  bad = good;
+  bad.sigma.conservativeResize(19);
+  expect_refused(bad, {}, "bias data: 19 sigmas for 20 observations");
+
+  BiasOptions options;
+  options.kernel = "sea";
+  expect_refused(good, options, "bias kernel `sea` is unknown; known are none, se, matern32, matern52");
+  options.kernel = "se";
+  options.starts = 0;
+  expect_refused(good, options, "bias fit: 0 starts, at least 1");
+}
+
+TEST(BiasModel, RefusesAStateThatDoesNotFit) {
+  const BiasModel model = fit(smooth_problem(20, 19));
+  BiasState state = model.state();
+  state.hyperparameters.conservativeResize(5, 3);
+  EXPECT_EQ(BiasModel::restore(state).error().message,
+            "bias state: hyperparameters are 5 x 3, should be 8 x 3 for kernel `se`");
+  state = model.state();
+  state.offset.resize(0);
+  EXPECT_EQ(BiasModel::restore(state).error().message, "bias state: 0 offsets, should be 3");
+  state = model.state();
+  state.hyperparameters(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(BiasModel::restore(state).has_value());
+}
+
+}  // namespace
+}  // namespace trammel
