@@ -10,14 +10,14 @@ namespace trammel {
 
 /// What kind of thing went wrong; decides exit codes and reply codes, never the wording.
 enum class ErrorCode {
-  kUsage,         ///< the caller asked for something that does not exist (exit 2)
-  kRefused,       ///< data that must not be used: bad row, unknown tool, ill-conditioned fit (exit 3)
-  kNotFound,      ///< an unknown cell, model or job (exit 3)
-  kConflict,      ///< the same id with other content, a second writer (exit 3)
-  kTooLarge,      ///< over a stated limit (exit 3)
-  kBusy,          ///< a bounded queue is full; try again (exit 4)
-  kUnreachable,   ///< no service answered in time (exit 4)
-  kInternal       ///< the disk, the database, a corrupt file of our own (exit 3)
+  kUsage,        ///< the caller asked for something that does not exist (exit 2)
+  kRefused,      ///< data that must not be used: bad row, unknown tool, ill-conditioned fit (exit 3)
+  kNotFound,     ///< an unknown cell, model or job (exit 3)
+  kConflict,     ///< the same id with other content, a second writer (exit 3)
+  kTooLarge,     ///< over a stated limit (exit 3)
+  kBusy,         ///< a bounded queue is full; try again (exit 4)
+  kUnreachable,  ///< no service answered in time (exit 4)
+  kInternal      ///< the disk, the database, a corrupt file of our own (exit 3)
 };
 
 /// An expected failure. `message` says what, where, value and limit:

@@ -39,20 +39,20 @@ struct CalibrationResult {
   Eigen::MatrixXd covariance;  ///< P x P, SI
   int rank = 0;                ///< directions with singular value >= 1
   std::vector<UnidentifiableCombination> unidentifiable;
-  double condition_number = 0;        ///< of the identified directions, prior units
-  double rms = 0;                     ///< m, Euclidean residual of the training positions
-  double discrepancy = 0;             ///< m per axis: what the model leaves over beyond the measurement's sigma
-  double discrepancy_rotation = 0;    ///< rad per axis
+  double condition_number = 0;      ///< of the identified directions, prior units
+  double rms = 0;                   ///< m, Euclidean residual of the training positions
+  double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
+  double discrepancy_rotation = 0;  ///< rad per axis
   bool converged = false;
   int iterations = 0;
-  std::string message;                ///< of the solver
+  std::string message;  ///< of the solver
 };
 
-/// Identifies the parameters of the model's sources by maximum a posteriori (Gaussian priors in the parameters' own scales,
-/// residuals in units of sigma), source section 3.3.2. Orientation errors are rotation vectors. Where the model cannot
-/// reach the measurement's sigma, the surplus is estimated as a discrepancy and added to it, so that positions and
-/// orientations, good and bad points keep their proper weights.
-/// Refuses: fewer equations than identifiable parameters; a base or tool that the data cannot determine.
+/// Identifies the parameters of the model's sources by maximum a posteriori (Gaussian priors in the parameters' own
+/// scales, residuals in units of sigma), source section 3.3.2. Orientation errors are rotation vectors. Where the model
+/// cannot reach the measurement's sigma, the surplus is estimated as a discrepancy and added to it, so that positions
+/// and orientations, good and bad points keep their proper weights. Refuses: fewer equations than identifiable
+/// parameters; a base or tool that the data cannot determine.
 [[nodiscard]] Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options);
 
 }  // namespace trammel

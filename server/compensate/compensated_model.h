@@ -28,8 +28,8 @@ struct Evaluation {
 
 /// The error expected at one joint vector, all in B.
 struct ErrorPrediction {
-  Pose X_BT_nominal;    ///< where the controller believes the tool to be
-  Pose X_BT_predicted;  ///< where it will be
+  Pose X_BT_nominal;                   ///< where the controller believes the tool to be
+  Pose X_BT_predicted;                 ///< where it will be
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
   bool in_domain = false;              ///< false: error_B is the calibrated model's, without learned bias
@@ -56,7 +56,7 @@ struct Correction {
   double error_after = 0;                  ///< m, what the iteration left
   double stddev = 0;                       ///< m, root sum of squares of the three axes, of the tool position reached
   int iterations = 0;
-  std::string message;                     ///< why not ok
+  std::string message;  ///< why not ok
 };
 
 struct CorrectOptions {
@@ -66,34 +66,35 @@ struct CorrectOptions {
 
 /// Where a model comes from.
 struct ModelProvenance {
-  std::string id;            ///< first 12 characters of the hash
-  std::string hash;          ///< SHA-256 of the model's content
-  std::string level;         ///< source names joined by commas
+  std::string id;     ///< first 12 characters of the hash
+  std::string hash;   ///< SHA-256 of the model's content
+  std::string level;  ///< source names joined by commas
   std::string batch_id;
-  std::string batch_hash;    ///< of the batch text
+  std::string batch_hash;       ///< of the batch text
   std::int64_t trained_at = 0;  ///< Unix time, s
   int training_poses = 0;
   std::uint64_t seed = 0;
   std::string program_version;
 };
 
-/// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap to
-/// copy, thread-safe.
+/// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap
+/// to copy, thread-safe.
 class CompensatedModel {
  public:
   struct Parts {
     PhysicalModel physics;
     std::vector<IdentifiedParameter> parameters;
     std::vector<UnidentifiableCombination> unidentifiable;
+    Eigen::MatrixXd covariance;  ///< of the parameters, SI
     int rank = 0;
     double condition_number = 0;
-    double discrepancy = 0;           ///< m per axis, see CalibrationResult
+    double discrepancy = 0;  ///< m per axis, see CalibrationResult
     std::optional<BiasState> bias;
-    JointVector q_min, q_max;         ///< range of the training poses, rad
-    double prior_share_limit = 0;     ///< in domain: prior share not above this
-    ModelProvenance provenance;       ///< id and hash are filled in by make()
+    JointVector q_min, q_max;              ///< range of the training poses, rad
+    double prior_share_limit = 0;          ///< in domain: prior share not above this
+    ModelProvenance provenance;            ///< id and hash are filled in by make()
+    Evaluation training;                   ///< on the poses it was trained on
     std::optional<Evaluation> validation;  ///< on poses held out from training
-    double training_rms = 0;               ///< m, calibrated
   };
   [[nodiscard]] static Result<CompensatedModel> make(Parts parts);
 
@@ -107,7 +108,7 @@ class CompensatedModel {
   /// Target correction, source section 3.4.1.
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
-  /// Measured against predicted, pose by pose.
+  /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
@@ -115,11 +116,15 @@ class CompensatedModel {
     Parts parts;
     std::optional<BiasModel> bias;
   };
+  enum class Domain { kDecide, kInside, kOutside };
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& context, Domain domain) const;
+  [[nodiscard]] bool in_range(const JointVector& q) const;
   explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
   std::shared_ptr<const Inside> inside_;
 };
 
-/// The model as text (JSON, one object) and back. load refuses a text whose hash does not fit its content.
+/// The model as text (JSON, one object) and back. Refuses a text that is no model or whose hash does not fit its
+/// content. The hash covers what the model is, not when it was made: same data, same seed, same id.
 [[nodiscard]] std::string serialize(const CompensatedModel& model);
 [[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where);
 [[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-
 #include <limits>
 #include <memory>
 #include <string>
@@ -16,11 +15,11 @@ namespace trammel {
 
 /// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people read it.
 struct Parameter {
-  std::string name;         ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
-  std::string unit;         ///< for people: `mm`, `rad`, `rad/Nmm`
-  double scale = 1;         ///< value for people = scale * SI value
-  double prior = 0;         ///< what it is believed to be before any data, SI
-  double prior_scale = 1;   ///< how far from there it may reasonably be (one standard deviation), SI
+  std::string name;        ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
+  std::string unit;        ///< for people: `mm`, `rad`, `rad/Nmm`
+  double scale = 1;        ///< value for people = scale * SI value
+  double prior = 0;        ///< what it is believed to be before any data, SI
+  double prior_scale = 1;  ///< how far from there it may reasonably be (one standard deviation), SI
   double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
 };
 
@@ -33,9 +32,9 @@ class ErrorSource {
   [[nodiscard]] virtual const std::vector<Parameter>& parameters() const = 0;
   /// What a report says of it in one sentence.
   [[nodiscard]] virtual std::string explanation() const = 0;
-  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given, its
-  /// columns first_column... receive the exact derivative, and sources that depend on the state pass the derivatives
-  /// of earlier sources on.
+  /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given,
+  /// its columns first_column... receive the exact derivative, and sources that depend on the state pass the
+  /// derivatives of earlier sources on.
   virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
                      StateJacobian* jacobian, int first_column) const = 0;
 };

@@ -25,6 +25,8 @@ struct PhysicalModel {
 
   /// X_WT of the chain alone: no error source.
   [[nodiscard]] Pose nominal_pose_W(const PoseContext& context) const;
+  /// The arm with every source applied.
+  [[nodiscard]] ArmState state(const PoseContext& context) const;
   /// X_WT with every source.
   [[nodiscard]] Pose pose_W(const PoseContext& context) const;
   /// X_WT and the 6 x P derivative [dp; rotation vector] in W by the parameters, at `parameter_values`.
@@ -34,8 +36,8 @@ struct PhysicalModel {
   [[nodiscard]] ArmState nominal_state(const PoseContext& context) const;
 };
 
-/// A model of `cell` with the sources that `specs` name, at their prior values. An unknown base or tool is identity until
-/// it is found.
+/// A model of `cell` with the sources that `specs` name, at their prior values. An unknown base or tool is identity
+/// until it is found.
 [[nodiscard]] Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell,
                                                         const std::vector<std::string>& specs);
 

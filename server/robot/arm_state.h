@@ -30,8 +30,8 @@ struct ArmState {
 };
 
 /// Where each number of an ArmState stands in a derivative: five rows a link, then base, tool, payload.
-/// Base and tool rows are small motions [translation; rotation vector]: of B seen in W, about the origin of B; of T seen
-/// in F, about the origin of F.
+/// Base and tool rows are small motions [translation; rotation vector]: of B seen in W, about the origin of B; of T
+/// seen in F, about the origin of F.
 class StateRows {
  public:
   explicit StateRows(int joints) : joints_(joints) {}
@@ -88,7 +88,8 @@ class ArmKinematics {
   [[nodiscard]] Motion link_motion(int row) const;
 
   const Chain* chain_;
-  std::vector<Vector3> z_, p_, x_, y_, q_;  // per link, in W: joint axis and a point on it; x and y axis at the link's end q
+  std::vector<Vector3> z_, p_, x_, y_,
+      q_;  // per link, in W: joint axis and a point on it; x and y axis at the link's end q
   Pose X_WB_, X_WF_, X_WT_;
   Vector3 p_cog_W_, force_W_, gravity_W_;
 };

@@ -31,7 +31,8 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
     }
     chain.transmission_(coupling.joint, coupling.follows) += coupling.ratio;
   }
-  if (std::abs(chain.transmission_.determinant()) < 1e-6) return refused("robot {}: couplings cannot be inverted", name);
+  if (std::abs(chain.transmission_.determinant()) < 1e-6)
+    return refused("robot {}: couplings cannot be inverted", name);
   chain.name_ = std::move(name);
   chain.joints_ = std::move(joints);
   return chain;

@@ -31,9 +31,9 @@ struct Joint {
   double sign = 1;      ///< +1 or -1: the controller's sense of this joint against the right-hand rule
   double lower = -std::numeric_limits<double>::infinity();  ///< rad (m), of the commanded value
   double upper = std::numeric_limits<double>::infinity();
-  double gear_ratio = 0;             ///< motor turns per joint turn; 0 when unknown
-  double compliance_prior = 0;       ///< rad/Nm
-  std::optional<double> max_speed;   ///< rad/s (m/s)
+  double gear_ratio = 0;            ///< motor turns per joint turn; 0 when unknown
+  double compliance_prior = 0;      ///< rad/Nm
+  std::optional<double> max_speed;  ///< rad/s (m/s)
 };
 
 /// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its own (0-based).

@@ -14,7 +14,7 @@ struct TrainOptions {
   std::optional<std::string> bias;   ///< instead of the cell's bias
   double validation_share = 0;       ///< of the rows, drawn, when the batch has no `set` column; 0 = train on all
   std::uint64_t seed = 1;
-  std::int64_t trained_at = 0;       ///< Unix time, s, as recorded
+  std::int64_t trained_at = 0;  ///< Unix time, s, as recorded
   /// What is being done and the share done of all in [0, 1]; return false to give up.
   std::function<bool(const std::string& stage, double share)> progress;
 };

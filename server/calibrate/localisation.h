@@ -1,0 +1,34 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/pose.h"
+
+/// Closed forms that find where things stand, before anything is refined.
+namespace trammel {
+
+/// The rigid transformation X_AB that takes `points_B` onto `points_A` (3 x N each, N >= 3) with least squares, by SVD,
+/// eqs. (3.8)-(3.10) written for the direct map. Refuses fewer than 3 points and points on a line.
+[[nodiscard]] Result<Pose> fit_transform(const Eigen::Matrix3Xd& points_A, const Eigen::Matrix3Xd& points_B);
+
+/// X_WB and X_FT from full poses, X_WT = X_WB X_BF X_FT (robot-world/hand-eye): the two rotations from the dominant
+/// singular pair of the sum of R_BF x R_WT (Kronecker), then both translations linearly. Refuses fewer than 3 poses and
+/// poses whose rotations do not determine both.
+struct BaseAndTool {
+  Pose X_WB = Pose::Identity();
+  Pose X_FT = Pose::Identity();
+};
+[[nodiscard]] Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF);
+
+/// X_WB and the tool point p_FT from positions alone: alternates fit_transform() with a linear solve for the point
+/// until the step is below 1e-9 m. Refuses fewer than 6 poses and poses whose rotations leave the point undetermined.
+[[nodiscard]] Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W,
+                                                             const std::vector<Pose>& X_BF);
+
+/// X_FT alone, the base known: mean over poses. Positions alone give the point and leave the rotation identity.
+[[nodiscard]] Result<Pose> locate_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_WF);
+[[nodiscard]] Result<Vector3> locate_tool_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF);
+
+}  // namespace trammel

@@ -1,0 +1,245 @@
+#include "server/compensate/compensated_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/compensate/model_file.h"
+#include "server/robot/inverse_kinematics.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kRangeMargin = 0.05;           // of a joint's training range, on either side
+constexpr double kInterval95 = 1.959963984540;  // standard deviations
+constexpr double kRotationTolerance = 1e-7;     // rad, of a corrected target
+
+/// |e| of all columns and their axes. `e_B`: 3 x N, m, not empty.
+ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
+  const auto n = e_B.cols();
+  TRAMMEL_CHECK(n > 0);
+  Eigen::VectorXd length = e_B.colwise().norm().transpose();
+  std::sort(length.begin(), length.end());
+  ErrorFigures figures;
+  figures.rms = std::sqrt(length.squaredNorm() / static_cast<double>(n));
+  figures.mean = length.mean();
+  const double place = 0.997 * static_cast<double>(n - 1);
+  const auto below = static_cast<Eigen::Index>(place);
+  const auto above = std::min(below + 1, n - 1);
+  figures.p997 = length(below) + (place - static_cast<double>(below)) * (length(above) - length(below));
+  figures.max = length(n - 1);
+  figures.axis_mean = e_B.rowwise().mean();
+  if (n > 1) {
+    figures.axis_stddev =
+        ((e_B.colwise() - figures.axis_mean).rowwise().squaredNorm() / static_cast<double>(n - 1)).cwiseSqrt();
+  }
+  return figures;
+}
+
+}  // namespace
+
+std::string_view to_string(CorrectionStatus status) {
+  switch (status) {
+    case CorrectionStatus::kOk:
+      return "ok";
+    case CorrectionStatus::kOutOfDomain:
+      return "out_of_domain";
+    case CorrectionStatus::kJointLimit:
+      return "joint_limit";
+    case CorrectionStatus::kUnreachable:
+      return "unreachable";
+    case CorrectionStatus::kSingular:
+      return "singular";
+    case CorrectionStatus::kNotConverged:
+      return "not_converged";
+    case CorrectionStatus::kRefused:
+      return "refused";
+  }
+  return "refused";
+}
+
+Result<CompensatedModel> CompensatedModel::make(Parts parts) {
+  const int n = parts.physics.cell->robot.size();
+  const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
+  if (parts.q_min.size() != n || parts.q_max.size() != n || parts.physics.values.size() != P ||
+      parts.covariance.rows() != P || parts.covariance.cols() != P) {
+    return refused("model: {} parameters and {} joint ranges do not fit a robot of {} joints with {} parameters",
+                   parts.physics.values.size(), parts.q_min.size(), n, P);
+  }
+  if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
+    return refused("model: a parameter is not finite");
+  }
+  auto inside = std::make_shared<Inside>();
+  if (parts.bias) {
+    if (parts.bias->q.cols() != n)
+      return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
+    Result<BiasModel> bias = BiasModel::restore(*parts.bias);
+    if (!bias) return tl::make_unexpected(bias.error());
+    inside->bias = std::move(*bias);
+  }
+  parts.provenance.hash = content_hash(parts);
+  parts.provenance.id = parts.provenance.hash.substr(0, 12);
+  inside->parts = std::move(parts);
+  return CompensatedModel(std::move(inside));
+}
+
+bool CompensatedModel::in_range(const JointVector& q) const {
+  const Eigen::ArrayXd margin = kRangeMargin * (parts().q_max - parts().q_min).array() + 1e-9;
+  return (q.array() >= parts().q_min.array() - margin).all() && (q.array() <= parts().q_max.array() + margin).all();
+}
+
+ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::string& tool,
+                                          const std::string& payload) const {
+  PoseContext context;
+  context.q = q;
+  context.tool = tool;
+  context.payload = payload;
+  return predict(context, Domain::kDecide);
+}
+
+ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain domain) const {
+  const PhysicalModel& physics = parts().physics;
+  const Pose X_BW = physics.X_WB.inverse();
+  Eigen::MatrixXd J_W;
+  ErrorPrediction prediction;
+  prediction.X_BT_nominal = X_BW * physics.nominal_pose_W(context);
+  prediction.X_BT_predicted = X_BW * physics.pose_W(context, physics.values, &J_W);
+  const Eigen::MatrixXd J_B = X_BW.linear() * J_W.topRows<3>();
+  const Vector3 identified = (J_B * parts().covariance * J_B.transpose()).diagonal();
+  const double sigma = cell().tracker.sigma;
+
+  Vector3 variance = Vector3::Constant(sigma * sigma + parts().discrepancy * parts().discrepancy) + identified;
+  prediction.in_domain = domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q));
+  if (inside_->bias) {
+    const BiasPrediction bias = inside_->bias->predict(context.q);
+    if (domain == Domain::kDecide) prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
+    if (prediction.in_domain) {
+      prediction.X_BT_predicted.translation() += bias.mean_B;
+      variance = bias.measured_stddev_B.cwiseAbs2();
+    } else {
+      // Not used, so all of it may be missing.
+      variance += bias.mean_B.cwiseAbs2() + bias.stddev_B.cwiseAbs2();
+    }
+  }
+  prediction.stddev_B = variance.cwiseSqrt();
+  prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
+  return prediction;
+}
+
+Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
+                                     const CorrectOptions& options) const {
+  const Chain& robot = cell().robot;
+  PoseContext context;
+  context.tool = tool;
+  context.payload = payload;
+  Correction result;
+  const auto end = [&](CorrectionStatus status, std::string message) {
+    result.status = status;
+    result.message = std::move(message);
+    return result;
+  };
+
+  const Pose X_TF = parts().physics.tools.at(tool).inverse();
+  // The joints the controller would go to for a tool pose, by its nominal inverse kinematics.
+  const auto nominal_joints = [&](const Pose& X_BT, const JointVector& seed) {
+    return inverse_kinematics(robot, X_BT * X_TF, seed);
+  };
+  InverseResult joints;
+  if (target.joint_target) {
+    if (!target.seed) return end(CorrectionStatus::kRefused, "a joint target without joints");
+    context.q = *target.seed;
+    if (robot.joint_outside_limits(context.q))
+      joints.status = InverseStatus::kJointLimit;
+    else
+      joints.status = InverseStatus::kOk;
+    joints.q = context.q;
+    result.X_BT_wanted = predict(context, Domain::kOutside).X_BT_nominal;
+  } else {
+    result.X_BT_wanted = target.X_BT;
+    if (target.conf) {
+      const Result<InverseResult> branch = inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
+      if (!branch) return end(CorrectionStatus::kRefused, branch.error().message);
+      joints = *branch;
+    } else if (target.seed) {
+      joints = nominal_joints(target.X_BT, *target.seed);
+    } else {
+      return end(CorrectionStatus::kRefused, "a target needs a branch (conf) or joints as a seed");
+    }
+  }
+  result.X_BT_commanded = result.X_BT_wanted;
+  result.q = joints.q;
+
+  const auto why = [&](InverseStatus status) {
+    switch (status) {
+      case InverseStatus::kJointLimit:
+        return end(CorrectionStatus::kJointLimit, "only reachable outside the joint limits");
+      case InverseStatus::kSingular:
+        return end(CorrectionStatus::kSingular, "the arm is singular there");
+      default:
+        return end(CorrectionStatus::kUnreachable, "no joints bring the tool there");
+    }
+  };
+  if (joints.status != InverseStatus::kOk) return why(joints.status);
+
+  context.q = joints.q;
+  ErrorPrediction prediction = predict(context, Domain::kDecide);
+  // Decided once: a target at the edge must not switch models between steps.
+  const Domain domain = prediction.in_domain ? Domain::kInside : Domain::kOutside;
+  result.error_before = (prediction.X_BT_predicted.translation() - result.X_BT_wanted.translation()).norm();
+  Vector6 missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
+  const auto settled = [&] {
+    return missing.head<3>().norm() < options.tolerance && missing.tail<3>().norm() < kRotationTolerance;
+  };
+  while (!settled() && result.iterations < options.max_iterations) {
+    ++result.iterations;
+    result.X_BT_commanded.translation() += missing.head<3>();
+    result.X_BT_commanded.linear() = (rotation_exp(missing.tail<3>()) * result.X_BT_commanded.linear()).eval();
+    joints = nominal_joints(result.X_BT_commanded, context.q);
+    if (joints.status != InverseStatus::kOk) return why(joints.status);
+    context.q = joints.q;
+    prediction = predict(context, domain);
+    missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
+  }
+  result.q = joints.q;
+  result.error_after = missing.head<3>().norm();
+  result.stddev = prediction.stddev_B.norm();
+  if (!settled()) {
+    return end(CorrectionStatus::kNotConverged,
+               fmt::format("{:.2e} mm left after {} iterations", 1e3 * result.error_after, result.iterations));
+  }
+  if (domain == Domain::kOutside) {
+    return end(CorrectionStatus::kOutOfDomain,
+               "too far from the training poses: corrected by the calibrated model alone");
+  }
+  return end(CorrectionStatus::kOk, "");
+}
+
+Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
+  const PhysicalModel& physics = parts().physics;
+  const Pose X_BW = physics.X_WB.inverse();
+  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
+  Eigen::Matrix3Xd nominal(3, n);
+  Eigen::Matrix3Xd calibrated(3, n);
+  Eigen::Matrix3Xd compensated(3, n);
+  Evaluation evaluation;
+  evaluation.poses = static_cast<int>(n);
+  Eigen::Index covered = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    const Vector3 p_B = X_BW * m.p_W;
+    const ErrorPrediction prediction = predict(m.context, Domain::kDecide);
+    nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
+    calibrated.col(i) = p_B - X_BW * physics.pose_W(m.context).translation();
+    compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
+    covered += (compensated.col(i).array().abs() <= kInterval95 * prediction.stddev_B.array()).count();
+    evaluation.in_domain += prediction.in_domain ? 1 : 0;
+  }
+  evaluation.nominal = figures_of(nominal);
+  evaluation.calibrated = figures_of(calibrated);
+  evaluation.compensated = figures_of(compensated);
+  evaluation.coverage_95 = static_cast<double>(covered) / static_cast<double>(3 * n);
+  return evaluation;
+}
+
+}  // namespace trammel

@@ -1,0 +1,233 @@
+#include "server/compensate/model_file.h"
+
+#include <nlohmann/json.hpp>
+
+#include "server/base/hash.h"
+#include "server/base/text_file.h"
+
+namespace trammel {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kFormat = 1;
+
+Json to_json(const Eigen::MatrixXd& m) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    for (Eigen::Index j = 0; j < m.cols(); ++j) values.push_back(m(i, j));
+  }
+  return {{"rows", m.rows()}, {"columns", m.cols()}, {"values", std::move(values)}};
+}
+
+Eigen::MatrixXd matrix_from(const Json& json) {
+  const auto rows = json.at("rows").get<Eigen::Index>();
+  const auto columns = json.at("columns").get<Eigen::Index>();
+  const Json& values = json.at("values");
+  if (rows < 0 || columns < 0 || static_cast<std::size_t>(rows * columns) != values.size()) {
+    throw Json::other_error::create(501, "a matrix whose size does not fit its values", &json);
+  }
+  Eigen::MatrixXd m(rows, columns);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (Eigen::Index j = 0; j < columns; ++j)
+      m(i, j) = values[static_cast<std::size_t>(i * columns + j)].get<double>();
+  }
+  return m;
+}
+
+Json to_json(const Pose& X) { return to_json(Eigen::MatrixXd(X.matrix().topRows<3>())); }
+
+Pose pose_from(const Json& json) {
+  const Eigen::MatrixXd m = matrix_from(json);
+  if (m.rows() != 3 || m.cols() != 4) throw Json::other_error::create(501, "a pose that is not 3 x 4", &json);
+  Pose X = Pose::Identity();
+  X.matrix().topRows<3>() = m;
+  return X;
+}
+
+Json to_json(const ErrorFigures& f) {
+  return {{"rms_m", f.rms},
+          {"mean_m", f.mean},
+          {"p997_m", f.p997},
+          {"max_m", f.max},
+          {"axis_mean_m", to_json(Eigen::MatrixXd(f.axis_mean))},
+          {"axis_stddev_m", to_json(Eigen::MatrixXd(f.axis_stddev))}};
+}
+
+ErrorFigures figures_from(const Json& json) {
+  ErrorFigures f;
+  f.rms = json.at("rms_m");
+  f.mean = json.at("mean_m");
+  f.p997 = json.at("p997_m");
+  f.max = json.at("max_m");
+  f.axis_mean = matrix_from(json.at("axis_mean_m"));
+  f.axis_stddev = matrix_from(json.at("axis_stddev_m"));
+  return f;
+}
+
+Json to_json(const Evaluation& e) {
+  return {{"poses", e.poses},
+          {"nominal", to_json(e.nominal)},
+          {"calibrated", to_json(e.calibrated)},
+          {"compensated", to_json(e.compensated)},
+          {"coverage_95", e.coverage_95},
+          {"in_domain", e.in_domain}};
+}
+
+Evaluation evaluation_from(const Json& json) {
+  Evaluation e;
+  e.poses = json.at("poses");
+  e.nominal = figures_from(json.at("nominal"));
+  e.calibrated = figures_from(json.at("calibrated"));
+  e.compensated = figures_from(json.at("compensated"));
+  e.coverage_95 = json.at("coverage_95");
+  e.in_domain = json.at("in_domain");
+  return e;
+}
+
+Json to_json(const BiasState& bias) {
+  return {{"kernel", bias.kernel},
+          {"q", to_json(bias.q)},
+          {"residual_B", to_json(bias.residual_B)},
+          {"sigma", to_json(Eigen::MatrixXd(bias.sigma))},
+          {"offset", to_json(Eigen::MatrixXd(bias.offset))},
+          {"hyperparameters", to_json(bias.hyperparameters)}};
+}
+
+BiasState bias_from(const Json& json) {
+  BiasState bias;
+  bias.kernel = json.at("kernel");
+  bias.q = matrix_from(json.at("q"));
+  bias.residual_B = matrix_from(json.at("residual_B"));
+  bias.sigma = matrix_from(json.at("sigma"));
+  bias.offset = matrix_from(json.at("offset"));
+  bias.hyperparameters = matrix_from(json.at("hyperparameters"));
+  return bias;
+}
+
+/// All but the stamp.
+Json content_of(const CompensatedModel::Parts& parts) {
+  const PhysicalModel& physics = parts.physics;
+  Json tools = Json::object();
+  for (const auto& [name, X_FT] : physics.tools) tools[name] = to_json(X_FT);
+  Json sources = Json::array();
+  for (const ErrorSourcePtr& source : physics.sources) sources.push_back(source->name());
+  Json parameters = Json::array();
+  for (const IdentifiedParameter& p : parts.parameters) {
+    parameters.push_back(
+        {{"name", p.parameter.name}, {"value", p.value}, {"stddev", p.stddev}, {"identified", p.identified}});
+  }
+  Json unidentifiable = Json::array();
+  for (const UnidentifiableCombination& u : parts.unidentifiable) {
+    unidentifiable.push_back(
+        {{"singular_value", u.singular_value}, {"parameters", u.parameters}, {"sentence", u.sentence}});
+  }
+  Json content = {{"cell_yaml", physics.cell->cell_yaml},
+                  {"robot_yaml", physics.cell->robot_yaml},
+                  {"X_WB", to_json(physics.X_WB)},
+                  {"tools", std::move(tools)},
+                  {"error_sources", std::move(sources)},
+                  {"values", to_json(Eigen::MatrixXd(physics.values))},
+                  {"covariance", to_json(parts.covariance)},
+                  {"parameters", std::move(parameters)},
+                  {"unidentifiable", std::move(unidentifiable)},
+                  {"rank", parts.rank},
+                  {"condition_number", parts.condition_number},
+                  {"discrepancy_m", parts.discrepancy},
+                  {"q_min", to_json(Eigen::MatrixXd(parts.q_min))},
+                  {"q_max", to_json(Eigen::MatrixXd(parts.q_max))},
+                  {"prior_share_limit", parts.prior_share_limit},
+                  {"training", to_json(parts.training)},
+                  {"provenance",
+                   {{"level", parts.provenance.level},
+                    {"batch_id", parts.provenance.batch_id},
+                    {"batch_hash", parts.provenance.batch_hash},
+                    {"training_poses", parts.provenance.training_poses},
+                    {"seed", parts.provenance.seed}}}};
+  if (parts.bias) content["bias"] = to_json(*parts.bias);
+  if (parts.validation) content["validation"] = to_json(*parts.validation);
+  return content;
+}
+
+Result<CompensatedModel> model_from(const Json& file, const std::string& where) {
+  if (file.at("trammel_model").get<int>() != kFormat) {
+    return refused("{}: model format {}, this program reads {}", where, file.at("trammel_model").dump(), kFormat);
+  }
+  const Json& content = file.at("content");
+  const std::string hash = sha256_hex(content.dump());
+  if (hash != file.at("hash").get<std::string>()) {
+    return refused("{}: damaged: its hash is {}, its content has {}", where, file.at("hash").dump(), hash);
+  }
+  Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
+  if (!cell) return tl::make_unexpected(cell.error());
+  Result<PhysicalModel> physics = make_physical_model(std::make_shared<const Cell>(std::move(*cell)),
+                                                      content.at("error_sources").get<std::vector<std::string>>());
+  if (!physics) return refused("{}: {}", where, physics.error().message);
+  CompensatedModel::Parts parts;
+  parts.physics = std::move(*physics);
+  parts.physics.X_WB = pose_from(content.at("X_WB"));
+  for (auto& [name, X_FT] : parts.physics.tools) X_FT = pose_from(content.at("tools").at(name));
+  parts.physics.values = matrix_from(content.at("values"));
+  parts.covariance = matrix_from(content.at("covariance"));
+  const std::vector<Parameter> known = parts.physics.parameters();
+  const Json& parameters = content.at("parameters");
+  if (parameters.size() != known.size())
+    return refused("{}: {} parameters, expected {}", where, parameters.size(), known.size());
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    parts.parameters.push_back(
+        {known[i], parameters[i].at("value"), parameters[i].at("stddev"), parameters[i].at("identified")});
+  }
+  for (const Json& u : content.at("unidentifiable")) {
+    parts.unidentifiable.push_back({u.at("singular_value"), u.at("parameters"), u.at("sentence")});
+  }
+  parts.rank = content.at("rank");
+  parts.condition_number = content.at("condition_number");
+  parts.discrepancy = content.at("discrepancy_m");
+  parts.q_min = matrix_from(content.at("q_min"));
+  parts.q_max = matrix_from(content.at("q_max"));
+  parts.prior_share_limit = content.at("prior_share_limit");
+  parts.training = evaluation_from(content.at("training"));
+  if (content.contains("bias")) parts.bias = bias_from(content.at("bias"));
+  if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
+  const Json& provenance = content.at("provenance");
+  parts.provenance.level = provenance.at("level");
+  parts.provenance.batch_id = provenance.at("batch_id");
+  parts.provenance.batch_hash = provenance.at("batch_hash");
+  parts.provenance.training_poses = provenance.at("training_poses");
+  parts.provenance.seed = provenance.at("seed");
+  parts.provenance.trained_at = file.at("stamp").at("trained_at");
+  parts.provenance.program_version = file.at("stamp").at("program_version");
+  return CompensatedModel::make(std::move(parts)).map_error([&](Error error) {
+    error.message = where + ": " + error.message;
+    return error;
+  });
+}
+
+}  // namespace
+
+std::string content_hash(const CompensatedModel::Parts& parts) { return sha256_hex(content_of(parts).dump()); }
+
+std::string serialize(const CompensatedModel& model) {
+  const ModelProvenance& provenance = model.provenance();
+  const Json file = {
+      {"trammel_model", kFormat},
+      {"hash", provenance.hash},
+      {"stamp", {{"trained_at", provenance.trained_at}, {"program_version", provenance.program_version}}},
+      {"content", content_of(model.parts())}};
+  return file.dump() + "\n";
+}
+
+Result<CompensatedModel> deserialize(const std::string& text, const std::string& where) {
+  try {
+    return model_from(Json::parse(text), where);
+  } catch (const Json::exception& error) {
+    return refused("{}: not a Trammel model: {}", where, error.what());
+  }
+}
+
+Result<CompensatedModel> load_model(const std::string& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return deserialize(text, path); });
+}
+
+}  // namespace trammel

@@ -1,0 +1,42 @@
+#include "server/error_sources/parameter.h"
+#include "server/error_sources/sources.h"
+
+namespace trammel {
+
+namespace {
+
+/// The base stands elsewhere than believed: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0) Rx(alpha0), eq. (3.5).
+/// The prior is wide: where a robot stands is found by measuring, not believed.
+class Base final : public ErrorSource {
+ public:
+  std::string name() const override { return "base"; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  std::string explanation() const override { return "the robot base stands elsewhere than the cell file says"; }
+
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    const Pose X_WB_nominal = state.X_WB;
+    state.X_WB = X_WB_nominal * pose_zyx(values.head<3>(), values(3), values(4), values(5));
+    if (jacobian == nullptr) return;
+    const Matrix3 R = X_WB_nominal.linear();
+    const Matrix3 Rz = Eigen::AngleAxisd(values(3), Vector3::UnitZ()).toRotationMatrix();
+    const Matrix3 RzRy = Rz * Eigen::AngleAxisd(values(4), Vector3::UnitY()).toRotationMatrix();
+    const int translation = jacobian->rows.base(0);
+    const int rotation = jacobian->rows.base(3);
+    jacobian->matrix.block<3, 3>(translation, first_column) = R;
+    jacobian->matrix.block<3, 1>(rotation, first_column + 3) = R.col(2);
+    jacobian->matrix.block<3, 1>(rotation, first_column + 4) = R * Rz.col(1);
+    jacobian->matrix.block<3, 1>(rotation, first_column + 5) = R * RzRy.col(0);
+  }
+
+ private:
+  const std::vector<Parameter> parameters_ = {length_parameter("x0", 100),   length_parameter("y0", 100),
+                                              length_parameter("z0", 100),   angle_parameter("gamma0", 0.1),
+                                              angle_parameter("beta0", 0.1), angle_parameter("alpha0", 0.1)};
+};
+
+}  // namespace
+
+Result<ErrorSourcePtr> make_base(const Cell&, int) { return std::make_shared<Base>(); }
+
+}  // namespace trammel

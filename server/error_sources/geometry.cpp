@@ -1,0 +1,56 @@
+#include "server/error_sources/parameter.h"
+#include "server/error_sources/sources.h"
+
+namespace trammel {
+
+namespace {
+
+/// The links are not quite what the drawing says: q, d (or beta in a Hayati row), a and alpha of every link, eqs. (3.3)
+/// and (3.4), 24 parameters for a six-axis arm with one pair of parallel axes.
+class Geometry final : public ErrorSource {
+ public:
+  explicit Geometry(const Chain& chain) {
+    for (int i = 0; i < chain.size(); ++i) {
+      const auto add = [&](double LinkGeometry::*member, int row, const char* symbol, bool length) {
+        const std::string name = fmt::format("{}{}", symbol, i + 1);
+        entries_.push_back({static_cast<std::size_t>(i), member, row});
+        parameters_.push_back(length ? length_parameter(name, 2) : angle_parameter(name, 5e-3));
+      };
+      const StateRows rows(chain.size());
+      const bool prismatic = chain.joint(i).type == JointType::kPrismatic;
+      add(&LinkGeometry::theta, rows.theta(i), prismatic ? "theta" : "q", false);
+      if (!chain.joint(i).hayati) add(&LinkGeometry::d, rows.d(i), "d", true);
+      add(&LinkGeometry::a, rows.a(i), "a", true);
+      add(&LinkGeometry::alpha, rows.alpha(i), "alpha", false);
+      if (chain.joint(i).hayati) add(&LinkGeometry::beta, rows.beta(i), "beta", false);
+    }
+  }
+
+  std::string name() const override { return "geometry"; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  std::string explanation() const override { return "link lengths, twists and joint zeros differ from the drawing"; }
+
+  void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    for (std::size_t k = 0; k < entries_.size(); ++k) {
+      const auto column = static_cast<Eigen::Index>(k);
+      state.links[entries_[k].link].*entries_[k].member += values(column);
+      if (jacobian != nullptr) jacobian->matrix(entries_[k].row, first_column + column) = 1;
+    }
+  }
+
+ private:
+  struct Entry {
+    std::size_t link;
+    double LinkGeometry::*member;
+    int row;
+  };
+  std::vector<Entry> entries_;
+  std::vector<Parameter> parameters_;
+};
+
+}  // namespace
+
+Result<ErrorSourcePtr> make_geometry(const Cell& cell, int) { return std::make_shared<Geometry>(cell.robot); }
+
+}  // namespace trammel

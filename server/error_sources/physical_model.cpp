@@ -1,0 +1,109 @@
+#include "server/error_sources/physical_model.h"
+
+#include <algorithm>
+
+#include "server/base/check.h"
+
+namespace trammel {
+
+namespace {
+
+/// The order in which causes act on the arm: frames and geometry first, what depends on the loaded posture last.
+int stage(const std::string& source_name) { return source_name == "compliance" ? 1 : 0; }
+
+}  // namespace
+
+int PhysicalModel::parameter_count() const {
+  int count = 0;
+  for (const ErrorSourcePtr& source : sources) count += static_cast<int>(source->parameters().size());
+  return count;
+}
+
+std::vector<Parameter> PhysicalModel::parameters() const {
+  std::vector<Parameter> all;
+  for (const ErrorSourcePtr& source : sources) {
+    all.insert(all.end(), source->parameters().begin(), source->parameters().end());
+  }
+  return all;
+}
+
+Eigen::VectorXd PhysicalModel::prior_values() const {
+  const std::vector<Parameter> all = parameters();
+  Eigen::VectorXd prior(static_cast<Eigen::Index>(all.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) prior(static_cast<Eigen::Index>(i)) = all[i].prior;
+  return prior;
+}
+
+ArmState PhysicalModel::nominal_state(const PoseContext& context) const {
+  ArmState state;
+  state.chain = &cell->robot;
+  state.links = cell->robot.links_at(context.q);
+  state.X_WB = X_WB;
+  const auto tool = tools.find(context.tool);
+  TRAMMEL_CHECK(tool != tools.end());
+  state.X_FT = tool->second;
+  if (!context.payload.empty()) {
+    const auto payload = cell->payloads.find(context.payload);
+    TRAMMEL_CHECK(payload != cell->payloads.end());
+    state.payload = payload->second;
+  }
+  state.gravity_W = cell->gravity_W;
+  return state;
+}
+
+Pose PhysicalModel::nominal_pose_W(const PoseContext& context) const {
+  return ArmKinematics(nominal_state(context)).tool_pose_W();
+}
+
+ArmState PhysicalModel::state(const PoseContext& context) const {
+  ArmState state = nominal_state(context);
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    source->apply(context, values.segment(first, count), state, nullptr, 0);
+    first += count;
+  }
+  return state;
+}
+
+Pose PhysicalModel::pose_W(const PoseContext& context) const { return ArmKinematics(state(context)).tool_pose_W(); }
+
+Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& parameter_values,
+                           Eigen::MatrixXd* jacobian) const {
+  TRAMMEL_CHECK(parameter_values.size() == parameter_count());
+  ArmState state = nominal_state(context);
+  std::optional<StateJacobian> by_parameters;
+  if (jacobian != nullptr) by_parameters.emplace(cell->robot, static_cast<int>(parameter_values.size()));
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    source->apply(context, parameter_values.segment(first, count), state, by_parameters ? &*by_parameters : nullptr,
+                  static_cast<int>(first));
+    first += count;
+  }
+  const ArmKinematics kinematics(state);
+  if (jacobian != nullptr) *jacobian = kinematics.pose_jacobian() * by_parameters->matrix;
+  return kinematics.tool_pose_W();
+}
+
+Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, const std::vector<std::string>& specs) {
+  PhysicalModel model;
+  for (const std::string& spec : specs) {
+    Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
+    if (!source) return tl::make_unexpected(source.error());
+    for (const ErrorSourcePtr& other : model.sources) {
+      if (other->name() == (*source)->name()) return failure(ErrorCode::kUsage, "error source '{}' given twice", spec);
+    }
+    model.sources.push_back(std::move(*source));
+  }
+  std::stable_sort(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) {
+    return stage(a->name()) < stage(b->name());
+  });
+  model.X_WB = cell->X_WB.value_or(Pose::Identity());
+  for (const auto& [name, X_FT] : cell->tools) model.tools[name] = X_FT.value_or(Pose::Identity());
+  model.cell = std::move(cell);
+  model.values = model.prior_values();
+  return model;
+}
+
+}  // namespace trammel

@@ -1,0 +1,227 @@
+#include "server/robot/cell_file.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/base/yaml_file.h"
+#include "server/robot/cell.h"
+
+namespace trammel {
+
+namespace {
+
+Joint read_joint(const YamlMap& map) {
+  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg", "limits_mm", "sign",
+            "gear_ratio", "compliance_rad_per_nmm", "max_speed_deg_s", "max_speed_mm_s"});
+  Joint joint;
+  const std::string type = map.text("type", "revolute");
+  if (type != "revolute" && type != "prismatic") map.refuse("type", "expected revolute or prismatic");
+  joint.type = type == "revolute" ? JointType::kRevolute : JointType::kPrismatic;
+  joint.hayati = map.boolean("hayati", false);
+  if (joint.hayati && map.number("d_mm", 0) != 0) map.refuse("d_mm", "a Hayati link has no d");
+  if (!joint.hayati && map.has("beta_deg")) map.refuse("beta_deg", "only a Hayati link has beta");
+  joint.link.theta = from_deg(map.number("theta_deg", 0));
+  joint.link.d = from_mm(map.number("d_mm", 0));
+  joint.link.a = from_mm(map.number("a_mm", 0));
+  joint.link.alpha = from_deg(map.number("alpha_deg", 0));
+  joint.link.beta = from_deg(map.number("beta_deg", 0));
+  joint.sign = map.number("sign", 1);
+  joint.gear_ratio = map.number("gear_ratio", 0);
+  joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
+  const bool revolute = joint.type == JointType::kRevolute;
+  const std::string limits = revolute ? "limits_deg" : "limits_mm";
+  const std::string speed = revolute ? "max_speed_deg_s" : "max_speed_mm_s";
+  const auto si = [&](double value) { return revolute ? from_deg(value) : from_mm(value); };
+  if (map.has(limits)) {
+    const std::vector<double> range = map.numbers(limits, 2);
+    joint.lower = si(range[0]);
+    joint.upper = si(range[1]);
+  }
+  if (map.has(speed)) joint.max_speed = si(map.number(speed));
+  return joint;
+}
+
+Vector3 read_vector(const YamlMap& map, const std::string& key) {
+  const std::vector<double> v = map.numbers(key, 3);
+  return {v[0], v[1], v[2]};
+}
+
+}  // namespace
+
+Pose read_pose(const YamlMap& map) {
+  map.only({"xyz_mm", "q_wxyz"});
+  Pose X = Pose::Identity();
+  X.translation() = read_vector(map, "xyz_mm") * from_mm(1);
+  if (map.has("q_wxyz")) {
+    const std::vector<double> v = map.numbers("q_wxyz", 4);
+    const Eigen::Quaterniond quaternion(v[0], v[1], v[2], v[3]);
+    if (std::abs(quaternion.norm() - 1) > 1e-3) {
+      map.refuse("q_wxyz", fmt::format("length {:.6f}, expected a unit quaternion (limit 1e-3)", quaternion.norm()));
+    }
+    X.linear() = quaternion.normalized().toRotationMatrix();
+  }
+  return X;
+}
+
+namespace {
+
+Tracker read_tracker(const YamlMap& map) {
+  map.only({"sigma_mm", "sigma_deg", "xyz_mm", "aperture_deg"});
+  Tracker tracker;
+  tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
+  tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
+  if (tracker.sigma <= 0) map.refuse("sigma_mm", "must be above 0");
+  if (tracker.sigma_rotation <= 0) map.refuse("sigma_deg", "must be above 0");
+  if (!map.is_null("xyz_mm")) tracker.p_W = read_vector(map, "xyz_mm") * from_mm(1);
+  if (map.has("aperture_deg")) tracker.aperture = from_deg(map.number("aperture_deg"));
+  return tracker;
+}
+
+Cell read_cell_map(const YamlMap& map) {
+  map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
+            "workspace_mm"});
+  if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+  Cell cell;
+  cell.name = map.text("cell");
+  if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
+    map.refuse("cell", "expected a name without blanks, '@' and '/'");
+  }
+  if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
+  if (map.has("gravity")) {
+    cell.gravity_W = read_vector(map, "gravity");
+    if (cell.gravity_W.norm() < 1e-9) map.refuse("gravity", "a direction of length 0");
+    cell.gravity_W.normalize();
+  }
+  if (!map.is_null("tools")) {
+    const YamlMap tools = map.map("tools");
+    for (const std::string& name : tools.keys()) {
+      cell.tools[name] = tools.is_null(name) ? std::nullopt : std::optional<Pose>(read_pose(tools.map(name)));
+    }
+  }
+  if (cell.tools.empty()) map.refuse("tools", "at least one tool is needed (null when its pose is unknown)");
+  if (!map.is_null("payloads")) {
+    const YamlMap payloads = map.map("payloads");
+    for (const std::string& name : payloads.keys()) {
+      const YamlMap entry = payloads.map(name);
+      entry.only({"mass_kg", "cog_mm"});
+      Payload payload{entry.number("mass_kg"), read_vector(entry, "cog_mm") * from_mm(1)};
+      if (payload.mass < 0) entry.refuse("mass_kg", "below 0");
+      cell.payloads[name] = payload;
+    }
+  }
+  if (map.has("tracker")) cell.tracker = read_tracker(map.map("tracker"));
+  if (map.has("model")) {
+    const YamlMap model = map.map("model");
+    model.only({"error_sources", "bias"});
+    if (model.has("error_sources")) cell.model.error_sources = model.texts("error_sources");
+    cell.model.bias = model.text("bias", cell.model.bias);
+  }
+  if (map.has("workspace_mm")) {
+    const YamlMap box = map.map("workspace_mm");
+    box.only({"lower", "upper"});
+    cell.workspace = Workspace{read_vector(box, "lower") * from_mm(1), read_vector(box, "upper") * from_mm(1)};
+  }
+  return cell;
+}
+
+void read_joint_ranges(const YamlMap& map, Cell& cell) {
+  if (map.is_null("joint_ranges_deg")) return;
+  const YamlMap ranges = map.map("joint_ranges_deg");
+  for (int i = 0; i < cell.robot.size(); ++i) {
+    const std::vector<double> range = ranges.numbers(fmt::format("q{}", i + 1), 2);
+    if (!(range[0] <= range[1])) ranges.refuse(fmt::format("q{}", i + 1), "lower end above upper end");
+    cell.joint_ranges.emplace_back(from_deg(range[0]), from_deg(range[1]));
+  }
+  if (ranges.keys().size() != static_cast<std::size_t>(cell.robot.size())) {
+    ranges.refuse("q1...", fmt::format("expected {} joints", cell.robot.size()));
+  }
+}
+
+}  // namespace
+
+Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where) {
+  return read_yaml(robot_yaml, where,
+                   [&](const YamlMap& map) {
+                     map.only({"version", "name", "source", "joints", "coupling"});
+                     if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+                     std::vector<Joint> joints;
+                     for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
+                     std::vector<Coupling> couplings;
+                     if (!map.is_null("coupling")) {
+                       for (const YamlMap& entry : map.maps("coupling")) {
+                         entry.only({"joint", "follows", "ratio"});
+                         couplings.push_back(
+                             {entry.integer("joint", 0) - 1, entry.integer("follows", 0) - 1, entry.number("ratio")});
+                       }
+                     }
+                     return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
+                   })
+      .and_then([](Result<Chain> chain) { return chain; })
+      .map_error([&](Error error) {
+        if (!error.message.starts_with(where)) error.message = where + ": " + error.message;
+        return error;
+      });
+}
+
+Result<Chain> read_robot(const std::string& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_robot(text, path); });
+}
+
+Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {
+  Result<Chain> robot = parse_robot(robot_yaml, where + " (robot)");
+  if (!robot) return tl::make_unexpected(robot.error());
+  Result<Cell> cell = read_yaml(cell_yaml, where, [&](const YamlMap& map) {
+    Cell read = read_cell_map(map);
+    read.robot = *robot;
+    read_joint_ranges(map, read);
+    return read;
+  });
+  if (cell) {
+    cell->cell_yaml = cell_yaml;
+    cell->robot_yaml = robot_yaml;
+  }
+  return cell;
+}
+
+Result<Cell> read_cell(const std::string& path) {
+  const Result<std::string> cell_text = read_text_file(path);
+  if (!cell_text) return tl::make_unexpected(cell_text.error());
+  const Result<std::string> robot_file =
+      read_yaml(*cell_text, path, [](const YamlMap& map) { return map.text("robot"); });
+  if (!robot_file) return tl::make_unexpected(robot_file.error());
+  const Result<std::string> robot_text =
+      read_text_file((std::filesystem::path(path).parent_path() / *robot_file).string());
+  if (!robot_text) return refused("{}: robot: {}", path, robot_text.error().message);
+  return parse_cell(*cell_text, *robot_text, path);
+}
+
+namespace {
+
+template <typename Map>
+Result<std::string> resolve(const Map& known, const std::string& requested, const std::string& cell, const char* kind) {
+  std::string names;
+  for (const auto& [name, value] : known) names += (names.empty() ? "" : ", ") + name;
+  if (requested.empty()) {
+    if (known.size() == 1) return known.begin()->first;
+    return refused("cell {}: no {} named, and the cell has {}: {}", cell, kind, known.size(), names);
+  }
+  if (!known.contains(requested)) {
+    return refused("cell {}: unknown {} '{}'; known: {}", cell, kind, requested, names.empty() ? "none" : names);
+  }
+  return requested;
+}
+
+}  // namespace
+
+Result<std::string> resolve_tool(const Cell& cell, const std::string& requested) {
+  return resolve(cell.tools, requested, cell.name, "tool");
+}
+
+Result<std::string> resolve_payload(const Cell& cell, const std::string& requested) {
+  if (cell.payloads.empty() && requested.empty()) return std::string();
+  return resolve(cell.payloads, requested, cell.name, "payload");
+}
+
+}  // namespace trammel

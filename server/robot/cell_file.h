@@ -1,0 +1,11 @@
+#pragma once
+
+#include "server/base/yaml_file.h"
+#include "server/robot/pose.h"
+
+namespace trammel {
+
+/// {xyz_mm: [...], q_wxyz: [...]} as cell and truth files write a pose; the quaternion may be left out (no rotation).
+[[nodiscard]] Pose read_pose(const YamlMap& map);
+
+}  // namespace trammel

@@ -1,0 +1,210 @@
+#include "server/robot/inverse_kinematics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kConverged = 1e-10;     // m and rad
+constexpr double kSingularValue = 1e-3;  // of the Jacobian, m and rad per rad
+constexpr int kMaxIterations = 200;
+
+JointVector clamped(const Chain& chain, JointVector q) {
+  for (int i = 0; i < chain.size(); ++i) q(i) = std::clamp(q(i), chain.joint(i).lower, chain.joint(i).upper);
+  return q;
+}
+
+struct Descent {
+  JointVector q;
+  double error = 0;
+  int iterations = 0;
+};
+
+Descent descend(const Chain& chain, const Pose& X_BF, const JointVector& start, bool within_limits) {
+  const auto keep = [&](const JointVector& q) { return within_limits ? clamped(chain, q) : q; };
+  Descent now{keep(start), 0, 0};
+  Vector6 e = pose_difference(X_BF, chain.flange_pose(now.q));
+  now.error = e.norm();
+  double damping = 1e-3;
+  while (now.iterations < kMaxIterations && now.error > kConverged) {
+    ++now.iterations;
+    Eigen::MatrixXd J = chain.jacobian(now.q);
+    // A joint that stands at its limit and would be pushed out is held.
+    for (int pass = 0; within_limits && pass < 2; ++pass) {
+      const Eigen::VectorXd push = J.transpose() * e;
+      for (int i = 0; i < chain.size(); ++i) {
+        if ((now.q(i) <= chain.joint(i).lower && push(i) < 0) || (now.q(i) >= chain.joint(i).upper && push(i) > 0)) {
+          J.col(i).setZero();
+        }
+      }
+    }
+    const Eigen::MatrixXd normal = J.transpose() * J + damping * Eigen::MatrixXd::Identity(chain.size(), chain.size());
+    const JointVector q = keep(now.q + normal.ldlt().solve(J.transpose() * e));
+    const Vector6 e_new = pose_difference(X_BF, chain.flange_pose(q));
+    if (e_new.norm() < now.error) {
+      const bool stalled = (q - now.q).norm() < 1e-14;
+      now.q = q;
+      e = e_new;
+      now.error = e.norm();
+      damping = std::max(damping * 0.1, 1e-14);
+      if (stalled) break;
+    } else {
+      damping *= 10;
+      if (damping > 1e8) break;
+    }
+  }
+  return now;
+}
+
+double smallest_singular_value(const Chain& chain, const JointVector& q) {
+  const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXd>(chain.jacobian(q)).singularValues();
+  return values(values.size() - 1);
+}
+
+InverseResult judged(const Chain& chain, const JointVector& q, int iterations) {
+  InverseResult result{InverseStatus::kOk, q, iterations};
+  if (chain.joint_outside_limits(q)) {
+    result.status = InverseStatus::kJointLimit;
+  } else if (smallest_singular_value(chain, q) < kSingularValue) {
+    result.status = InverseStatus::kSingular;
+  }
+  return result;
+}
+
+}  // namespace
+
+InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF, const JointVector& seed) {
+  TRAMMEL_CHECK(seed.size() == chain.size());
+  const Descent inside = descend(chain, X_BF, seed, true);
+  if (inside.error <= kConverged) return judged(chain, inside.q, inside.iterations);
+  const Descent free = descend(chain, X_BF, seed, false);
+  const int iterations = inside.iterations + free.iterations;
+  if (free.error <= kConverged) return judged(chain, free.q, iterations);
+  return {InverseStatus::kUnreachable, inside.q, iterations};
+}
+
+bool has_spherical_wrist(const Chain& chain) {
+  if (chain.size() != 6) return false;
+  constexpr double kTolerance = 1e-9;
+  const auto link = [&](int i) { return chain.joint(i).link; };
+  const auto right_angle = [&](int i) { return std::abs(std::cos(link(i).alpha)) < kTolerance; };
+  for (int i = 0; i < 6; ++i) {
+    if (chain.joint(i).type != JointType::kRevolute || std::abs(link(i).beta) > kTolerance) return false;
+  }
+  return right_angle(0) && std::abs(std::sin(link(1).alpha)) < kTolerance && std::cos(link(1).alpha) > 0 &&
+         right_angle(2) && right_angle(3) && right_angle(4) && std::abs(link(3).a) < kTolerance &&
+         std::abs(link(4).a) < kTolerance && std::abs(link(4).d) < kTolerance && link(1).a > kTolerance;
+}
+
+namespace {
+
+/// theta (not joint values) of one branch; empty when the wrist centre is out of reach.
+/// The wrist centre, seen in frame 1, is a planar two-link problem: lengths a2 and hypot(a3, d4).
+std::optional<std::array<double, 6>> branch(const Chain& chain, const Pose& X_BF, bool behind_axis_1, bool behind_arm,
+                                            bool negative_5) {
+  const auto link = [&](int i) { return chain.joint(i).link; };
+  Pose X_B5 = X_BF;  // frame 6 undone up to Rz(theta6): its origin is the wrist centre
+  X_B5.linear() = X_BF.linear() * Eigen::AngleAxisd(-link(5).alpha, Vector3::UnitX()).toRotationMatrix();
+  const Vector3 wrist = X_BF.translation() - X_B5.linear().col(0) * link(5).a - X_B5.linear().col(2) * link(5).d;
+
+  std::array<double, 6> theta{};
+  const double offset = (link(1).d + link(2).d) / std::sin(link(0).alpha);
+  const double radius = std::hypot(wrist.x(), wrist.y());
+  if (radius < 1e-12 || std::abs(offset) > radius) return std::nullopt;
+  const double azimuth = std::atan2(wrist.y(), wrist.x());
+  const double side = std::asin(offset / radius);
+  theta[0] = behind_axis_1 ? azimuth + kPi - side : azimuth + side;
+
+  const Matrix3 R_B1 =
+      (Eigen::AngleAxisd(theta[0], Vector3::UnitZ()) * Eigen::AngleAxisd(link(0).alpha, Vector3::UnitX()))
+          .toRotationMatrix();
+  const Vector3 p_B1 = link(0).d * Vector3::UnitZ() + link(0).a * Vector3(std::cos(theta[0]), std::sin(theta[0]), 0);
+  const Vector3 p = R_B1.transpose() * (wrist - p_B1);
+  const double upper = link(1).a;
+  const double fore_y = -std::sin(link(2).alpha) * link(3).d;
+  const double fore = std::hypot(link(2).a, fore_y);
+  const double cosine = (p.x() * p.x() + p.y() * p.y() - upper * upper - fore * fore) / (2 * upper * fore);
+  if (std::abs(cosine) > 1) return std::nullopt;
+  // Two elbows; the one whose wrist lies in front of the line of the lower arm is told by the sign of the sine, which
+  // depends on how frame 1 is turned and on which side of axis 1 the arm works.
+  const double forward = (R_B1.transpose() * Vector3(std::cos(theta[0]), std::sin(theta[0]), 0)).x() *
+                         (std::sin(link(0).alpha) < 0 ? 1.0 : -1.0);
+  const bool positive_sine = (forward > 0) != behind_arm;
+  const double sine = (positive_sine ? 1.0 : -1.0) * std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  theta[2] = std::atan2(sine, cosine) - std::atan2(fore_y, link(2).a);
+  theta[1] = std::atan2(p.y(), p.x()) - std::atan2(fore * sine, upper + fore * cosine);
+
+  const Matrix3 R_B3 =
+      R_B1 * (Eigen::AngleAxisd(theta[1], Vector3::UnitZ()) * Eigen::AngleAxisd(link(1).alpha, Vector3::UnitX()) *
+              Eigen::AngleAxisd(theta[2], Vector3::UnitZ()) * Eigen::AngleAxisd(link(2).alpha, Vector3::UnitX()))
+                 .toRotationMatrix();
+  const Matrix3 R = R_B3.transpose() * X_B5.linear();  // Rz(4) Rx(alpha4) Rz(5) Rx(alpha5) Rz(6)
+  const double s4 = std::sin(link(3).alpha);
+  const double s5 = std::sin(link(4).alpha);
+  // The third column is (cos4 A, sin4 A, C), A = sin(alpha5) sin5, C = -sin(alpha4) sin(alpha5) cos5.
+  const double sine_5 = (negative_5 ? -1.0 : 1.0) * std::hypot(R(0, 2), R(1, 2));
+  const double A = s5 * sine_5;
+  theta[4] = std::atan2(sine_5, -R(2, 2) / (s4 * s5));
+  theta[3] = std::abs(A) < 1e-12 ? 0.0 : std::atan2(R(1, 2) / A, R(0, 2) / A);
+  const Matrix3 R_up_to_5 =
+      (Eigen::AngleAxisd(theta[3], Vector3::UnitZ()) * Eigen::AngleAxisd(link(3).alpha, Vector3::UnitX()) *
+       Eigen::AngleAxisd(theta[4], Vector3::UnitZ()) * Eigen::AngleAxisd(link(4).alpha, Vector3::UnitX()))
+          .toRotationMatrix();
+  const Matrix3 R_6 = R_up_to_5.transpose() * R;
+  theta[5] = std::atan2(R_6(1, 0), R_6(0, 0));
+  return theta;
+}
+
+/// The turn of `angle` (rad) nearest to `near` that the joint's limits allow; the nearest of all when none does.
+double nearest_turn(const Joint& joint, double angle, double near) {
+  const double nearest = angle + 2 * kPi * std::round((near - angle) / (2 * kPi));
+  for (const double turns : {0.0, 1.0, -1.0, 2.0, -2.0}) {
+    const double candidate = nearest + 2 * kPi * turns;
+    if (candidate >= joint.lower - 1e-9 && candidate <= joint.upper + 1e-9) return candidate;
+  }
+  return nearest;
+}
+
+}  // namespace
+
+Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, int conf,
+                                         const std::optional<JointVector>& near) {
+  if (!has_spherical_wrist(chain)) {
+    return refused("robot {}: no spherical wrist, so a branch (conf) does not say enough: give joints as a seed",
+                   chain.name());
+  }
+  if (conf < 0 || conf > 7) return refused("conf is {}, limits 0 and 7", conf);
+  const auto theta = branch(chain, X_BF, (conf & 4) != 0, (conf & 2) != 0, (conf & 1) != 0);
+  InverseResult result{InverseStatus::kUnreachable, near.value_or(JointVector::Zero(6)), 0};
+  if (!theta) return result;
+  Eigen::VectorXd value(6);
+  for (int i = 0; i < 6; ++i) value(i) = (*theta)[static_cast<std::size_t>(i)] - chain.joint(i).link.theta;
+  JointVector q = chain.transmission().inverse() * value;
+  for (int i = 0; i < 6; ++i) q(i) = nearest_turn(chain.joint(i), q(i), near ? (*near)(i) : 0.0);
+  return judged(chain, q, 0);
+}
+
+Result<int> branch_of(const Chain& chain, const JointVector& q) {
+  TRAMMEL_CHECK(q.size() == chain.size());
+  if (!has_spherical_wrist(chain)) return refused("robot {}: no spherical wrist, so no branches", chain.name());
+  const Pose X_BF = chain.flange_pose(q);
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int conf = 0; conf < 8; ++conf) {
+    const Result<InverseResult> candidate = inverse_kinematics(chain, X_BF, conf, q);
+    if (!candidate || candidate->status == InverseStatus::kUnreachable) continue;
+    const double distance = (candidate->q - q).norm();
+    if (distance < least) {
+      least = distance;
+      best = conf;
+    }
+  }
+  return best;
+}
+
+}  // namespace trammel

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/error_sources/physical_model.h"
+#include "server/measurement/measurement.h"
+
+/// A virtual robot and tracker: truth in, batches out.
+namespace trammel {
+
+/// A robot whose true numbers are known to its owner only.
+struct VirtualRobot {
+  PhysicalModel truth;
+  double sigma = 0;           ///< m, of one measured coordinate
+  double sigma_rotation = 0;  ///< rad, of one axis of the measured orientation
+};
+
+/// Reads a truth file for the robot of `cell`:
+/// ```yaml
+/// version: 1
+/// error_sources: {base: {x0_mm: 0.5, gamma0_rad: 1.7e-3}, compliance: {C2_rad_per_nmm: 2.8e-10}}
+/// noise: {sigma_mm: 0.013, sigma_deg: 0.0035}          # optional; the cell's tracker otherwise
+/// base: {xyz_mm: [...], q_wxyz: [...]}                 # where the cell says unknown
+/// tools: {probe: {xyz_mm: [...], q_wxyz: [...]}}       # likewise
+/// ```
+/// Refuses an unknown source, parameter or key.
+[[nodiscard]] Result<VirtualRobot> read_virtual_robot(const std::string& path, std::shared_ptr<const Cell> cell);
+
+struct SimulateOptions {
+  std::uint64_t seed = 1;
+  bool orientation = true;  ///< false: positions only, as a single reflector gives
+  bool noise = true;
+  std::string tool, payload;  ///< empty: the cell's only ones
+};
+
+/// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints, joints outside limits,
+/// an unknown tool or payload.
+[[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
+                                                const SimulateOptions& options);
+
+}  // namespace trammel

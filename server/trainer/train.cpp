@@ -1,0 +1,123 @@
+#include "server/trainer/train.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/hash.h"
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr const char* kProgramVersion = "0.1.0";
+constexpr double kDomainQuantile = 0.995;  // of the training poses, each left out, count as known
+constexpr int kLeastBiasPoses = 10;
+
+Error given_up() { return {ErrorCode::kBusy, "training given up on request"}; }
+
+/// The sources to identify: as asked, and the tool besides the geometry where nobody knows the tool.
+Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
+  Result<std::vector<std::string>> names =
+      options.level ? parse_level(*options.level) : Result<std::vector<std::string>>(cell.model.error_sources);
+  if (!names) return names;
+  const auto has = [&](const char* name) { return std::find(names->begin(), names->end(), name) != names->end(); };
+  const bool unknown_tool =
+      std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
+  if (unknown_tool && has("geometry") && !has("tool")) names->emplace_back("tool");
+  return names;
+}
+
+/// What the calibrated model leaves over, in B.
+BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch) {
+  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
+  BiasProblem problem{Eigen::MatrixXd(n, physics.cell->robot.size()), Eigen::MatrixXd(n, 3), Eigen::VectorXd(n)};
+  const Matrix3 R_BW = physics.X_WB.linear().transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    problem.q.row(i) = m.context.q.transpose();
+    problem.residual_B.row(i) = (R_BW * (m.p_W - physics.pose_W(m.context).translation())).transpose();
+    problem.sigma(i) = m.sigma.value_or(physics.cell->tracker.sigma);
+  }
+  return problem;
+}
+
+/// A pose counts as known when its posterior-to-prior share is what training poses have when each is left out.
+double domain_limit(const BiasModel& bias) {
+  Eigen::VectorXd share = bias.leave_one_out_prior_share();
+  std::sort(share.begin(), share.end());
+  const auto place = static_cast<Eigen::Index>(kDomainQuantile * static_cast<double>(share.size() - 1));
+  return share(place);
+}
+
+}  // namespace
+
+Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const MeasurementBatch& batch,
+                               const TrainOptions& options) {
+  const auto report = [&](const std::string& stage, double share) {
+    return !options.progress || options.progress(stage, share);
+  };
+  const Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
+  if (!checked) return tl::make_unexpected(checked.error());
+  const BatchSplit split = split_batch(*checked, options.validation_share, options.seed);
+  if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
+
+  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
+  if (!sources) return tl::make_unexpected(sources.error());
+  Result<PhysicalModel> nominal = make_physical_model(cell, *sources);
+  if (!nominal) return tl::make_unexpected(nominal.error());
+
+  if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
+  Result<CalibrationResult> calibration = calibrate({*nominal, split.train}, {});
+  if (!calibration) return tl::make_unexpected(calibration.error());
+
+  CompensatedModel::Parts parts;
+  const std::string kernel = options.bias.value_or(cell->model.bias);
+  if (kernel != "none" && split.train.measurements.size() < kLeastBiasPoses) {
+    return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
+                   split.train.measurements.size(), kLeastBiasPoses);
+  }
+  if (kernel != "none") {
+    if (!report("learning the bias", 0.3)) return tl::make_unexpected(given_up());
+    BiasOptions bias_options;
+    bias_options.kernel = kernel;
+    bias_options.seed = options.seed;
+    bias_options.progress = [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); };
+    const Result<BiasModel> bias = BiasModel::fit(leftover(calibration->model, split.train), bias_options);
+    if (!bias) return tl::make_unexpected(bias.error());
+    parts.bias = bias->state();
+    parts.prior_share_limit = domain_limit(*bias);
+  }
+
+  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  parts.physics = std::move(calibration->model);
+  parts.parameters = std::move(calibration->parameters);
+  parts.unidentifiable = std::move(calibration->unidentifiable);
+  parts.covariance = std::move(calibration->covariance);
+  parts.rank = calibration->rank;
+  parts.condition_number = calibration->condition_number;
+  parts.discrepancy = calibration->discrepancy;
+  parts.q_min = parts.q_max = split.train.measurements.front().context.q;
+  for (const Measurement& m : split.train.measurements) {
+    parts.q_min = parts.q_min.cwiseMin(m.context.q);
+    parts.q_max = parts.q_max.cwiseMax(m.context.q);
+  }
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();
+  }
+  parts.provenance.batch_id = batch.id;
+  parts.provenance.batch_hash = sha256_hex(batch.source_text.empty() ? to_csv(batch) : batch.source_text);
+  parts.provenance.training_poses = static_cast<int>(split.train.measurements.size());
+  parts.provenance.seed = options.seed;
+  parts.provenance.trained_at = options.trained_at;
+  parts.provenance.program_version = kProgramVersion;
+
+  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
+  if (!bare) return bare;
+  parts.training = bare->evaluate(split.train);
+  if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
+  if (!report("done", 1.0)) return tl::make_unexpected(given_up());
+  return CompensatedModel::make(std::move(parts));
+}
+
+}  // namespace trammel
