@@ -1,6 +1,7 @@
 #include "server/trainer/trainer.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -61,16 +62,16 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
     m.extra.clear();
     all.measurements.push_back(std::move(m));
   }
+  all.joint_types = next.joint_types;
   all.id += (all.id.empty() ? "" : "+") + next.id;
   all.source_text += next.source_text;
 }
 
-MeasurementBatch held_out_of(const MeasurementBatch& batch) {
-  MeasurementBatch held_out;
-  held_out.id = batch.id;
-  std::copy_if(batch.measurements.begin(), batch.measurements.end(), std::back_inserter(held_out.measurements),
-               [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
-  return held_out;
+/// Whether the model knows the tools and payloads of these poses (its cell file may be an older one).
+bool fits(const CompensatedModel& model, const MeasurementBatch& batch) {
+  return std::all_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+    return resolve_tool(model.cell(), m.context.tool) && resolve_payload(model.cell(), m.context.payload);
+  });
 }
 
 /// Whether a new model takes the place of the one in force, and why.
@@ -79,7 +80,7 @@ struct Verdict {
   std::string message;
 };
 
-/// Against the nominal model: the first one of a cell, or the first after its tools have changed.
+/// Against the nominal model: the first one of a cell, or the first with a tool that the one in force does not know.
 Verdict judge_alone(const Evaluation& candidate) {
   const bool better = candidate.compensated.rms < candidate.nominal.rms;
   return {better,
@@ -102,7 +103,7 @@ Verdict judge(const CompensatedModel& candidate, const ServedModel* present, con
   }
   const Evaluation evaluation = candidate.evaluate(held_out);
   if (!std::isfinite(evaluation.compensated.rms)) return {false, "not in force: its held-out rms is not finite"};
-  if (present == nullptr || !check_against_cell(held_out, present->model.cell())) return judge_alone(evaluation);
+  if (present == nullptr || !fits(present->model, held_out)) return judge_alone(evaluation);
   return judge_against(evaluation, present->model.evaluate(held_out), present->version, accept_ratio);
 }
 
@@ -149,29 +150,51 @@ void Trainer::set_listeners(ProgressListener progress, ModelListener model) {
   on_model_ = std::move(model);
 }
 
-Result<std::vector<std::string>> Trainer::start() {
-  TRAMMEL_CHECK(!worker_.joinable());
+Result<std::vector<std::string>> Trainer::take_up() {
+  TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
   std::vector<std::string> notices;
   for (const auto& [name, cell] : cells_) {
     if (auto published = publish_from_store(name); !published) notices.push_back(published.error().message);
   }
   auto unfinished = store_.unfinished_jobs();
   if (!unfinished) return tl::make_unexpected(unfinished.error());
+  std::vector<StoredJob> jobs;
+  for (StoredJob& job : *unfinished) {
+    const auto wanted = can_take_up(job, notices);
+    if (!wanted) return tl::make_unexpected(wanted.error());
+    job.state = JobState::kQueued;
+    if (*wanted) jobs.push_back(std::move(job));
+  }
   // Accepted is accepted: those of before may be more than the queue takes now.
   queue_ = std::make_unique<BoundedQueue<std::int64_t>>(
-      std::max(static_cast<std::size_t>(options_.queue_capacity), unfinished->size()));
-  for (StoredJob& job : *unfinished) {
-    if (!cells_.contains(job.cell)) {
-      notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
-    } else if (job.state == JobState::kRunning && job.attempts >= kMaxAttempts) {
-      const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
-      if (auto failed = store_.set_job_failed(job.id, why); !failed) return tl::make_unexpected(failed.error());
-      notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
-    } else {
-      job.state = JobState::kQueued;
-      enqueue(job);
-    }
+      std::max(static_cast<std::size_t>(options_.queue_capacity), jobs.size()));
+  for (const StoredJob& job : jobs) TRAMMEL_CHECK(queue_->try_push(std::int64_t{job.id}));
+  taken_up_ = std::move(jobs);
+  return notices;
+}
+
+Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>& notices) {
+  if (!cells_.contains(job.cell)) {
+    notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
+    return false;
   }
+  if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
+  const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
+  if (auto failed = store_.set_job_failed(job.id, why); !failed) return tl::make_unexpected(failed.error());
+  notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
+  return false;
+}
+
+Result<std::vector<std::string>> Trainer::start() {
+  TRAMMEL_CHECK(!worker_.joinable());
+  std::vector<std::string> notices;
+  if (!taken_up_) {
+    auto taken = take_up();
+    if (!taken) return taken;
+    notices = std::move(*taken);
+  }
+  for (const StoredJob& job : *taken_up_) report(progress_of(job));
+  taken_up_.reset();
   worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
   return notices;
 }
@@ -442,8 +465,8 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
   report(progress);
   {
     const std::lock_guard lock(activation_mutex_);
-    const Verdict verdict =
-        judge(model, registry_.in_force(progress.cell).get(), held_out_of(batch), options_.accept_ratio);
+    const MeasurementBatch held_out = split_batch(batch, options_.validation_share, options_.seed).validation;
+    const Verdict verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, options_.accept_ratio);
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());
     const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});

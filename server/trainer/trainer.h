@@ -39,8 +39,8 @@ struct JobProgress {
 };
 
 /// The queue of trainings and the one thread that works on it. Everything accepted is in the store before it is
-/// acknowledged; what a crash interrupts is taken up again at the next start, at most three times. Thread-safe, start()
-/// and stop() excepted.
+/// acknowledged; what a crash interrupts is taken up again at the next start, at most three times. Thread-safe,
+/// take_up(), start() and stop() excepted.
 ///
 /// Which rows are held out is drawn batch by batch: a row held out once is held out in every training of that batch, so
 /// that the model in force and its successor are compared on poses that neither was trained on.
@@ -59,9 +59,11 @@ class Trainer {
 
   /// Set before start().
   void set_listeners(ProgressListener progress, ModelListener model);
-  /// Publishes the models in force from the store, queues unfinished jobs, starts the worker. Returns what could not be
-  /// taken up, for the log: a model that does not load or was trained for another robot, a job of a cell not served
-  /// here, a job that was interrupted too often and is now failed.
+  /// Publishes the models in force from the store and queues unfinished jobs. Returns what could not be taken up, for
+  /// the log: a model that does not load or was trained for another robot, a job of a cell not served here, a job that
+  /// was interrupted too often and is now failed. Requests may come as soon as it returns.
+  [[nodiscard]] Result<std::vector<std::string>> take_up();
+  /// Reports the jobs taken up and starts the worker. Does take_up() itself where that has not been done.
   [[nodiscard]] Result<std::vector<std::string>> start();
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
@@ -93,6 +95,8 @@ class Trainer {
   [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const std::string& name) const;
   [[nodiscard]] Status check_room() const;
   void enqueue(const StoredJob& job);
+  /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
+  [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
 
   [[nodiscard]] Status publish_from_store(const std::string& cell);
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
@@ -112,6 +116,7 @@ class Trainer {
   ProgressListener on_progress_;
   ModelListener on_model_;
   std::unique_ptr<BoundedQueue<std::int64_t>> queue_;
+  std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
   std::mutex submit_mutex_;      // one at a time between the look at the queue's room and the push: who may push
   std::mutex activation_mutex_;  // one change of what is in force at a time
   mutable std::mutex progress_mutex_;

@@ -1,0 +1,151 @@
+#include "server/config/server_config.h"
+
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <limits>
+
+#include "server/base/text_file.h"
+#include "server/base/yaml_file.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
+constexpr std::size_t kMaxName = 64;     // likewise, bytes
+constexpr int kMaxDomain = 232;          // beyond it DDS' port numbers overflow
+
+int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
+  const int value = map.integer(key, otherwise);
+  if (value < lower || value > upper) map.refuse(key, fmt::format("{}, limit {} to {}", value, lower, upper));
+  return value;
+}
+
+double number_within(const YamlMap& map, const std::string& key, double otherwise, double lower, double upper) {
+  const double value = map.number(key, otherwise);
+  if (value < lower || value > upper) map.refuse(key, fmt::format("{}, limit {} to {}", value, lower, upper));
+  return value;
+}
+
+std::string server_id(const YamlMap& map, const std::string& key) {
+  const std::string id = map.text(key);
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  };
+  if (id.empty() || id.size() > kMaxName || !std::all_of(id.begin(), id.end(), allowed)) {
+    map.refuse(key, fmt::format("'{}', expected 1 to {} letters, digits, '.', '_', '-'", id, kMaxName));
+  }
+  return id;
+}
+
+/// IPv4; loopback unless the network is allowed.
+std::string address(const YamlMap& map, const std::string& otherwise) {
+  const std::string text = map.text("address", otherwise);
+  in_addr parsed{};
+  if (::inet_pton(AF_INET, text.c_str(), &parsed) != 1) {
+    map.refuse("address", fmt::format("'{}' is no IPv4 address", text));
+  }
+  const bool loopback = (ntohl(parsed.s_addr) >> 24) == 127;
+  if (!loopback && !map.boolean("allow_network", false)) {
+    map.refuse("address", text + " leaves this host; say allow_network: true if that is meant");
+  }
+  return text;
+}
+
+std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
+  std::vector<std::uint16_t> ports;
+  if (!map.has("peer_ports")) return ports;
+  for (const std::string& text : map.texts("peer_ports")) {
+    int port = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+    if (error != std::errc{} || end != text.data() + text.size() || port < 1024 || port > 65535) {
+      map.refuse("peer_ports", fmt::format("'{}', expected a whole number, limit 1024 to 65535", text));
+    }
+    if (port == own) map.refuse("peer_ports", fmt::format("{} is this server's own port", port));
+    ports.push_back(static_cast<std::uint16_t>(port));
+  }
+  return ports;
+}
+
+void read_dds(const YamlMap& map, DdsOptions& dds) {
+  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients"});
+  dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
+  dds.address = address(map, dds.address);
+  dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535));
+  dds.peer_ports = peer_ports(map, dds.port);
+  dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64);
+  dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000);
+}
+
+void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
+  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed"});
+  trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000);
+  trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000);
+  trainer.validation_share = number_within(map, "validation_share", trainer.validation_share, 0.05, 0.5);
+  trainer.accept_ratio = number_within(map, "accept_ratio", trainer.accept_ratio, 0.1, 10);
+  trainer.seed = static_cast<std::uint64_t>(
+      integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
+}
+
+void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
+  map.only({"level", "file"});
+  log.level = map.text("level", log.level);
+  const std::array known = {"debug", "info", "warn", "error"};
+  if (std::find(known.begin(), known.end(), log.level) == known.end()) {
+    map.refuse("level", fmt::format("'{}', expected {}", log.level, fmt::join(known, ", ")));
+  }
+  if (!map.is_null("file")) log.file = (folder / map.text("file")).string();
+}
+
+/// The server file alone, and the cell files it names.
+struct ServerFile {
+  ServerConfig config;
+  std::vector<std::string> cell_files;
+};
+
+ServerFile read_server_map(const YamlMap& map, const std::filesystem::path& folder) {
+  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
+  if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+  ServerFile file;
+  file.config.dds.server_id = server_id(map, "server");
+  for (const std::string& cell : map.texts("cells")) file.cell_files.push_back((folder / cell).string());
+  if (file.cell_files.empty() || file.cell_files.size() > kMaxCells) {
+    map.refuse("cells", fmt::format("{} cell files, limit 1 to {}", file.cell_files.size(), kMaxCells));
+  }
+  const std::string store = map.text("store");
+  if (store.empty()) map.refuse("store", "expected a path");
+  file.config.store = (folder / store).string();
+  if (map.has("dds")) read_dds(map.map("dds"), file.config.dds);
+  if (map.has("trainer")) read_trainer(map.map("trainer"), file.config.trainer);
+  if (map.has("log")) read_log(map.map("log"), file.config.log, folder);
+  return file;
+}
+
+}  // namespace
+
+Result<ServerConfig> read_server_config(const std::string& path) {
+  const auto text = read_text_file(path);
+  if (!text) return tl::make_unexpected(text.error());
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  auto file = read_yaml(*text, path, [&folder](const YamlMap& map) { return read_server_map(map, folder); });
+  if (!file) return tl::make_unexpected(file.error());
+  std::map<std::string, std::string> file_of;
+  for (const std::string& cell_file : file->cell_files) {
+    auto cell = read_cell(cell_file);
+    if (!cell) return tl::make_unexpected(cell.error());
+    const std::string name = cell->name;
+    if (name.size() > kMaxName)
+      return refused("{}: cell: name of {} bytes, limit {}", cell_file, name.size(), kMaxName);
+    if (const auto [other, is_new] = file_of.emplace(name, cell_file); !is_new) {
+      return refused("{}: cells: {} and {} are both called {}", path, other->second, cell_file, name);
+    }
+    file->config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
+  }
+  return std::move(file->config);
+}
+
+}  // namespace trammel

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/base/result.h"
+#include "server/dds/dds_options.h"
+#include "server/robot/cell.h"
+#include "server/trainer/trainer.h"
+
+namespace trammel {
+
+struct LogOptions {
+  std::string level = "info";  ///< `debug`, `info`, `warn` or `error`
+  std::string file;            ///< empty: standard error
+};
+
+/// All that a server is told at its start.
+struct ServerConfig {
+  std::map<std::string, std::shared_ptr<const Cell>> cells;  ///< by name
+  std::string store;                                         ///< path of the database
+  DdsOptions dds;
+  TrainerOptions trainer;
+  LogOptions log;
+};
+
+/// Reads a server file (`config/server.yaml` has every key) and the cell files that it names. Paths in it are relative
+/// to it. Refuses, with file, key and limit: an unknown, doubled or missing key, a wrong type, a value out of range,
+/// two cells of one name, an address that leaves this host without `allow_network`.
+[[nodiscard]] Result<ServerConfig> read_server_config(const std::string& path);
+
+}  // namespace trammel

@@ -1,0 +1,171 @@
+// trammeld: composition root. Loads, wires, runs, stops in reverse.
+#include <signal.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include "server/config/server_config.h"
+#include "server/dds/dds_service.h"
+#include "server/registry/model_registry.h"
+#include "server/store/store.h"
+#include "server/trainer/trainer.h"
+
+namespace trammel {
+namespace {
+
+constexpr int kExitUsage = 2;
+constexpr int kExitRefused = 3;
+constexpr int kExitUnreachable = 4;
+
+struct Arguments {
+  std::string config;
+  bool check = false;
+  std::optional<std::string> store;
+  std::optional<std::uint16_t> port;
+  std::optional<std::uint32_t> domain;
+};
+
+int exit_code(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kUsage:
+      return kExitUsage;
+    case ErrorCode::kBusy:
+    case ErrorCode::kUnreachable:
+      return kExitUnreachable;
+    default:
+      return kExitRefused;
+  }
+}
+
+int refuse(const Error& error) {
+  fmt::print(stderr, "trammeld: {}\n", error.message);
+  return exit_code(error);
+}
+
+Status start_log(const LogOptions& options) {
+  try {
+    spdlog::set_default_logger(options.file.empty() ? spdlog::stderr_color_mt("trammeld")
+                                                    : spdlog::basic_logger_mt("trammeld", options.file));
+  } catch (const spdlog::spdlog_ex& error) {
+    return refused("log: {}", error.what());
+  }
+  spdlog::set_level(spdlog::level::from_str(options.level));
+  spdlog::flush_on(spdlog::level::info);
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
+  return {};
+}
+
+void log_progress(const JobProgress& progress) {
+  switch (progress.stage) {
+    case JobStage::kQueued:
+      spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+      break;
+    case JobStage::kTraining:
+      spdlog::debug("{}: job {}: {}, {:.0f} %", progress.cell, progress.job, progress.what, 100 * progress.share);
+      break;
+    case JobStage::kStoring:
+      spdlog::debug("{}: job {} is being stored", progress.cell, progress.job);
+      break;
+    case JobStage::kDone:
+      spdlog::info("{}: job {} made version {}, {}", progress.cell, progress.job, progress.model_version,
+                   progress.what);
+      break;
+    case JobStage::kFailed:
+      spdlog::warn("{}: job {} failed: {}", progress.cell, progress.job, progress.what);
+      break;
+  }
+}
+
+/// The signals that end the service, blocked in every thread from here on; wait() takes the first that comes.
+class StopSignals {
+ public:
+  StopSignals() {
+    ::sigemptyset(&signals_);
+    ::sigaddset(&signals_, SIGTERM);
+    ::sigaddset(&signals_, SIGINT);
+    ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+  [[nodiscard]] const char* wait() const {
+    int number = 0;
+    while (::sigwait(&signals_, &number) != 0) continue;
+    return ::strsignal(number);
+  }
+
+ private:
+  sigset_t signals_;
+};
+
+/// Serves until a signal says otherwise.
+Status serve(const ServerConfig& config) {
+  const StopSignals signals;  // before any thread starts
+  auto store = Store::open(config.store);
+  if (!store) return tl::make_unexpected(store.error());
+  ModelRegistry registry;
+  Trainer trainer(config.cells, **store, registry, config.trainer);
+  DdsService service(config.dds, trainer, **store, registry);
+  trainer.set_listeners(
+      [&service](const JobProgress& progress) {
+        log_progress(progress);
+        service.publish_progress(progress);
+      },
+      [&service](const ServedModel& model, bool in_force) {
+        if (!in_force) return;
+        spdlog::info("{}: version {} ({}) is in force", model.cell, model.version, model.model.provenance().id);
+        service.publish_model(model.cell);
+      });
+
+  const auto notices = trainer.take_up();
+  if (!notices) return tl::make_unexpected(notices.error());
+  for (const std::string& notice : *notices) spdlog::warn("{}", notice);
+  if (const Status started = service.start(); !started) return started;
+  if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
+  spdlog::info("ready: {} serves {} cells on {}:{}, domain {}, store {}", config.dds.server_id, config.cells.size(),
+               config.dds.address, config.dds.port, config.dds.domain, config.store);
+
+  spdlog::info("stopping: {}", signals.wait());
+  service.stop();
+  trainer.stop();
+  spdlog::info("stopped");
+  return {};
+}
+
+int run(const Arguments& arguments) {
+  auto config = read_server_config(arguments.config);
+  if (!config) return refuse(config.error());
+  if (arguments.store) config->store = *arguments.store;
+  if (arguments.port) config->dds.port = *arguments.port;
+  if (arguments.domain) config->dds.domain = *arguments.domain;
+  if (arguments.check) {
+    fmt::print("{}: good, {} cells\n", arguments.config, config->cells.size());
+    return 0;
+  }
+  if (auto log = start_log(config->log); !log) return refuse(log.error());
+  const Status served = serve(*config);
+  if (served) return 0;
+  if (!config->log.file.empty()) spdlog::error("{}", served.error().message);
+  return refuse(served.error());
+}
+
+}  // namespace
+}  // namespace trammel
+
+int main(int argc, char** argv) {
+  CLI::App app("Serves compensated robot models over DDS.", "trammeld");
+  trammel::Arguments arguments;
+  app.add_option("--config", arguments.config, "server file, see config/server.yaml")->required();
+  app.add_flag("--check", arguments.check, "only read the server file and its cells");
+  app.add_option("--store", arguments.store, "database instead of the server file's");
+  app.add_option("--port", arguments.port, "UDP port instead of the server file's")->check(CLI::Range(1024, 65535));
+  app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : trammel::kExitUsage;
+  }
+  return trammel::run(arguments);
+}

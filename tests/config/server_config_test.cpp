@@ -1,0 +1,155 @@
+#include "server/config/server_config.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+const std::string kShipped = TRAMMEL_SOURCE_DIR "/config/server.yaml";
+
+class ServerConfigTest : public testing::Test {
+ protected:
+  ServerConfigTest() {
+    folder_.write("robot.yaml", test::small_robot_yaml());
+    folder_.write("cell-7.yaml", test::small_cell_yaml("cell-7"));
+    folder_.write("cell-8.yaml", test::small_cell_yaml("cell-8"));
+  }
+  /// What is said of the minimal file with `more` at its end.
+  std::string message_for(const std::string& more) const { return message_of(kMinimal + more); }
+  std::string message_of(const std::string& text) const {
+    const auto config = read_server_config(folder_.write("server.yaml", text));
+    return config ? "accepted" : config.error().message;
+  }
+  ServerConfig read(const std::string& more) const {
+    auto config = read_server_config(folder_.write("server.yaml", kMinimal + more));
+    EXPECT_TRUE(config) << config.error().message;
+    return config.value_or(ServerConfig{});
+  }
+  static void expect_says(const std::string& message, const std::vector<std::string>& parts) {
+    for (const std::string& part : parts) EXPECT_NE(message.find(part), std::string::npos) << part << " in " << message;
+  }
+
+  static inline const std::string kMinimal = "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n";
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(ServerConfigTest, WhatShipsLoads) {
+  const auto config = read_server_config(kShipped);
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_TRUE(config->cells.contains("cell-7"));
+}
+
+TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
+  const auto shipped = read_server_config(kShipped);
+  ASSERT_TRUE(shipped) << shipped.error().message;
+  const ServerConfig minimal = read("");
+  EXPECT_EQ(shipped->dds.domain, minimal.dds.domain);
+  EXPECT_EQ(shipped->dds.address, minimal.dds.address);
+  EXPECT_EQ(shipped->dds.port, minimal.dds.port);
+  EXPECT_EQ(shipped->dds.peer_ports, minimal.dds.peer_ports);
+  EXPECT_EQ(shipped->dds.compute_workers, minimal.dds.compute_workers);
+  EXPECT_EQ(shipped->dds.max_clients, minimal.dds.max_clients);
+  EXPECT_EQ(shipped->trainer.queue_capacity, minimal.trainer.queue_capacity);
+  EXPECT_EQ(shipped->trainer.max_poses, minimal.trainer.max_poses);
+  EXPECT_EQ(shipped->trainer.validation_share, minimal.trainer.validation_share);
+  EXPECT_EQ(shipped->trainer.accept_ratio, minimal.trainer.accept_ratio);
+  EXPECT_EQ(shipped->trainer.seed, minimal.trainer.seed);
+  EXPECT_EQ(shipped->log.level, minimal.log.level);
+  EXPECT_EQ(shipped->log.file, minimal.log.file);
+}
+
+TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
+  const std::string shipped = test::read_file(kShipped);
+  for (const std::string section : {"", "dds: ", "trainer: ", "log: "}) {
+    const std::string message = message_for(section.empty() ? "bogus: 1\n" : section + "{bogus: 1}\n");
+    const auto list = message.find("known here: ");
+    ASSERT_NE(list, std::string::npos) << message;
+    std::istringstream keys(message.substr(list + 12));
+    for (std::string key; keys >> key;) {
+      const auto at = shipped.find((section.empty() ? "\n" : "\n  ") + key + ":");
+      ASSERT_NE(at, std::string::npos) << key << " is not in " << kShipped;
+      if (key == "version" || key == "dds" || key == "trainer" || key == "log") continue;
+      EXPECT_NE(shipped.substr(at + 1, shipped.find('\n', at + 1) - at).find('#'), std::string::npos) << key;
+    }
+  }
+}
+
+TEST_F(ServerConfigTest, ReadsEveryKey) {
+  const ServerConfig config = read(
+      "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
+      "max_clients: 7}\n"
+      "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9}\n"
+      "log: {level: debug, file: trammel.log}\n");
+  EXPECT_EQ(config.dds.server_id, "a");
+  EXPECT_EQ(config.store, folder_.file("t.db")) << "relative to the file";
+  EXPECT_EQ(config.dds.domain, 3u);
+  EXPECT_EQ(config.dds.address, "127.0.0.2");
+  EXPECT_EQ(config.dds.port, 18000);
+  EXPECT_EQ(config.dds.peer_ports, (std::vector<std::uint16_t>{18002, 18004}));
+  EXPECT_EQ(config.dds.compute_workers, 4);
+  EXPECT_EQ(config.dds.max_clients, 7);
+  EXPECT_EQ(config.trainer.queue_capacity, 2);
+  EXPECT_EQ(config.trainer.max_poses, 300);
+  EXPECT_EQ(config.trainer.validation_share, 0.3);
+  EXPECT_EQ(config.trainer.accept_ratio, 1.5);
+  EXPECT_EQ(config.trainer.seed, 9u);
+  EXPECT_EQ(config.log.level, "debug");
+  EXPECT_EQ(config.log.file, folder_.file("trammel.log"));
+}
+
+TEST_F(ServerConfigTest, RefusesUnknownDoubledAndMissingKeys) {
+  expect_says(message_for("dds: {prot: 17500}\n"), {"server.yaml", "dds", "prot", "unknown key"});
+  expect_says(message_for("trainer: {}\ntrainer: {}\n"), {"server.yaml", "trainer", "twice"});
+  expect_says(message_of("version: 1\nserver: a\nstore: t.db\n"), {"server.yaml", "cells", "missing"});
+  expect_says(message_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), {"version", "expected 1"});
+}
+
+TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
+  expect_says(message_for("dds: {port: 80}\n"), {"dds", "port", "80", "1024 to 65535"});
+  expect_says(message_for("dds: {domain: 233}\n"), {"domain", "0 to 232"});
+  expect_says(message_for("dds: {peer_ports: [17500]}\n"), {"peer_ports", "own port"});
+  expect_says(message_for("dds: {peer_ports: [1e4]}\n"), {"peer_ports", "1024 to 65535"});
+  expect_says(message_for("dds: {compute_workers: 0}\n"), {"compute_workers", "1 to 64"});
+  expect_says(message_for("trainer: {validation_share: 0}\n"), {"validation_share", "0.05 to 0.5"});
+  expect_says(message_for("trainer: {accept_ratio: -1}\n"), {"accept_ratio", "0.1 to 10"});
+  expect_says(message_for("trainer: {seed: -1}\n"), {"seed", "0 to"});
+  expect_says(message_for("log: {level: loud}\n"), {"log", "level", "loud", "debug"});
+}
+
+TEST_F(ServerConfigTest, RefusesWrongTypes) {
+  expect_says(message_for("trainer: {queue_capacity: many}\n"), {"queue_capacity", "whole number"});
+  expect_says(message_for("trainer: {validation_share: .nan}\n"), {"validation_share", "finite"});
+  expect_says(message_for("dds: 17500\n"), {"dds", "keys and values"});
+  expect_says(message_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), {"allow_network", "true or false"});
+  expect_says(message_of("- a\n- b\n"), {"server.yaml", "keys and values"});
+  expect_says(message_of("version: [1\n"), {"server.yaml", "not YAML"});
+}
+
+TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
+  expect_says(message_for("dds: {address: 192.168.1.5}\n"), {"address", "192.168.1.5", "allow_network"});
+  expect_says(message_for("dds: {address: 0.0.0.0}\n"), {"address", "allow_network"});
+  expect_says(message_for("dds: {address: localhost}\n"), {"address", "IPv4"});
+  EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true}\n").dds.address, "192.168.1.5");
+}
+
+TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {
+  for (const std::string& name : {std::string("\"\""), std::string("a b"), std::string(65, 'x')}) {
+    expect_says(message_of("version: 1\nserver: " + name + "\ncells: [cell-7.yaml]\nstore: t.db\n"), {"server", "64"});
+  }
+}
+
+TEST_F(ServerConfigTest, RefusesTwoCellsOfOneNameAndACellThatCannotBeRead) {
+  const std::string start = "version: 1\nserver: a\nstore: t.db\n";
+  folder_.write("copy.yaml", test::small_cell_yaml("cell-7"));
+  expect_says(message_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), {"cell-7.yaml", "copy.yaml", "both"});
+  expect_says(message_of(start + "cells: [nowhere.yaml]\n"), {"nowhere.yaml"});
+  expect_says(message_of(start + "cells: []\n"), {"cells", "1 to 1024"});
+}
+
+TEST_F(ServerConfigTest, RefusesAFileThatIsNotThere) { EXPECT_FALSE(read_server_config(folder_.file("nowhere.yaml"))); }
+
+}  // namespace
+}  // namespace trammel

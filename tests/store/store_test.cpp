@@ -1,0 +1,344 @@
+#include "server/store/store.h"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "server/base/hash.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+class StoreTest : public testing::Test {
+ protected:
+  void SetUp() override { open(); }
+  void open() {
+    auto opened = Store::open(path_);
+    ASSERT_TRUE(opened) << opened.error().message;
+    store_ = std::move(*opened);
+  }
+  void reopen() {
+    store_.reset();
+    open();
+  }
+
+  static StoredBatch batch(const std::string& id, const std::string& csv = "q1_deg\n1\n",
+                           const std::string& request = "client:1") {
+    return {"cell-7", id, csv, sha256_hex(csv), request, 1700000000, 12};
+  }
+  static StoredJob job() {
+    StoredJob job;
+    job.cell = "cell-7";
+    job.created_at = 1700000001;
+    return job;
+  }
+  int add_model(int training_poses, bool put_in_force = false, std::int64_t job_id = 0) {
+    const auto version =
+        store_->add_model("cell-7", test::nominal_model(cell_, training_poses), job_id, put_in_force, "made");
+    return version.value();
+  }
+  int in_force() { return store_->version_in_force("cell-7")->value_or(0); }
+
+  test::TemporaryFolder folder_;
+  const std::string path_ = folder_.file("trammel.db");
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
+  std::unique_ptr<Store> store_;
+};
+
+TEST_F(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
+  const auto accepted = store_->add_batch(batch("lt-07"), job());
+  ASSERT_TRUE(accepted) << accepted.error().message;
+  EXPECT_EQ(accepted->batch_ids, std::vector<std::string>{"lt-07"});
+  EXPECT_EQ(accepted->state, JobState::kQueued);
+  reopen();
+  const auto kept = store_->batch("cell-7", "lt-07");
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ(kept->csv, batch("lt-07").csv);
+  EXPECT_EQ(kept->request_id, "client:1");
+  EXPECT_EQ(kept->accepted_at, 1700000000);
+  EXPECT_EQ(kept->poses, 12);
+  const auto unfinished = store_->unfinished_jobs();
+  ASSERT_EQ(unfinished->size(), 1u);
+  EXPECT_EQ(unfinished->front().id, accepted->id);
+  EXPECT_EQ(unfinished->front().created_at, 1700000001);
+}
+
+TEST_F(StoreTest, KeepsEveryByteOfABatch) {
+  const std::string bytes("# \xC3\xA4 \xFF\0 end\r\n", 13);
+  ASSERT_TRUE(store_->add_batch(batch("odd", bytes), job()));
+  reopen();
+  EXPECT_EQ(store_->batch("cell-7", "odd")->csv, bytes);
+}
+
+TEST_F(StoreTest, TheSameRequestAgainReturnsTheJobItMadeThen) {
+  const auto first = store_->add_batch(batch("lt-07"), job());
+  ASSERT_TRUE(store_->add_batch(batch("lt-08", "x", "client:2"), job()));
+  const auto again = store_->add_batch(batch("lt-07"), job());
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->id, first->id);
+  EXPECT_EQ(store_->batches("cell-7")->size(), 2u);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 2u);
+}
+
+TEST_F(StoreTest, RefusesAnIdThatTheCellAlreadyHas) {
+  ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
+  const auto other_content = store_->add_batch(batch("lt-07", "other"), job());
+  ASSERT_FALSE(other_content);
+  EXPECT_EQ(other_content.error().code, ErrorCode::kConflict);
+  const auto other_request = store_->add_batch(batch("lt-07", "q1_deg\n1\n", "client:2"), job());
+  ASSERT_FALSE(other_request);
+  EXPECT_EQ(other_request.error().code, ErrorCode::kConflict);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u) << "a refused batch must leave no job behind";
+  EXPECT_EQ(store_->batch("cell-7", "lt-07")->csv, batch("lt-07").csv);
+}
+
+TEST_F(StoreTest, IdsAreUniqueWithinACellOnly) {
+  ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
+  StoredBatch elsewhere = batch("lt-07", "elsewhere");
+  StoredJob its_job = job();
+  elsewhere.cell = its_job.cell = "cell-8";
+  EXPECT_TRUE(store_->add_batch(elsewhere, its_job));
+}
+
+TEST_F(StoreTest, ListsBatchesOldestFirstWithoutTheirText) {
+  ASSERT_TRUE(store_->add_batch(batch("z", "1", "a"), job()));
+  ASSERT_TRUE(store_->add_batch(batch("a", "2", "b"), job()));
+  const auto batches = store_->batches("cell-7");
+  ASSERT_EQ(batches->size(), 2u);
+  EXPECT_EQ(batches->front().id, "z");
+  EXPECT_EQ(batches->back().id, "a");
+  EXPECT_TRUE(batches->back().csv.empty());
+  EXPECT_EQ(batches->back().hash, sha256_hex("2"));
+}
+
+TEST_F(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
+  ASSERT_TRUE(store_->add_batch(batch("a", "1", "r1"), job()));
+  ASSERT_TRUE(store_->add_batch(batch("b", "2", "r2"), job()));
+  StoredJob both = job();
+  both.batch_ids = {"b", "a"};
+  both.level = "M2";
+  both.bias = "matern52";
+  const auto queued = store_->add_job(both);
+  ASSERT_TRUE(queued) << queued.error().message;
+  const auto read = store_->job(queued->id);
+  EXPECT_EQ(read->batch_ids, both.batch_ids);
+  EXPECT_EQ(read->level, "M2");
+  EXPECT_EQ(read->bias, "matern52");
+}
+
+TEST_F(StoreTest, RefusesAJobOverAnUnknownBatch) {
+  StoredJob lost = job();
+  lost.batch_ids = {"never-seen"};
+  const auto refused_job = store_->add_job(lost);
+  ASSERT_FALSE(refused_job);
+  EXPECT_EQ(refused_job.error().code, ErrorCode::kNotFound);
+  EXPECT_TRUE(store_->unfinished_jobs()->empty());
+}
+
+TEST_F(StoreTest, CountsAttemptsThatWereNotPutBack) {
+  const auto id = store_->add_batch(batch("a"), job())->id;
+  ASSERT_TRUE(store_->set_job_running(id));
+  ASSERT_TRUE(store_->set_job_running(id));
+  EXPECT_EQ(store_->job(id)->attempts, 2);
+  ASSERT_TRUE(store_->set_job_queued(id));
+  EXPECT_EQ(store_->job(id)->attempts, 1);
+  EXPECT_EQ(store_->job(id)->state, JobState::kQueued);
+}
+
+TEST_F(StoreTest, AFinishedJobStaysFinished) {
+  const auto id = store_->add_batch(batch("a"), job())->id;
+  ASSERT_TRUE(store_->set_job_failed(id, "too few rows"));
+  EXPECT_EQ(store_->job(id)->message, "too few rows");
+  EXPECT_TRUE(store_->unfinished_jobs()->empty());
+  EXPECT_EQ(store_->set_job_running(id).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->set_job_queued(id).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->set_job_failed(id, "again").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->set_job_running(id + 1).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(StoreTest, StoresModelsAsVersionsOfTheirCell) {
+  const auto id = store_->add_batch(batch("a"), job())->id;
+  EXPECT_EQ(add_model(10), 1);
+  EXPECT_EQ(add_model(20, true, id), 2);
+  reopen();
+  const auto models = store_->models("cell-7");
+  ASSERT_EQ(models->size(), 2u);
+  EXPECT_FALSE(models->front().in_force);
+  EXPECT_TRUE(models->back().in_force);
+  EXPECT_EQ(models->back().training_poses, 20);
+  EXPECT_EQ(models->back().hash, test::nominal_model(cell_, 20).provenance().hash);
+  EXPECT_EQ(in_force(), 2);
+  const auto done = store_->job(id);
+  EXPECT_EQ(done->state, JobState::kDone);
+  EXPECT_EQ(done->model_version, 2);
+  EXPECT_EQ(done->message, "made");
+  const auto model = store_->model("cell-7", 2);
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_EQ(serialize(*model), serialize(test::nominal_model(cell_, 20)));
+}
+
+TEST_F(StoreTest, AModelOfAFinishedJobIsNotStored) {
+  const auto id = store_->add_batch(batch("a"), job())->id;
+  ASSERT_TRUE(store_->set_job_failed(id, "interrupted"));
+  const auto stored = store_->add_model("cell-7", test::nominal_model(cell_, 1), id, true, "made");
+  ASSERT_FALSE(stored);
+  EXPECT_TRUE(store_->models("cell-7")->empty()) << "one transaction: all of it or nothing";
+  EXPECT_EQ(in_force(), 0);
+}
+
+TEST_F(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
+  for (int version = 1; version <= 3; ++version) add_model(version, true);
+  EXPECT_EQ(store_->previous_in_force("cell-7").value(), 2);
+  EXPECT_EQ(store_->rollback("cell-7").value(), 2);
+  reopen();
+  EXPECT_EQ(in_force(), 2);
+  EXPECT_EQ(store_->rollback("cell-7").value(), 1);
+  EXPECT_EQ(in_force(), 1);
+  const auto no_further = store_->rollback("cell-7");
+  ASSERT_FALSE(no_further);
+  EXPECT_EQ(no_further.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(in_force(), 1);
+}
+
+TEST_F(StoreTest, AnActivationAfterARollbackRemembersWhatItReplaced) {
+  for (int version = 1; version <= 3; ++version) add_model(version, true);
+  ASSERT_EQ(store_->rollback("cell-7").value(), 2);
+  ASSERT_TRUE(store_->activate("cell-7", 3));
+  EXPECT_EQ(store_->rollback("cell-7").value(), 2);
+  EXPECT_EQ(store_->rollback("cell-7").value(), 1);
+}
+
+TEST_F(StoreTest, ActivatingWhatIsInForceChangesNothing) {
+  add_model(1, true);
+  add_model(2, true);
+  ASSERT_TRUE(store_->activate("cell-7", 2));
+  EXPECT_EQ(store_->rollback("cell-7").value(), 1);
+}
+
+TEST_F(StoreTest, RefusesToActivateAnUnknownVersion) {
+  add_model(1, true);
+  EXPECT_EQ(store_->activate("cell-7", 2).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->activate("cell-8", 1).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(store_->model("cell-7", 2).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->rollback("cell-8").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(StoreTest, WorksForSeveralThreadsAtOnce) {
+  {
+    std::vector<std::jthread> threads;
+    for (int t = 0; t < 4; ++t) {
+      threads.emplace_back([this, t] {
+        for (int i = 0; i < 10; ++i) {
+          const std::string id = fmt::format("{}-{}", t, i);
+          EXPECT_TRUE(store_->add_batch(batch(id, id, id), job()));
+          EXPECT_TRUE(store_->batch("cell-7", id));
+        }
+      });
+    }
+  }
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 40u);
+}
+
+TEST_F(StoreTest, RefusesASecondWriterAndNamesTheFirst) {
+  const auto second = Store::open(path_);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kConflict);
+  EXPECT_NE(second.error().message.find(std::to_string(::getpid())), std::string::npos) << second.error().message;
+}
+
+TEST_F(StoreTest, RefusesASecondWriterThatComesByALink) {
+  const std::string link = folder_.file("link.db");
+  std::filesystem::create_symlink(path_, link);
+  const auto second = Store::open(link);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kConflict);
+}
+
+TEST_F(StoreTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
+  const std::string other = folder_.file("other.db");
+  { SQLite::Database(other, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec("CREATE TABLE t (a)"); }
+  const std::string before = test::read_file(other);
+  const auto opened = Store::open(other);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(test::read_file(other), before);
+}
+
+TEST_F(StoreTest, RefusesANewerSchema) {
+  store_.reset();
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 2"); }
+  const auto opened = Store::open(path_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kRefused);
+  EXPECT_NE(opened.error().message.find("schema 2"), std::string::npos) << opened.error().message;
+}
+
+TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
+  const std::string text = folder_.write("notes.db", std::string(5000, 'x'));
+  const auto opened = Store::open(text);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
+  EXPECT_NE(opened.error().message.find(text), std::string::npos) << opened.error().message;
+}
+
+TEST_F(StoreTest, AFolderThatDoesNotExistIsAnError) {
+  const auto opened = Store::open(folder_.file("nowhere/trammel.db"));
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
+}
+
+TEST_F(StoreTest, ADamagedFileIsAnErrorThatNamesIt) {
+  for (int i = 0; i < 20; ++i) {
+    const std::string id = std::to_string(i);
+    ASSERT_TRUE(store_->add_batch(batch(id, std::string(3000, 'x'), id), job()));
+  }
+  store_.reset();
+  const auto size = static_cast<std::streamoff>(std::filesystem::file_size(path_));
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    for (std::streamoff page = 4096; page < size; page += 4096) {
+      file.seekp(page);
+      file << std::string(512, '\x5A');
+    }
+  }
+  const auto opened = Store::open(path_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
+  EXPECT_NE(opened.error().message.find(path_), std::string::npos) << opened.error().message;
+}
+
+TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
+  ASSERT_TRUE(store_->add_batch(batch("a"), job()));
+  store_.reset();
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE batches SET csv = 'q1_deg' || char(10) || '2'"); }
+  open();
+  const auto changed = store_->batch("cell-7", "a");
+  ASSERT_FALSE(changed);
+  EXPECT_EQ(changed.error().code, ErrorCode::kInternal);
+}
+
+TEST_F(StoreTest, AModelWhoseContentWasChangedIsNotHandedOut) {
+  add_model(10, true);
+  store_.reset();
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = replace(content, '10', '11')"); }
+  open();
+  EXPECT_FALSE(store_->model("cell-7", 1));
+}
+
+TEST_F(StoreTest, LetsAnotherProcessReadWhileItIsOpen) {
+  ASSERT_TRUE(store_->add_batch(batch("a"), job()));
+  EXPECT_TRUE(std::filesystem::exists(path_ + "-wal"));
+  SQLite::Database reader(path_, SQLite::OPEN_READONLY);
+  EXPECT_EQ(reader.execAndGet("PRAGMA journal_mode").getString(), "wal");
+  EXPECT_EQ(reader.execAndGet("SELECT COUNT(*) FROM batches").getInt(), 1) << "another process may read";
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,442 @@
+#include "server/trainer/trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <new>
+#include <thread>
+
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::chrono::seconds kLimit{60};
+
+/// What the listeners heard, for waiting.
+class Watch {
+ public:
+  void heard(const JobProgress& progress) {
+    {
+      const std::lock_guard lock(mutex_);
+      reports_.push_back(progress);
+    }
+    changed_.notify_all();
+  }
+  /// The first report that `wanted` accepts; fails the test when none comes.
+  template <typename Wanted>
+  JobProgress wait_for(const Wanted& wanted) {
+    std::unique_lock lock(mutex_);
+    const auto found = [&] { return std::find_if(reports_.begin(), reports_.end(), wanted); };
+    if (!changed_.wait_for(lock, kLimit, [&] { return found() != reports_.end(); })) {
+      ADD_FAILURE() << "the awaited report did not come";
+      return {};
+    }
+    return *found();
+  }
+  JobProgress wait_until_finished(std::int64_t job) {
+    return wait_for([job](const JobProgress& p) {
+      return p.job == job && (p.stage == JobStage::kDone || p.stage == JobStage::kFailed);
+    });
+  }
+  std::vector<JobStage> stages(std::int64_t job) {
+    const std::lock_guard lock(mutex_);
+    std::vector<JobStage> stages;
+    for (const JobProgress& p : reports_) {
+      if (p.job == job && (stages.empty() || stages.back() != p.stage)) stages.push_back(p.stage);
+    }
+    return stages;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<JobProgress> reports_;  // guarded by mutex_
+};
+
+class TrainerTest : public testing::Test {
+ protected:
+  TrainerTest() { open(); }
+
+  void open() {
+    auto opened = Store::open(folder_.file("trammel.db"));
+    if (!opened) throw std::runtime_error(opened.error().message);
+    store_ = std::move(*opened);
+    registry_ = std::make_unique<ModelRegistry>();
+    make_trainer();
+  }
+  void make_trainer(Trainer::ProgressListener first = nullptr) {
+    trainer_ = std::make_unique<Trainer>(cells_, *store_, *registry_, options_);
+    trainer_->set_listeners(
+        [this, first](const JobProgress& progress) {
+          watch_.heard(progress);
+          if (first) first(progress);
+        },
+        [this](const ServedModel& model, bool in_force) {
+          const std::lock_guard lock(models_mutex_);
+          models_.emplace_back(model.version, in_force);
+        });
+  }
+  void restart() {
+    trainer_.reset();
+    store_.reset();
+    open();
+  }
+  std::string csv(const test::SmallBatch& batch = {}) const {
+    return test::small_batch_csv(*cells_.at("cell-7"), batch);
+  }
+  std::int64_t submit(const std::string& id, const test::SmallBatch& batch = {}) {
+    const auto job = trainer_->submit("cell-7", id, csv(batch), "client:" + id);
+    EXPECT_TRUE(job) << job.error().message;
+    return job.value_or(0);
+  }
+  JobProgress train(const std::string& id, const test::SmallBatch& batch = {}) {
+    return watch_.wait_until_finished(submit(id, batch));
+  }
+  JobProgress retrain(const std::vector<std::string>& ids, const std::string& level = "",
+                      const std::string& bias = "") {
+    const auto job = trainer_->retrain("cell-7", ids, level, bias);
+    EXPECT_TRUE(job) << job.error().message;
+    return watch_.wait_until_finished(job.value_or(0));
+  }
+  void start() {
+    const auto started = trainer_->start();
+    ASSERT_TRUE(started) << started.error().message;
+    EXPECT_TRUE(started->empty()) << started->front();
+  }
+  int in_force() const {
+    const auto model = registry_->in_force("cell-7");
+    return model ? model->version : 0;
+  }
+  std::vector<std::pair<int, bool>> models_heard() {
+    const std::lock_guard lock(models_mutex_);
+    return models_;
+  }
+
+  test::TemporaryFolder folder_;
+  TrainerOptions options_;
+  std::map<std::string, std::shared_ptr<const Cell>> cells_ = {{"cell-7", test::small_cell("cell-7")}};
+  Watch watch_;
+  std::mutex models_mutex_;
+  std::vector<std::pair<int, bool>> models_;  // guarded by models_mutex_
+  std::unique_ptr<Store> store_;
+  std::unique_ptr<ModelRegistry> registry_;
+  std::unique_ptr<Trainer> trainer_;
+};
+
+TEST_F(TrainerTest, MakesAnAcceptedBatchTheModelInForce) {
+  start();
+  const JobProgress done = train("lt-07");
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_TRUE(done.in_force) << done.what;
+  EXPECT_EQ(done.model_version, 1);
+  EXPECT_EQ(watch_.stages(done.job),
+            (std::vector{JobStage::kQueued, JobStage::kTraining, JobStage::kStoring, JobStage::kDone}));
+  ASSERT_EQ(in_force(), 1);
+  EXPECT_EQ(registry_->in_force("cell-7")->model.provenance().batch_id, "lt-07");
+  EXPECT_EQ(models_heard(), (std::vector<std::pair<int, bool>>{{1, true}}));
+  const auto stored = store_->job(done.job);
+  EXPECT_EQ(stored->state, JobState::kDone);
+  EXPECT_EQ(stored->message, done.what);
+  const auto later = trainer_->progress(done.job);
+  EXPECT_EQ(later->stage, JobStage::kDone);
+  EXPECT_TRUE(later->in_force);
+}
+
+TEST_F(TrainerTest, StoresAWorseModelAndLeavesTheBetterOneInForce) {
+  start();
+  train("lt-07");
+  const JobProgress worse = retrain({"lt-07"}, "M0");
+  EXPECT_EQ(worse.stage, JobStage::kDone);
+  EXPECT_FALSE(worse.in_force);
+  EXPECT_EQ(worse.model_version, 2);
+  EXPECT_NE(worse.what.find("not in force"), std::string::npos) << worse.what;
+  EXPECT_NE(worse.what.find("version 1"), std::string::npos) << worse.what;
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(*store_->version_in_force("cell-7"), 1);
+  EXPECT_EQ(store_->models("cell-7")->size(), 2u);
+  EXPECT_FALSE(trainer_->progress(worse.job)->in_force);
+  EXPECT_EQ(models_heard().back(), std::pair(2, false));
+}
+
+TEST_F(TrainerTest, ANominalModelIsNotPutInForceAsTheFirstOfItsCell) {
+  Cell nominal = *cells_.at("cell-7");
+  nominal.model.error_sources.clear();
+  cells_["cell-7"] = std::make_shared<const Cell>(std::move(nominal));
+  make_trainer();
+  start();
+  const JobProgress done = train("lt-07");
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_FALSE(done.in_force) << done.what;
+  EXPECT_EQ(in_force(), 0);
+}
+
+TEST_F(TrainerTest, AModelThatNothingWasHeldOutForIsNotPutInForce) {
+  start();
+  test::SmallBatch all_train;
+  all_train.set = "train";
+  const JobProgress done = train("lt-07", all_train);
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_FALSE(done.in_force);
+  EXPECT_NE(done.what.find("held out"), std::string::npos) << done.what;
+  EXPECT_TRUE(trainer_->activate("cell-7", 1)) << "by hand it may be";
+  EXPECT_EQ(in_force(), 1);
+}
+
+TEST_F(TrainerTest, ARowHeldOutOnceIsHeldOutInEveryTrainingOfItsBatch) {
+  cells_["cell-7"] = test::small_cell("cell-7", "se");
+  make_trainer();
+  start();
+  test::SmallBatch second;
+  second.seed = 2;
+  ASSERT_EQ(train("a").stage, JobStage::kDone);
+  ASSERT_EQ(train("b", second).stage, JobStage::kDone);
+  const JobProgress both = retrain({"a", "b"});
+  ASSERT_EQ(both.stage, JobStage::kDone) << both.what;
+  const auto trained_on = [this](int version) { return store_->model("cell-7", version)->parts().bias->q; };
+  const Eigen::MatrixXd of_both = trained_on(3);
+  EXPECT_EQ(of_both.rows(), 64);
+  Eigen::MatrixXd one_after_the_other(64, 6);
+  one_after_the_other << trained_on(1), trained_on(2);
+  EXPECT_EQ(of_both, one_after_the_other);
+}
+
+TEST_F(TrainerTest, TheSameRequestAgainIsTheSameJobEvenWhenTheQueueIsFull) {
+  options_.queue_capacity = 1;
+  make_trainer();
+  const auto first = trainer_->submit("cell-7", "lt-07", csv(), "client:1");
+  const auto again = trainer_->submit("cell-7", "lt-07", csv(), "client:1");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(*again, *first);
+  EXPECT_EQ(trainer_->queued_jobs(), 1);
+  const auto other = trainer_->submit("cell-7", "lt-07", csv({.seed = 2}), "client:2");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::kConflict);
+}
+
+TEST_F(TrainerTest, AFullQueueRefusesAndStoresNothing) {
+  options_.queue_capacity = 1;
+  make_trainer();
+  submit("lt-07");
+  const auto second = trainer_->submit("cell-7", "lt-08", csv({.seed = 2}), "client:2");
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kBusy);
+  EXPECT_EQ(store_->batches("cell-7")->size(), 1u);
+  const auto again = trainer_->retrain("cell-7", {}, "", "");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::kBusy);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+}
+
+TEST_F(TrainerTest, RefusedInputStoresNothing) {
+  const std::string good = csv();
+  EXPECT_EQ(trainer_->submit("cell-9", "a", good, "r").error().code, ErrorCode::kNotFound);
+  EXPECT_FALSE(trainer_->submit("cell-7", "", good, "r"));
+  EXPECT_FALSE(trainer_->submit("cell-7", "two\nlines", good, "r"));
+  EXPECT_FALSE(trainer_->submit("cell-7", std::string(200, 'x'), good, "r"));
+  EXPECT_FALSE(trainer_->submit("cell-7", "a", "no,batch\n1,2\n", "r"));
+  std::string beyond = good;
+  beyond.replace(beyond.find('\n') + 1, beyond.find(',', beyond.find('\n')) - beyond.find('\n') - 1, "999.0");
+  EXPECT_FALSE(trainer_->submit("cell-7", "a", beyond, "r"));
+  EXPECT_TRUE(store_->batches("cell-7")->empty());
+  EXPECT_TRUE(store_->unfinished_jobs()->empty());
+}
+
+TEST_F(TrainerTest, RefusesMorePosesThanItsLimit) {
+  options_.max_poses = 50;
+  make_trainer();
+  const auto large = trainer_->submit("cell-7", "large", csv({.poses = 51}), "r");
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::kTooLarge);
+  submit("a");
+  submit("b", {.seed = 2});
+  EXPECT_EQ(trainer_->retrain("cell-7", {"a", "b"}, "", "").error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 2u);
+}
+
+TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
+  EXPECT_EQ(trainer_->retrain("cell-7", {}, "", "").error().code, ErrorCode::kNotFound);
+  submit("a");
+  EXPECT_EQ(trainer_->retrain("cell-7", {"b"}, "", "").error().code, ErrorCode::kNotFound);
+  EXPECT_FALSE(trainer_->retrain("cell-7", {"a", "a"}, "", ""));
+  EXPECT_FALSE(trainer_->retrain("cell-7", {"a"}, "M1,no_such_cause", ""));
+  EXPECT_EQ(trainer_->retrain("cell-9", {}, "", "").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+}
+
+TEST_F(TrainerTest, RetrainsFromTheNewestBatchWhenNoneIsNamed) {
+  submit("older");
+  submit("newer", {.seed = 2});
+  const auto job = trainer_->retrain("cell-7", {}, "", "");
+  ASSERT_TRUE(job);
+  EXPECT_EQ(store_->job(*job)->batch_ids, std::vector<std::string>{"newer"});
+}
+
+TEST_F(TrainerTest, AFailedTrainingSaysWhyAndTheNextOneGoesOn) {
+  start();
+  const JobProgress failed = train("tiny", {.poses = 1});
+  EXPECT_EQ(failed.stage, JobStage::kFailed);
+  EXPECT_FALSE(failed.what.empty());
+  EXPECT_EQ(store_->job(failed.job)->state, JobState::kFailed);
+  EXPECT_EQ(store_->job(failed.job)->message, failed.what);
+  EXPECT_EQ(trainer_->progress(failed.job)->stage, JobStage::kFailed);
+  EXPECT_EQ(train("lt-07").stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, OutOfMemoryEndsTheTrainingAndNotTheService) {
+  bool thrown = false;
+  make_trainer([&thrown](const JobProgress& progress) {
+    if (progress.stage != JobStage::kTraining || thrown) return;
+    thrown = true;
+    throw std::bad_alloc();
+  });
+  start();
+  const JobProgress failed = train("a");
+  EXPECT_EQ(failed.stage, JobStage::kFailed);
+  EXPECT_NE(failed.what.find("bad_alloc"), std::string::npos) << failed.what;
+  EXPECT_EQ(retrain({"a"}).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, StoppingGivesTheTrainingUpAndTheNextStartFinishesIt) {
+  cells_["cell-7"] = test::small_cell("cell-7", "se");
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool stopping = false;
+  make_trainer([&](const JobProgress& progress) {
+    if (progress.stage != JobStage::kTraining) return;
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, kLimit, [&] { return stopping; });
+  });
+  start();
+  const std::int64_t job = submit("lt-07", {.poses = 300});
+  watch_.wait_for([](const JobProgress& p) { return p.stage == JobStage::kTraining; });
+  {
+    const std::lock_guard lock(mutex);
+    stopping = true;
+  }
+  changed.notify_all();
+  trainer_->stop();
+  EXPECT_EQ(store_->job(job)->state, JobState::kQueued);
+  EXPECT_EQ(store_->job(job)->attempts, 0) << "a stop is no crash";
+  EXPECT_EQ(watch_.stages(job).back(), JobStage::kQueued);
+  restart();
+  start();
+  EXPECT_EQ(watch_.wait_until_finished(job).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, TakesUpWhatACrashInterrupted) {
+  const std::int64_t job = submit("lt-07");
+  ASSERT_TRUE(store_->set_job_running(job));
+  restart();
+  start();
+  EXPECT_EQ(watch_.wait_until_finished(job).stage, JobStage::kDone);
+  EXPECT_EQ(in_force(), 1);
+}
+
+TEST_F(TrainerTest, AJobThatTookTheProcessDownThreeTimesIsNotTriedAgain) {
+  const std::int64_t poison = submit("poison");
+  const std::int64_t good = submit("good", {.seed = 2});
+  for (int crash = 0; crash < 3; ++crash) ASSERT_TRUE(store_->set_job_running(poison));
+  restart();
+  const auto notices = trainer_->start();
+  ASSERT_TRUE(notices);
+  ASSERT_EQ(notices->size(), 1u);
+  EXPECT_NE(notices->front().find("3 times"), std::string::npos) << notices->front();
+  EXPECT_EQ(store_->job(poison)->state, JobState::kFailed);
+  EXPECT_TRUE(store_->batch("cell-7", "poison")) << "the batch itself is kept";
+  EXPECT_EQ(watch_.wait_until_finished(good).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, TakesUpMoreJobsThanTheQueueTakesNow) {
+  for (int i = 0; i < 4; ++i) submit(std::to_string(i), {.seed = static_cast<std::uint64_t>(i)});
+  options_.queue_capacity = 1;
+  restart();
+  start();
+  EXPECT_EQ(watch_.wait_until_finished(4).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, AJobOfACellThatIsNotServedHereWaits) {
+  const std::int64_t job = submit("lt-07");
+  cells_ = {{"cell-8", test::small_cell("cell-8")}};
+  restart();
+  const auto notices = trainer_->start();
+  ASSERT_TRUE(notices);
+  EXPECT_EQ(notices->size(), 1u);
+  EXPECT_EQ(store_->job(job)->state, JobState::kQueued);
+  EXPECT_EQ(trainer_->queued_jobs(), 0);
+}
+
+TEST_F(TrainerTest, ServesWhatWasInForceAfterARestart) {
+  start();
+  train("lt-07");
+  const std::string hash = registry_->in_force("cell-7")->model.provenance().hash;
+  restart();
+  EXPECT_EQ(in_force(), 0);
+  start();
+  ASSERT_EQ(in_force(), 1);
+  EXPECT_EQ(registry_->in_force("cell-7")->model.provenance().hash, hash);
+  EXPECT_EQ(models_heard().back(), std::pair(1, true));
+}
+
+TEST_F(TrainerTest, DoesNotServeAModelOfAnotherRobot) {
+  start();
+  train("lt-07");
+  Cell changed = *cells_.at("cell-7");
+  std::vector<Joint> joints;
+  for (int i = 0; i < changed.robot.size(); ++i) joints.push_back(changed.robot.joint(i));
+  joints[0].link.d += 0.1;
+  changed.robot = Chain::make("longer", joints).value();
+  cells_["cell-7"] = std::make_shared<const Cell>(std::move(changed));
+  restart();
+  const auto notices = trainer_->start();
+  ASSERT_TRUE(notices);
+  ASSERT_EQ(notices->size(), 1u);
+  EXPECT_EQ(in_force(), 0);
+  EXPECT_EQ(trainer_->activate("cell-7", 1).error().code, ErrorCode::kRefused);
+}
+
+TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
+  start();
+  train("a");
+  train("b", {.noise = 1e-6, .seed = 2});
+  if (in_force() != 2) {
+    ASSERT_TRUE(trainer_->activate("cell-7", 2));
+  }
+  const auto back = trainer_->rollback("cell-7");
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, 1);
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(trainer_->rollback("cell-7").error().code, ErrorCode::kNotFound);
+  ASSERT_TRUE(trainer_->activate("cell-7", 2));
+  EXPECT_EQ(in_force(), 2);
+  EXPECT_EQ(*store_->version_in_force("cell-7"), 2);
+  EXPECT_EQ(models_heard().back(), std::pair(2, true));
+  EXPECT_EQ(trainer_->activate("cell-7", 3).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(in_force(), 2);
+}
+
+TEST_F(TrainerTest, ImportsAModelIntoTheHistoryButNotIntoForce) {
+  start();
+  train("lt-07");
+  const std::string text = serialize(test::nominal_model(cells_.at("cell-7"), 7));
+  const auto version = trainer_->import_model("cell-7", text);
+  ASSERT_TRUE(version) << version.error().message;
+  EXPECT_EQ(*version, 2);
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(trainer_->import_model("cell-7", text).value(), 2) << "the same again is the same";
+  EXPECT_TRUE(trainer_->activate("cell-7", 2));
+}
+
+TEST_F(TrainerTest, RefusesToImportWhatIsNotOfTheCell) {
+  start();
+  EXPECT_FALSE(trainer_->import_model("cell-7", serialize(test::nominal_model(test::small_cell("cell-8"), 7))));
+  EXPECT_FALSE(trainer_->import_model("cell-7", "no model"));
+  EXPECT_TRUE(store_->models("cell-7")->empty());
+}
+
+TEST_F(TrainerTest, AnUnknownJobIsNotFound) { EXPECT_EQ(trainer_->progress(77).error().code, ErrorCode::kNotFound); }
+
+}  // namespace
+}  // namespace trammel
