@@ -10,13 +10,14 @@
 
 #include "server/base/result.h"
 
-/// The DDS client that other programs link. Units as on the wire: mm, rad. No Fast DDS type appears here.
+/// The DDS client that other programs link. Units as on the wire: mm, rad; a prismatic joint in mm. No Fast DDS type
+/// appears here.
 namespace trammel::client {
 
 struct SessionOptions {
   std::uint32_t domain = 0;
   std::vector<std::uint16_t> server_ports = {17500};  ///< on 127.0.0.1, one a replica
-  std::chrono::milliseconds timeout{5000};            ///< of one call, discovery included
+  std::chrono::milliseconds timeout{5000};            ///< of one request, discovery included; long calls are several
 };
 
 /// What a call is about; must fit what the model was trained on.
@@ -25,7 +26,7 @@ struct CallContext {
   std::string tool;     ///< empty: the cell's only one
   std::string payload;  ///< empty: the cell's only one
   bool controller_compensates = false;
-  std::string model;    ///< empty: the model in force; else `@version` or a model id that must be the one in force
+  std::string model;  ///< empty: the model in force; else `@version` or a model id that must be the one in force
 };
 
 struct PoseMm {
@@ -52,8 +53,8 @@ struct PredictedError {
 };
 
 struct TargetMm {
-  PoseMm pose;                    ///< ignored for a joint target
-  std::vector<double> seed_rad;   ///< empty when `conf` says the branch
+  PoseMm pose;                   ///< ignored for a joint target
+  std::vector<double> seed_rad;  ///< empty when `conf` says the branch
   std::optional<int> conf;
   bool joint_target = false;
 };
@@ -89,16 +90,19 @@ struct ServerStatus {
   int queued_jobs = 0;
 };
 
-/// One participant, its own reply partition. Thread-safe; calls from several threads overlap. Errors: kUnreachable when no
-/// server answered in time, else what the server said, with its code.
+/// One participant, its own reply partition. Thread-safe; calls from several threads overlap. Errors: kUnreachable when
+/// no server answered in time, else what the server said, with its code. A request that is not answered is sent once
+/// more with the same id: elsewhere, or to the same server where a repeat could change something twice.
 class Session {
  public:
+  /// Does not wait for a server. One session a process is enough.
   [[nodiscard]] static Result<std::unique_ptr<Session>> open(const SessionOptions& options);
   ~Session();
 
-  /// Rows of joint vectors, rad.
+  /// Rows of joint vectors. Any number: long calls are sent in parts, and sent again when the model changed in between.
   [[nodiscard]] Result<Answer<PredictedError>> predict_error(const CallContext& context,
                                                              const std::vector<std::vector<double>>& joints_rad);
+  /// Any number, as predict_error().
   [[nodiscard]] Result<Answer<CorrectedTarget>> correct_targets(const CallContext& context,
                                                                 const std::vector<TargetMm>& targets);
   /// The CSV as it is on disk. Returns the job. A repeat after a lost answer is the same request to the server.
@@ -114,12 +118,12 @@ class Session {
   [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version);
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
 
-  /// Last state published, waiting up to the timeout for a server to appear.
+  /// Those that are there, by their last status, waiting up to the timeout for the first to appear.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers();
   /// Models in force, of every cell, from ModelStatus.
   [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
   /// Calls `listener` for the job's progress until it is done or failed (its last state is returned) or `limit` is over
-  /// (kUnreachable).
+  /// (kUnreachable). A server that restarts meanwhile is waited for. kNotFound: no server knows the job.
   [[nodiscard]] Result<JobStatus> wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
                                                const std::function<void(const JobStatus&)>& listener);
 

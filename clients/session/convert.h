@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "clients/session/session.h"
+#include "idl/valid.h"
+
+/// Between the session's types and the wire's.
+namespace trammel::client {
+
+[[nodiscard]] wire::Context to_wire(const CallContext& context);
+[[nodiscard]] wire::Target to_wire(const TargetMm& target);
+
+[[nodiscard]] ModelInfo from_wire(const wire::ModelInfo& info);
+[[nodiscard]] PredictedError from_wire(const wire::PredictedError& prediction);
+[[nodiscard]] CorrectedTarget from_wire(const wire::CorrectedTarget& correction);
+[[nodiscard]] JobStatus from_wire(const wire::Job& job);
+[[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
+/// Of a reply that is not RESULT_OK.
+[[nodiscard]] Error error_of(const wire::ReplyHeader& header);
+
+}  // namespace trammel::client

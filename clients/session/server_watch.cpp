@@ -1,0 +1,147 @@
+#include "clients/session/server_watch.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace trammel::client {
+namespace {
+
+constexpr std::size_t kJobsRemembered = 1000;
+
+}  // namespace
+
+Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticipant& participant,
+                                                       wire::dds::Subscriber& subscriber) {
+  std::unique_ptr<ServerWatch> watch(new ServerWatch);
+  ServerWatch* self = watch.get();
+  auto status = StateReader<wire::ServiceStatusTopic>::open(
+      participant, subscriber, wire::state_reader_qos(),
+      [self](const wire::ServiceStatus* sample, const std::string& writer) { self->on_status(sample, writer); });
+  if (!status) return tl::make_unexpected(status.error());
+  watch->status_reader_ = std::move(*status);
+  auto model = StateReader<wire::ModelStatusTopic>::open(
+      participant, subscriber, wire::state_reader_qos(),
+      [self](const wire::ModelStatus* sample, const std::string& writer) { self->on_model(sample, writer); });
+  if (!model) return tl::make_unexpected(model.error());
+  watch->model_reader_ = std::move(*model);
+  auto progress = StateReader<wire::TrainingProgressTopic>::open(
+      participant, subscriber, wire::progress_reader_qos(),
+      [self](const wire::TrainingProgress* sample, const std::string&) { self->on_progress(sample); });
+  if (!progress) return tl::make_unexpected(progress.error());
+  watch->progress_reader_ = std::move(*progress);
+  return watch;
+}
+
+std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
+                                                        Clock::time_point deadline,
+                                                        const std::function<bool(const KnownServer&)>& reachable) {
+  std::unique_lock lock(mutex_);
+  const KnownServer* chosen = nullptr;
+  changed_.wait_until(lock, deadline, [&] {
+    chosen = choose(cell, avoid, reachable);
+    return chosen != nullptr;
+  });
+  if (chosen == nullptr) return std::nullopt;
+  return *chosen;
+}
+
+const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid,
+                                       const std::function<bool(const KnownServer&)>& reachable) const {
+  const auto merit = [&](const KnownServer& server) {
+    const auto& cells = server.status.cells();
+    const bool serves = std::find(cells.begin(), cells.end(), cell) != cells.end();
+    return std::tuple(serves, Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid);
+  };
+  const KnownServer* best = nullptr;
+  for (const auto& [id, server] : servers_) {
+    if (server.status.state() != wire::SERVICE_SERVING || !reachable(server)) continue;
+    if (best == nullptr || merit(server) > merit(*best)) best = &server;
+  }
+  return best;
+}
+
+void ServerWatch::wake() {
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_all();
+}
+
+std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, deadline, [&] { return !servers_.empty(); });
+  changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
+                      [&] { return servers_.size() >= count; });
+  std::vector<KnownServer> servers;
+  for (const auto& [id, server] : servers_) servers.push_back(server);
+  return servers;
+}
+
+std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod, [&] {
+    return std::all_of(servers_.begin(), servers_.end(), [&](const auto& entry) {
+      const auto known = std::count_if(models_.begin(), models_.end(), [&](const auto& model) {
+        return model.first.first == entry.second.participant;
+      });
+      return known >= entry.second.status.models_in_force();
+    });
+  });
+  std::map<std::string, wire::ModelInfo> newest;
+  for (const auto& [key, model] : models_) {
+    const auto [entry, added] = newest.emplace(key.second, model);
+    if (!added && model.version() > entry->second.version()) entry->second = model;
+  }
+  std::vector<wire::ModelInfo> models;
+  for (const auto& [cell, model] : newest) models.push_back(model);
+  return models;
+}
+
+std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& server, std::int64_t job,
+                                                        std::uint64_t& seen, Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  std::optional<wire::Job> news;
+  changed_.wait_until(lock, deadline, [&] {
+    for (const auto& [from, progress] : jobs_[job]) {
+      if ((!server.empty() && from != server) || progress.first <= seen) continue;
+      seen = progress.first;
+      news = progress.second;
+    }
+    return news.has_value();
+  });
+  return news;
+}
+
+void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (status != nullptr) {
+      servers_[status->server().to_string()] = {participant, *status, Clock::now()};
+    } else {
+      std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
+    }
+  }
+  changed_.notify_all();
+}
+
+void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (status != nullptr) {
+      models_[{participant, status->cell().to_string()}] = status->model();
+    } else {
+      std::erase_if(models_, [&](const auto& entry) { return entry.first.first == participant; });
+    }
+  }
+  changed_.notify_all();
+}
+
+void ServerWatch::on_progress(const wire::TrainingProgress* progress) {
+  if (progress == nullptr) return;
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_[progress->number()][progress->server().to_string()] = {++progress_count_, progress->job()};
+    if (jobs_.size() > kJobsRemembered) jobs_.erase(jobs_.begin());
+  }
+  changed_.notify_all();
+}
+
+}  // namespace trammel::client

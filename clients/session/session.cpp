@@ -1,0 +1,298 @@
+#include "clients/session/session.h"
+
+#include <algorithm>
+#include <mutex>
+#include <random>
+#include <utility>
+
+#include "clients/session/caller.h"
+#include "clients/session/convert.h"
+#include "clients/session/server_watch.h"
+#include "idl/limits.h"
+
+namespace trammel::client {
+namespace {
+
+constexpr int kAttemptsAtOneModel = 5;
+constexpr std::chrono::milliseconds kJobPoll{2000};
+/// Room for everything but the text in the largest sample.
+constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
+
+/// Nobody else's, on any host.
+std::string make_partition() {
+  std::random_device random;
+  return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
+}
+
+Status check_text(const std::string& what, const std::string& text) {
+  if (text.size() <= kMaxText) return {};
+  return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, text.size(), kMaxText);
+}
+
+bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed"; }
+
+template <typename Caller>
+Status open_caller(std::unique_ptr<Caller>& caller, wire::dds::DomainParticipant& participant,
+                   wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, const std::string& partition,
+                   ServerWatch& watch) {
+  auto opened = Caller::open(participant, publisher, subscriber, partition, watch);
+  if (!opened) return tl::make_unexpected(opened.error());
+  caller = std::move(*opened);
+  return {};
+}
+
+}  // namespace
+
+/// Members are closed from the last to the first.
+struct Session::Participant {
+  SessionOptions options;
+  wire::ParticipantPtr participant;
+  std::unique_ptr<ServerWatch> watch;
+  std::unique_ptr<Caller<wire::PredictError>> predict_error;
+  std::unique_ptr<Caller<wire::CorrectTarget>> correct_target;
+  std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
+  std::unique_ptr<Caller<wire::Train>> train;
+  std::unique_ptr<Caller<wire::ManageModels>> manage_models;
+
+  [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
+
+  /// One request; an error also when the server says so.
+  template <typename Operation>
+  [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
+                                                             typename Operation::Request::type request,
+                                                             const Route& route) {
+    auto reply = caller.call(std::move(request), route, deadline());
+    if (!reply && reply.error().code == ErrorCode::kUnreachable) {
+      std::string ports;
+      for (const std::uint16_t port : options.server_ports) ports += fmt::format(" 127.0.0.1:{}", port);
+      return failure(ErrorCode::kUnreachable, "{} ({} ms, looking at{})", reply.error().message,
+                     options.timeout.count(), ports);
+    }
+    if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
+    return reply;
+  }
+
+  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action, int version,
+                                                       const std::string& text = {}) {
+    wire::ManageModelsRequest request;
+    request.about().cell(cell);
+    request.action(action);
+    request.version(version);
+    request.text(text);
+    const bool looks_only = action == wire::MANAGE_LIST || action == wire::MANAGE_EXPORT;
+    return call<wire::ManageModels>(*manage_models, std::move(request), {cell, {}, !looks_only});
+  }
+
+  /// What `server` (empty: any) knows of the job.
+  [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number) {
+    wire::ManageModelsRequest request;
+    request.action(wire::MANAGE_JOB);
+    request.job(number);
+    auto reply = call<wire::ManageModels>(*manage_models, std::move(request), {{}, server, false});
+    if (!reply) return tl::make_unexpected(reply.error());
+    return reply->job();
+  }
+
+  /// The server that has the job, and its present state.
+  [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
+    Error last{ErrorCode::kUnreachable, fmt::format("no server found in {} ms", options.timeout.count())};
+    for (const KnownServer& server : watch->wait_for_servers(options.server_ports.size(), deadline())) {
+      auto found = job(server.id(), number);
+      if (found) return std::pair(server.id(), std::move(*found));
+      last = found.error();
+    }
+    return tl::make_unexpected(last);
+  }
+
+  /// Sends `items` in parts, all to be answered by one model.
+  template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
+  [[nodiscard]] Result<Answer<Item>> call_in_parts(Caller<Operation>& caller, const CallContext& context,
+                                                   const std::vector<Wire>& items, const Put& put, const Get& get) {
+    for (int attempt = 0; attempt < kAttemptsAtOneModel; ++attempt) {
+      Answer<Item> answer;
+      bool one_model = true;
+      for (std::size_t first = 0; one_model && (first == 0 || first < items.size());
+           first += wire::kTargetsPerRequest) {
+        const std::size_t count = std::min(wire::kTargetsPerRequest, items.size() - first);
+        typename Operation::Request::type request;
+        request.about(to_wire(context));
+        for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
+        auto reply = call(caller, std::move(request), {context.cell, {}, false});
+        if (!reply) {
+          if (first == 0 || reply.error().code == ErrorCode::kUnreachable) return tl::make_unexpected(reply.error());
+          return failure(reply.error().code, "after the first {}: {}", first, reply.error().message);
+        }
+        if (get(*reply).size() != count) {
+          return failure(ErrorCode::kInternal, "server {} answered {} items for {}",
+                         reply->header().server().to_string(), get(*reply).size(), count);
+        }
+        const ModelInfo model = from_wire(reply->model());
+        one_model = first == 0 || (model.hash == answer.model.hash && model.version == answer.model.version);
+        if (first == 0) answer.model = model;
+        for (const auto& item : get(*reply)) answer.items.push_back(from_wire(item));
+      }
+      if (one_model) return answer;
+    }
+    return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", context.cell,
+                   kAttemptsAtOneModel);
+  }
+};
+
+Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
+  auto inside = std::make_unique<Participant>();
+  inside->options = options;
+  auto participant = wire::make_participant({"trammel client", options.domain, "127.0.0.1", 0, options.server_ports});
+  if (!participant) return tl::make_unexpected(participant.error());
+  inside->participant = std::move(*participant);
+
+  const std::string partition = make_partition();
+  wire::dds::Publisher* requests = inside->participant->create_publisher(wire::publisher_qos({}));
+  wire::dds::Subscriber* replies = inside->participant->create_subscriber(wire::subscriber_qos(partition));
+  wire::dds::Subscriber* states = inside->participant->create_subscriber(wire::subscriber_qos({}));
+  if (requests == nullptr || replies == nullptr || states == nullptr) {
+    return failure(ErrorCode::kInternal, "cannot create the publisher and the subscribers of a session");
+  }
+  auto watch = ServerWatch::open(*inside->participant, *states);
+  if (!watch) return tl::make_unexpected(watch.error());
+  inside->watch = std::move(*watch);
+  const auto open_all = [&](auto&... callers) {
+    Status opened;
+    ((opened =
+          opened ? open_caller(callers, *inside->participant, *requests, *replies, partition, *inside->watch) : opened),
+     ...);
+    return opened;
+  };
+  const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
+                                 inside->train, inside->manage_models);
+  if (!opened) return tl::make_unexpected(opened.error());
+  return std::unique_ptr<Session>(new Session(std::move(inside)));
+}
+
+Session::Session(std::unique_ptr<Participant> participant) : participant_(std::move(participant)) {}
+
+Session::~Session() = default;
+
+Result<Answer<PredictedError>> Session::predict_error(const CallContext& context,
+                                                      const std::vector<std::vector<double>>& joints_rad) {
+  return participant_->call_in_parts<wire::PredictError, PredictedError>(
+      *participant_->predict_error, context, joints_rad,
+      [](wire::PredictErrorRequest & request) -> auto& { return request.joints_rad(); },
+      [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
+}
+
+Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& context,
+                                                         const std::vector<TargetMm>& targets) {
+  std::vector<wire::Target> items;
+  items.reserve(targets.size());
+  for (const TargetMm& target : targets) items.push_back(to_wire(target));
+  return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
+      *participant_->correct_target, context, items,
+      [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
+      [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
+}
+
+Result<std::int64_t> Session::submit_measurements(const std::string& cell, const std::string& batch_id,
+                                                  const std::string& csv) {
+  if (const Status fits = check_text("batch " + batch_id, csv); !fits) return tl::make_unexpected(fits.error());
+  wire::SubmitMeasurementsRequest request;
+  request.about().cell(cell);
+  request.batch_id(batch_id);
+  request.csv(csv);
+  const auto reply = participant_->call<wire::SubmitMeasurements>(*participant_->submit_measurements,
+                                                                  std::move(request), {cell, {}, true});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job();
+}
+
+Result<std::int64_t> Session::train(const std::string& cell, const std::vector<std::string>& batch_ids,
+                                    const std::string& level, const std::string& bias) {
+  wire::TrainRequest request;
+  request.about().cell(cell);
+  request.batch_ids(batch_ids);
+  request.level(level);
+  request.bias(bias);
+  const auto reply = participant_->call<wire::Train>(*participant_->train, std::move(request), {cell, {}, true});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job();
+}
+
+Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
+  const auto reply = participant_->manage(cell, wire::MANAGE_LIST, 0);
+  if (!reply) return tl::make_unexpected(reply.error());
+  std::vector<ModelInfo> models;
+  for (const wire::ModelInfo& model : reply->models()) models.push_back(from_wire(model));
+  return models;
+}
+
+Result<int> Session::activate(const std::string& cell, int version) {
+  const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, version);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->version();
+}
+
+Result<int> Session::rollback(const std::string& cell) {
+  const auto reply = participant_->manage(cell, wire::MANAGE_ROLLBACK, 0);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->version();
+}
+
+Result<std::string> Session::export_model(const std::string& cell, int version) {
+  auto reply = participant_->manage(cell, wire::MANAGE_EXPORT, version);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
+}
+
+Result<int> Session::import_model(const std::string& cell, const std::string& text) {
+  if (const Status fits = check_text("the model", text); !fits) return tl::make_unexpected(fits.error());
+  const auto reply = participant_->manage(cell, wire::MANAGE_IMPORT, 0, text);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->version();
+}
+
+Result<std::vector<ServerStatus>> Session::servers() {
+  const auto& options = participant_->options;
+  const auto known = participant_->watch->wait_for_servers(options.server_ports.size(), participant_->deadline());
+  if (known.empty()) {
+    return failure(ErrorCode::kUnreachable, "no server found in {} ms", options.timeout.count());
+  }
+  std::vector<ServerStatus> servers;
+  for (const KnownServer& server : known) servers.push_back(from_wire(server.status));
+  return servers;
+}
+
+Result<std::vector<ModelInfo>> Session::model_status() {
+  if (const auto known = servers(); !known) return tl::make_unexpected(known.error());
+  std::vector<ModelInfo> models;
+  for (const wire::ModelInfo& model : participant_->watch->models_in_force()) models.push_back(from_wire(model));
+  return models;
+}
+
+Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
+                                        const std::function<void(const JobStatus&)>& listener) {
+  const auto deadline = Clock::now() + limit;
+  const auto found = participant_->find_job(job);
+  if (!found) return tl::make_unexpected(found.error());
+  const std::string& server = found->first;
+  JobStatus status = from_wire(found->second);
+  std::uint64_t seen = 0;
+  while (true) {
+    if (listener) listener(status);
+    if (is_over(status)) return status;
+    std::optional<wire::Job> news;
+    while (!news) {
+      if (Clock::now() >= deadline) {
+        return failure(ErrorCode::kUnreachable, "job {} is not over after {} ms: {}", job, limit.count(), status.what);
+      }
+      news = participant_->watch->wait_for_progress(server, job, seen, std::min(deadline, Clock::now() + kJobPoll));
+      if (news) continue;
+      const auto asked = participant_->job(server, job);
+      if (asked)
+        news = *asked;
+      else if (asked.error().code != ErrorCode::kUnreachable)
+        return tl::make_unexpected(asked.error());
+    }
+    status = from_wire(*news);
+  }
+}
+
+}  // namespace trammel::client

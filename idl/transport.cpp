@@ -1,0 +1,202 @@
+#include "idl/transport.h"
+
+#include <arpa/inet.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/attributes/LibrarySettingsAttributes.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <mutex>
+
+namespace trammel::wire {
+namespace {
+
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::Duration_t;
+
+constexpr std::uint32_t kSocketBuffer = 4u << 20;
+constexpr int kReplicaDepth = 16;
+
+Duration_t to_duration(std::chrono::milliseconds time) {
+  return {static_cast<std::int32_t>(time.count() / 1000), static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
+}
+
+void set_up_process() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    // Both would silently change how participants find each other.
+    unsetenv("ROS_DISCOVERY_SERVER");
+    unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
+    dds::Log::SetVerbosity(dds::Log::Kind::Error);
+    // Where a test has server and clients in one process, they too talk over UDP.
+    eprosima::fastrtps::LibrarySettingsAttributes settings;
+    settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+  });
+}
+
+Status check_address(const std::string& address) {
+  sockaddr_in name{};
+  name.sin_family = AF_INET;
+  if (inet_pton(AF_INET, address.c_str(), &name.sin_addr) != 1) {
+    return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address);
+  }
+  const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const bool bound = probe >= 0 && bind(probe, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
+  if (probe >= 0) close(probe);
+  if (!bound)
+    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address);
+  return {};
+}
+
+rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
+  rtps::Locator_t result;
+  rtps::IPLocator::createLocator(LOCATOR_KIND_UDPv4, address, port, result);
+  return result;
+}
+
+template <typename Qos>
+void set_call_history(Qos& qos, int depth) {
+  qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
+  qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = depth;
+  qos.resource_limits().max_samples = depth;
+  qos.resource_limits().max_instances = 1;
+  qos.resource_limits().max_samples_per_instance = depth;
+  qos.resource_limits().allocated_samples = 1;
+  qos.data_sharing().off();
+  qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+}
+
+template <typename Qos>
+void set_state_history(Qos& qos, int depth) {
+  set_call_history(qos, depth);
+  qos.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
+  qos.resource_limits().max_samples = 0;
+  qos.resource_limits().max_instances = 0;
+}
+
+void set_writer_times(dds::DataWriterQos& qos) {
+  qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+  qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(std::chrono::milliseconds(10));
+  qos.reliable_writer_qos().times.nackResponseDelay = to_duration(std::chrono::milliseconds(0));
+}
+
+void set_reader_times(dds::DataReaderQos& qos) {
+  qos.reliable_reader_qos().times.heartbeatResponseDelay = to_duration(std::chrono::milliseconds(0));
+  qos.reliable_reader_qos().times.initialAcknackDelay = to_duration(std::chrono::milliseconds(1));
+}
+
+}  // namespace
+
+void ParticipantDeleter::operator()(dds::DomainParticipant* participant) const {
+  participant->delete_contained_entities();
+  dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
+}
+
+Result<ParticipantPtr> make_participant(const ParticipantOptions& options) {
+  set_up_process();
+  if (const Status usable = check_address(options.address); !usable) return tl::make_unexpected(usable.error());
+
+  const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = {options.address};
+  udp->sendBufferSize = kSocketBuffer;
+  udp->receiveBufferSize = kSocketBuffer;
+
+  dds::DomainParticipantQos qos;
+  qos.name(options.name);
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports = {udp};
+  qos.transport().send_socket_buffer_size = kSocketBuffer;
+  qos.transport().listen_socket_buffer_size = kSocketBuffer;
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.discovery_config.leaseDuration = to_duration(kLease);
+  builtin.discovery_config.leaseDuration_announcementperiod = to_duration(kAnnouncement);
+  // A list of its own, even without a port, keeps the participant from joining the default multicast group.
+  builtin.metatrafficUnicastLocatorList.push_back(locator(options.address, options.listen_port));
+  for (const std::uint16_t port : options.peer_ports)
+    builtin.initialPeersList.push_back(locator(options.address, port));
+
+  dds::DomainParticipant* participant =
+      dds::DomainParticipantFactory::get_instance()->create_participant(options.domain, qos);
+  if (participant == nullptr) {
+    return failure(ErrorCode::kInternal, "cannot create a DDS participant on {} in domain {}", options.address,
+                   options.domain);
+  }
+  return ParticipantPtr(participant);
+}
+
+dds::PublisherQos publisher_qos(const std::string& partition) {
+  dds::PublisherQos qos;
+  if (!partition.empty()) qos.partition().push_back(partition.c_str());
+  return qos;
+}
+
+dds::SubscriberQos subscriber_qos(const std::string& partition) {
+  dds::SubscriberQos qos;
+  if (!partition.empty()) qos.partition().push_back(partition.c_str());
+  return qos;
+}
+
+dds::DataWriterQos call_writer_qos(int depth) {
+  dds::DataWriterQos qos;
+  set_call_history(qos, depth);
+  set_writer_times(qos);
+  return qos;
+}
+
+dds::DataReaderQos call_reader_qos(int depth) {
+  dds::DataReaderQos qos;
+  set_call_history(qos, depth);
+  set_reader_times(qos);
+  return qos;
+}
+
+dds::DataWriterQos state_writer_qos() {
+  dds::DataWriterQos qos;
+  set_state_history(qos, 1);
+  set_writer_times(qos);
+  return qos;
+}
+
+dds::DataReaderQos state_reader_qos() {
+  dds::DataReaderQos qos;
+  set_state_history(qos, kReplicaDepth);
+  set_reader_times(qos);
+  return qos;
+}
+
+dds::DataWriterQos progress_writer_qos() {
+  dds::DataWriterQos qos = state_writer_qos();
+  qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+  return qos;
+}
+
+dds::DataReaderQos progress_reader_qos() {
+  dds::DataReaderQos qos = state_reader_qos();
+  qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+  return qos;
+}
+
+dds::DataWriterQos service_status_writer_qos() {
+  dds::DataWriterQos qos = state_writer_qos();
+  qos.liveliness().kind = dds::MANUAL_BY_TOPIC_LIVELINESS_QOS;
+  qos.liveliness().lease_duration = to_duration(kStatusLost);
+  qos.liveliness().announcement_period = to_duration(kStatusPeriod);
+  return qos;
+}
+
+std::string participant_of(const rtps::GUID_t& guid) {
+  return {reinterpret_cast<const char*>(guid.guidPrefix.value), rtps::GuidPrefix_t::size};
+}
+
+}  // namespace trammel::wire

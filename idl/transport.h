@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
+#include <fastdds/dds/publisher/qos/PublisherQos.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+#include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "idl/safe_type.h"
+#include "idl/topics.h"
+#include "server/base/result.h"
+
+/// How samples travel: one participant set-up and one set of QoS for the server and all clients.
+namespace trammel::wire {
+
+namespace dds = eprosima::fastdds::dds;
+
+struct ParticipantOptions {
+  std::string name;
+  std::uint32_t domain = 0;
+  std::string address = "127.0.0.1";      ///< IPv4 of the only interface that is used
+  std::uint16_t listen_port = 0;          ///< where others look for it; 0 = any
+  std::vector<std::uint16_t> peer_ports;  ///< on `address`: where it looks for others
+};
+
+struct ParticipantDeleter {
+  void operator()(dds::DomainParticipant* participant) const;  ///< with all that it contains
+};
+using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
+
+/// UDPv4 on one interface, unicast only, nothing taken from the environment. Refuses an address that this host does not
+/// have now: such a participant would stay deaf even when the interface comes up. One participant a process.
+[[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options);
+
+[[nodiscard]] dds::PublisherQos publisher_qos(const std::string& partition);
+[[nodiscard]] dds::SubscriberQos subscriber_qos(const std::string& partition);
+
+/// Requests and replies: reliable, volatile, the last `depth` kept, so that a dead peer never stops anybody.
+[[nodiscard]] dds::DataWriterQos call_writer_qos(int depth);
+[[nodiscard]] dds::DataReaderQos call_reader_qos(int depth);
+/// State topics: reliable, transient local, the last sample of each of any number of keys; a reader keeps a few,
+/// because replicas write the same keys.
+[[nodiscard]] dds::DataWriterQos state_writer_qos();
+[[nodiscard]] dds::DataReaderQos state_reader_qos();
+/// TrainingProgress besides is volatile: what is over is asked for.
+[[nodiscard]] dds::DataWriterQos progress_writer_qos();
+[[nodiscard]] dds::DataReaderQos progress_reader_qos();
+/// ServiceStatus besides promises to be written every kStatusPeriod: its liveliness is lost after kStatusLost.
+[[nodiscard]] dds::DataWriterQos service_status_writer_qos();
+
+/// A topic of a type that survives hostile samples. Owned by the participant.
+template <typename PubSubType>
+[[nodiscard]] Result<dds::Topic*> make_topic(dds::DomainParticipant& participant, const std::string& name,
+                                             std::size_t max_sample) {
+  dds::TypeSupport type(new SafeType<PubSubType>(max_sample));
+  dds::Topic* topic = nullptr;
+  if (type.register_type(&participant) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    topic = participant.create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+  }
+  if (topic == nullptr) return failure(ErrorCode::kInternal, "cannot create the topic {}", name);
+  return topic;
+}
+
+template <typename Operation>
+[[nodiscard]] Result<dds::Topic*> make_request_topic(dds::DomainParticipant& participant) {
+  return make_topic<typename Operation::Request>(participant, fmt::format("{}_Request", Operation::kName),
+                                                 Operation::kMaxSample);
+}
+template <typename Operation>
+[[nodiscard]] Result<dds::Topic*> make_reply_topic(dds::DomainParticipant& participant) {
+  return make_topic<typename Operation::Reply>(participant, fmt::format("{}_Reply", Operation::kName),
+                                               Operation::kMaxSample);
+}
+template <typename State>
+[[nodiscard]] Result<dds::Topic*> make_state_topic(dds::DomainParticipant& participant) {
+  return make_topic<typename State::Type>(participant, State::kName, State::kMaxSample);
+}
+
+/// The participant that an endpoint belongs to: its first 12 octets.
+[[nodiscard]] std::string participant_of(const eprosima::fastrtps::rtps::GUID_t& guid);
+
+}  // namespace trammel::wire

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "idl/valid.h"
+#include "server/registry/model_registry.h"
+#include "server/trainer/trainer.h"
+
+/// Between the wire (mm, rad; prismatic joints mm) and the inside (m, rad).
+namespace trammel {
+
+[[nodiscard]] wire::PoseMm to_wire(const Pose& X);
+/// Refuses non-finite numbers and a quaternion whose length is not 1 within 1e-3; `where` names it.
+[[nodiscard]] Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where);
+
+[[nodiscard]] wire::Joints to_wire(const JointVector& q, const Chain& chain);
+/// Refuses a count that is not the robot's, and non-finite numbers; `where` names it.
+[[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where);
+
+[[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s);
+[[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);
+[[nodiscard]] wire::Job to_wire(const JobProgress& progress);
+[[nodiscard]] wire::TargetStatus to_wire(CorrectionStatus status);
+[[nodiscard]] wire::ResultCode to_wire(ErrorCode code);
+
+/// `<writer GUID in hex>:<sequence number>`.
+[[nodiscard]] std::string request_id_text(const wire::SampleIdentity& id);
+
+[[nodiscard]] std::int64_t unix_now_s();
+
+}  // namespace trammel

@@ -1,0 +1,77 @@
+#include "server/base/units.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+
+namespace trammel {
+namespace {
+
+/// Keeps the largest reply below its sample limit.
+constexpr std::size_t kMaxMessage = 120;
+constexpr int kMaxConf = 7;
+
+Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const std::string& where) {
+  Target target;
+  target.joint_target = wanted.kind() == wire::TARGET_JOINTS;
+  if (!target.joint_target) {
+    const auto X_BT = trammel::from_wire(wanted.pose(), where);
+    if (!X_BT) return tl::make_unexpected(X_BT.error());
+    target.X_BT = *X_BT;
+  }
+  if (wanted.kind() == wire::TARGET_POSE_ON_BRANCH) {
+    if (wanted.conf() < 0 || wanted.conf() > kMaxConf) {
+      return refused("{}: branch {} is not one of 0 to {}", where, wanted.conf(), kMaxConf);
+    }
+    target.conf = wanted.conf();
+    return target;
+  }
+  const auto seed = trammel::from_wire(wanted.joints_rad(), chain, where);
+  if (!seed) return tl::make_unexpected(seed.error());
+  target.seed = *seed;
+  return target;
+}
+
+wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) {
+  wire::CorrectedTarget item;
+  item.status(trammel::to_wire(correction.status));
+  item.commanded(trammel::to_wire(correction.X_BT_commanded));
+  item.joints_rad(trammel::to_wire(correction.q, chain));
+  item.error_before_mm(to_mm(correction.error_before));
+  item.error_after_mm(to_mm(correction.error_after));
+  item.sigma_mm(to_mm(correction.stddev));
+  item.iterations(correction.iterations);
+  item.message(correction.message.substr(0, kMaxMessage));
+  return item;
+}
+
+}  // namespace
+
+Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {
+  const auto& wanted = request.targets();
+  if (wanted.size() > wire::MAX_TARGETS) {
+    return failure(ErrorCode::kTooLarge, "{} targets in one request, limit {}", wanted.size(), wire::MAX_TARGETS);
+  }
+  const auto subject = subjects_.find(request.about());
+  if (!subject) return tl::make_unexpected(subject.error());
+  const CompensatedModel& model = subject->served->model;
+  const Chain& chain = model.cell().robot;
+
+  std::vector<Target> targets;
+  targets.reserve(wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto target = from_wire(wanted[i], chain, fmt::format("target {}", i + 1));
+    if (!target) return tl::make_unexpected(target.error());
+    targets.push_back(*target);
+  }
+
+  wire::CorrectTargetReply reply;
+  reply.model(trammel::to_wire(*subject->served, subject->in_force, unix_now_s()));
+  reply.corrections().reserve(targets.size());
+  for (const Target& target : targets) {
+    reply.corrections().push_back(to_wire(model.correct(target, subject->tool, subject->payload), chain));
+  }
+  return reply;
+}
+
+bool happens_once(const wire::CorrectTargetRequest&) { return false; }
+
+}  // namespace trammel

@@ -1,0 +1,201 @@
+#include "server/dds/dds_service.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <stop_token>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "idl/transport.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+#include "server/dds/port_lock.h"
+#include "server/dds/reply_channels.h"
+#include "server/dds/request_endpoint.h"
+#include "server/dds/state_topics.h"
+
+namespace trammel {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+Status check_names(const DdsOptions& options, const Trainer& trainer) {
+  if (!wire::valid_partition(options.server_id)) {
+    return failure(ErrorCode::kUsage, "server id `{}`: must be 1 to {} letters, digits, `.`, `_`, `-`",
+                   options.server_id, wire::MAX_NAME);
+  }
+  if (trainer.cells().size() > wire::MAX_CELLS) {
+    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS);
+  }
+  for (const auto& [name, cell] : trainer.cells()) {
+    if (name.empty() || name.size() > wire::MAX_NAME) {
+      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+class DdsService::Running {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
+                                                              const ModelRegistry& registry) {
+    if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
+    auto port = PortLock::take(options.address, options.port);
+    if (!port) return tl::make_unexpected(port.error());
+    auto participant = wire::make_participant(
+        {"trammel server " + options.server_id, options.domain, options.address, options.port, options.peer_ports});
+    if (!participant) return tl::make_unexpected(participant.error());
+    wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
+    if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
+    auto topics = StateTopics::open(**participant);
+    if (!topics) return tl::make_unexpected(topics.error());
+
+    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port),
+                                                 std::move(*participant), *subscriber, *topics));
+    if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
+    running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
+    return running;
+  }
+
+  ~Running() {
+    status_thread_ = {};
+    publish_status(wire::SERVICE_STOPPING);
+    endpoints_.clear();
+  }
+
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  void publish_progress(const JobProgress& progress) {
+    wire::TrainingProgress sample;
+    sample.server(options_.server_id);
+    sample.number(progress.job);
+    sample.job(to_wire(progress));
+    topics_.publish(std::move(sample));
+    if (progress.stage == JobStage::kTraining) return;
+    const std::lock_guard lock(mutex_);
+    wake_status();
+  }
+
+  void publish_model(const std::string& cell) {
+    const std::lock_guard lock(mutex_);  // so that the last one published is the one in force
+    if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
+    wake_status();
+  }
+
+ private:
+  Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry, PortLock port,
+          wire::ParticipantPtr participant, wire::dds::Subscriber& subscriber, const StateTopics& topics)
+      : options_(options),
+        trainer_(trainer),
+        registry_(registry),
+        handlers_(trainer, store, registry),
+        port_(std::move(port)),
+        participant_(std::move(participant)),
+        topics_(topics),
+        channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
+        core_{options.server_id, *participant_, subscriber, handlers_, channels_} {}
+
+  Status open_endpoints() {
+    const auto open = [this]<typename Operation>(Operation, int workers) -> Status {
+      auto endpoint = RequestEndpoint<Operation>::open(core_, workers);
+      if (!endpoint) return tl::make_unexpected(endpoint.error());
+      endpoints_.push_back(std::move(*endpoint));
+      return {};
+    };
+    Status opened = open(wire::PredictError(), options_.compute_workers);
+    if (opened) opened = open(wire::CorrectTarget(), options_.compute_workers);
+    if (opened) opened = open(wire::SubmitMeasurements(), 1);
+    if (opened) opened = open(wire::Train(), 1);
+    if (opened) opened = open(wire::Diagnose(), 1);
+    if (opened) opened = open(wire::ManageModels(), 1);
+    return opened;
+  }
+
+  void tell_status(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      publish_status(wire::SERVICE_SERVING);
+      channels_.sweep();
+      std::unique_lock lock(mutex_);
+      status_due_.wait_for(lock, stop, wire::kStatusPeriod, [this] { return status_changed_; });
+      status_changed_ = false;
+    }
+  }
+
+  void publish_status(wire::ServiceState state) {
+    wire::ServiceStatus status;
+    status.server(options_.server_id);
+    status.contract_version(wire::CONTRACT_VERSION);
+    status.program_version(options_.program_version);
+    status.state(state);
+    for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
+    status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
+    status.requests(core_.requests);
+    status.refused(core_.refused);
+    status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
+    status.queued_jobs(trainer_.queued_jobs());
+    topics_.publish(std::move(status));
+  }
+
+  /// With mutex_ held.
+  void wake_status() {
+    status_changed_ = true;
+    status_due_.notify_one();
+  }
+
+  const DdsOptions options_;
+  const Clock::time_point started_ = Clock::now();
+  Trainer& trainer_;
+  const ModelRegistry& registry_;
+  Handlers handlers_;
+  PortLock port_;
+  wire::ParticipantPtr participant_;
+  StateTopics topics_;
+  ReplyChannels channels_;
+  ServiceCore core_;
+  std::mutex mutex_;
+  std::condition_variable_any status_due_;
+  bool status_changed_ = false;  // guarded by mutex_
+  std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::jthread status_thread_;
+};
+
+DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry)
+    : options_(std::move(options)), trainer_(trainer), store_(store), registry_(registry) {}
+
+DdsService::~DdsService() { stop(); }
+
+Status DdsService::start() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (running_) return {};
+  }
+  // Without the lock: its workers may publish.
+  auto started = Running::start(options_, trainer_, store_, registry_);
+  if (!started) return tl::make_unexpected(started.error());
+  const std::lock_guard lock(mutex_);
+  running_ = std::move(*started);
+  for (const auto& model : registry_.all()) running_->publish_model(model->cell);
+  return {};
+}
+
+void DdsService::stop() {
+  std::unique_ptr<Running> last;  // destroyed without the lock: its workers may publish
+  const std::lock_guard lock(mutex_);
+  last.swap(running_);
+}
+
+void DdsService::publish_progress(const JobProgress& progress) {
+  const std::lock_guard lock(mutex_);
+  if (running_) running_->publish_progress(progress);
+}
+
+void DdsService::publish_model(const std::string& cell) {
+  const std::lock_guard lock(mutex_);
+  if (running_) running_->publish_model(cell);
+}
+
+}  // namespace trammel

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "idl/valid.h"
+#include "server/registry/model_registry.h"
+#include "server/store/store.h"
+#include "server/trainer/trainer.h"
+
+namespace trammel {
+
+/// What a request is about, looked up once: all of its answer comes from this one model.
+struct Subject {
+  std::shared_ptr<const ServedModel> served;
+  bool in_force = false;
+  std::string tool, payload;  ///< resolved
+};
+
+/// Finds what a request's context means. Keeps the few stored versions last asked for in memory. Thread-safe.
+class SubjectFinder {
+ public:
+  SubjectFinder(const Trainer& trainer, const Store& store, const ModelRegistry& registry)
+      : trainer_(trainer), store_(store), registry_(registry) {}
+
+  /// The cell's description. Refuses an unknown cell, tool or payload, and a controller that compensates: models are
+  /// trained with one that does not.
+  [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const wire::Context& context) const;
+  /// As cell(); refuses besides a cell without a model in force, an unknown version, a model id that is not in force.
+  [[nodiscard]] Result<Subject> find(const wire::Context& context);
+
+ private:
+  [[nodiscard]] Result<std::shared_ptr<const ServedModel>> version(const std::string& cell, int version);
+
+  const Trainer& trainer_;
+  const Store& store_;
+  const ModelRegistry& registry_;
+  std::mutex mutex_;
+  std::deque<std::shared_ptr<const ServedModel>> loaded_;  // guarded by mutex_; newest first
+};
+
+/// The answers to requests: a decoded request in, a reply or an error out. No DDS. Headers are the caller's business.
+/// Thread-safe.
+class Handlers {
+ public:
+  Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
+      : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, store, registry) {}
+
+  [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
+  [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);
+  /// Accepted means stored: see Trainer::submit.
+  [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
+  [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
+  /// RESULT_UNSUPPORTED.
+  [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
+  [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
+
+ private:
+  Trainer& trainer_;
+  Store& store_;
+  const ModelRegistry& registry_;
+  SubjectFinder subjects_;
+};
+
+/// Whether a repeat of the request must not be carried out again: it changes something.
+[[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);
+[[nodiscard]] bool happens_once(const wire::CorrectTargetRequest& request);
+[[nodiscard]] bool happens_once(const wire::SubmitMeasurementsRequest& request);
+[[nodiscard]] bool happens_once(const wire::TrainRequest& request);
+[[nodiscard]] bool happens_once(const wire::DiagnoseRequest& request);
+[[nodiscard]] bool happens_once(const wire::ManageModelsRequest& request);
+
+}  // namespace trammel

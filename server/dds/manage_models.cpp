@@ -1,0 +1,80 @@
+#include "idl/limits.h"
+#include "server/base/check.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+
+namespace trammel {
+namespace {
+
+/// Room for everything but the text in the largest sample.
+constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
+
+}  // namespace
+
+Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
+  wire::ManageModelsReply reply;
+  if (request.action() == wire::MANAGE_JOB) {
+    const auto progress = trainer_.progress(request.job());
+    if (!progress) return tl::make_unexpected(progress.error());
+    reply.job(to_wire(*progress));
+    return reply;
+  }
+
+  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  const std::string& cell = request.about().cell();
+  switch (request.action()) {
+    case wire::MANAGE_LIST: {
+      const auto models = store_.models(cell);
+      if (!models) return tl::make_unexpected(models.error());
+      const std::int64_t now = unix_now_s();
+      const std::size_t skipped = models->size() > wire::MAX_VERSIONS ? models->size() - wire::MAX_VERSIONS : 0;
+      for (std::size_t i = skipped; i < models->size(); ++i) reply.models().push_back(to_wire((*models)[i], now));
+      return reply;
+    }
+    case wire::MANAGE_ACTIVATE: {
+      const Status activated = trainer_.activate(cell, request.version());
+      if (!activated) return tl::make_unexpected(activated.error());
+      reply.version(request.version());
+      return reply;
+    }
+    case wire::MANAGE_ROLLBACK: {
+      const auto version = trainer_.rollback(cell);
+      if (!version) return tl::make_unexpected(version.error());
+      reply.version(*version);
+      return reply;
+    }
+    case wire::MANAGE_EXPORT: {
+      const auto in_force = registry_.in_force(cell);
+      if (request.version() == 0 && !in_force) {
+        return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+      }
+      const int version = request.version() == 0 ? in_force->version : request.version();
+      const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                                  : store_.model(cell, version);
+      if (!model) return tl::make_unexpected(model.error());
+      reply.version(version);
+      reply.text(serialize(*model));
+      if (reply.text().size() > kMaxText) {
+        return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version,
+                       reply.text().size(), kMaxText);
+      }
+      return reply;
+    }
+    case wire::MANAGE_IMPORT: {
+      const auto version = trainer_.import_model(cell, request.text());
+      if (!version) return tl::make_unexpected(version.error());
+      reply.version(*version);
+      return reply;
+    }
+    case wire::MANAGE_JOB:
+      break;
+  }
+  TRAMMEL_CHECK(false);
+}
+
+bool happens_once(const wire::ManageModelsRequest& request) {
+  return request.action() == wire::MANAGE_ACTIVATE || request.action() == wire::MANAGE_ROLLBACK ||
+         request.action() == wire::MANAGE_IMPORT;
+}
+
+}  // namespace trammel

@@ -1,0 +1,50 @@
+#include "server/dds/port_lock.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+namespace trammel {
+
+Result<PortLock> PortLock::take(const std::string& address, std::uint16_t port) {
+  // A name in the abstract namespace: taken atomically, freed by the kernel.
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  const std::string text = fmt::format("trammel-dds-{}-{}", address, port);
+  const std::size_t length = std::min(text.size(), sizeof name.sun_path - 1);
+  std::copy_n(text.begin(), length, name.sun_path + 1);
+  const int lock = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (lock < 0) return failure(ErrorCode::kInternal, "cannot open a socket to lock port {}", port);
+  PortLock result(lock);
+  const auto name_size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
+  if (bind(lock, reinterpret_cast<const sockaddr*>(&name), name_size) != 0) {
+    return failure(ErrorCode::kConflict, "another trammel server uses port {} on {}; give this one its own", port,
+                   address);
+  }
+
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(port);
+  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1) {
+    return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address);
+  }
+  const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const bool is_free = probe >= 0 && bind(probe, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0;
+  if (probe >= 0) close(probe);
+  if (!is_free) return failure(ErrorCode::kConflict, "UDP port {} on {} is taken by another program", port, address);
+  return result;
+}
+
+PortLock::~PortLock() {
+  if (socket_ >= 0) close(socket_);
+}
+
+PortLock::PortLock(PortLock&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
+
+}  // namespace trammel

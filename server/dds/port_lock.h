@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/base/result.h"
+
+namespace trammel {
+
+/// Keeps a UDP port of this host for one server: DDS itself would silently give a second one another port, where no
+/// client looks. Ends with the process, however that ends; leaves no file.
+class PortLock {
+ public:
+  /// Refuses (kConflict) a port that another server, or any program, uses on `address`.
+  [[nodiscard]] static Result<PortLock> take(const std::string& address, std::uint16_t port);
+  ~PortLock();
+  PortLock(PortLock&& other) noexcept;
+  PortLock& operator=(PortLock&& other) = delete;
+
+ private:
+  explicit PortLock(int socket) : socket_(socket) {}
+  int socket_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,129 @@
+#include "server/dds/reply_channels.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace trammel {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A client's reader is matched within a few announcements, or never.
+constexpr auto kPatience = 5 * wire::kAnnouncement;
+
+}  // namespace
+
+std::unique_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher, wire::dds::Topic* topic) {
+  std::unique_ptr<ReplyWriter> result(new ReplyWriter(publisher));
+  result->patient_until_ = Clock::now() + kPatience;
+  result->writer_ = publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
+                                                wire::dds::StatusMask::publication_matched());
+  return result->writer_ == nullptr ? nullptr : std::move(result);
+}
+
+ReplyWriter::~ReplyWriter() {
+  if (writer_ != nullptr) publisher_.delete_datawriter(writer_);
+}
+
+bool ReplyWriter::send(void* reply, const std::stop_token& stop) {
+  {
+    std::unique_lock lock(mutex_);
+    matched_.wait_until(lock, stop, patient_until_, [this] { return readers_ > 0; });
+    if (readers_ == 0) return false;
+  }
+  return writer_->write(reply);
+}
+
+bool ReplyWriter::abandoned() const {
+  const std::lock_guard lock(mutex_);
+  return readers_ == 0 && Clock::now() > patient_until_;
+}
+
+void ReplyWriter::on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) {
+  {
+    const std::lock_guard lock(mutex_);
+    readers_ = status.current_count;
+    if (readers_ == 0) patient_until_ = Clock::now() + kPatience;
+  }
+  matched_.notify_all();
+}
+
+class ReplyChannels::Client {
+ public:
+  explicit Client(wire::dds::DomainParticipant& participant, const std::string& partition)
+      : participant_(participant), publisher_(participant.create_publisher(wire::publisher_qos(partition))) {}
+  ~Client() {
+    writers_.clear();
+    if (publisher_ != nullptr) participant_.delete_publisher(publisher_);
+  }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  /// Null when DDS refuses.
+  [[nodiscard]] ReplyWriter* writer(wire::dds::Topic* topic) {
+    const std::lock_guard lock(mutex_);
+    auto& writer = writers_[topic];
+    if (!writer && publisher_ != nullptr) writer = ReplyWriter::make(*publisher_, topic);
+    return writer.get();
+  }
+
+  [[nodiscard]] bool left() const {
+    const std::lock_guard lock(mutex_);
+    return std::all_of(writers_.begin(), writers_.end(),
+                       [](const auto& entry) { return !entry.second || entry.second->abandoned(); });
+  }
+
+  Clock::time_point last_used;  // guarded by the channels' mutex_
+
+ private:
+  wire::dds::DomainParticipant& participant_;
+  wire::dds::Publisher* publisher_;
+  mutable std::mutex mutex_;
+  std::map<wire::dds::Topic*, std::unique_ptr<ReplyWriter>> writers_;  // guarded by mutex_
+};
+
+bool ReplyChannels::send(const std::string& partition, wire::dds::Topic* topic, void* reply,
+                         const std::stop_token& stop) {
+  const std::shared_ptr<Client> to = client(partition);
+  ReplyWriter* writer = to->writer(topic);
+  return writer != nullptr && writer->send(reply, stop);
+}
+
+std::shared_ptr<ReplyChannels::Client> ReplyChannels::client(const std::string& partition) {
+  std::shared_ptr<Client> crowded_out;  // destroyed without the lock
+  const std::lock_guard lock(mutex_);
+  auto& entry = clients_[partition];
+  if (!entry) entry = std::make_shared<Client>(participant_, partition);
+  entry->last_used = Clock::now();
+  const std::shared_ptr<Client> result = entry;
+  if (clients_.size() > capacity_) {
+    const auto oldest = std::min_element(clients_.begin(), clients_.end(), [](const auto& a, const auto& b) {
+      return a.second->last_used < b.second->last_used;
+    });
+    crowded_out = std::move(oldest->second);
+    clients_.erase(oldest);
+  }
+  return result;
+}
+
+void ReplyChannels::sweep() {
+  std::vector<std::shared_ptr<Client>> gone;  // destroyed without the lock
+  const std::lock_guard lock(mutex_);
+  for (auto entry = clients_.begin(); entry != clients_.end();) {
+    const bool idle = Clock::now() - entry->second->last_used > kPatience;
+    if (idle && entry->second->left()) {
+      gone.push_back(std::move(entry->second));
+      entry = clients_.erase(entry);
+    } else {
+      ++entry;
+    }
+  }
+}
+
+std::size_t ReplyChannels::clients() const {
+  const std::lock_guard lock(mutex_);
+  return clients_.size();
+}
+
+}  // namespace trammel

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+
+#include "idl/transport.h"
+
+namespace trammel {
+
+/// A writer of one reply topic to one client.
+class ReplyWriter final : private wire::dds::DataWriterListener {
+ public:
+  /// Null when DDS refuses.
+  [[nodiscard]] static std::unique_ptr<ReplyWriter> make(wire::dds::Publisher& publisher, wire::dds::Topic* topic);
+  ~ReplyWriter() override;
+  ReplyWriter(const ReplyWriter&) = delete;
+  ReplyWriter& operator=(const ReplyWriter&) = delete;
+
+  /// Waits a bounded time until the client's reader is matched: a reply written before would be lost.
+  [[nodiscard]] bool send(void* reply, const std::stop_token& stop);
+  /// No reader, and not waiting for the first one any more.
+  [[nodiscard]] bool abandoned() const;
+
+ private:
+  explicit ReplyWriter(wire::dds::Publisher& publisher) : publisher_(publisher) {}
+  void on_publication_matched(wire::dds::DataWriter* writer,
+                              const wire::dds::PublicationMatchedStatus& status) override;
+
+  wire::dds::Publisher& publisher_;
+  wire::dds::DataWriter* writer_ = nullptr;
+  mutable std::mutex mutex_;
+  std::condition_variable_any matched_;
+  int readers_ = 0;                                      // guarded by mutex_
+  std::chrono::steady_clock::time_point patient_until_;  // guarded by mutex_: when there is no reader, wait until then
+};
+
+/// The way back to each client: a publisher in its partition and a writer for each operation it uses. Made on demand,
+/// in worker threads only; dropped when the client has left, or when more clients than `capacity` are there.
+/// Thread-safe.
+class ReplyChannels {
+ public:
+  ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity)
+      : participant_(participant), capacity_(capacity) {}
+
+  /// `reply` is a sample of the topic's type. False when the client did not listen.
+  [[nodiscard]] bool send(const std::string& partition, wire::dds::Topic* topic, void* reply,
+                          const std::stop_token& stop);
+  /// Forgets clients that have left.
+  void sweep();
+  [[nodiscard]] std::size_t clients() const;
+
+ private:
+  class Client;
+  [[nodiscard]] std::shared_ptr<Client> client(const std::string& partition);
+
+  wire::dds::DomainParticipant& participant_;
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<Client>> clients_;  // guarded by mutex_
+};
+
+}  // namespace trammel

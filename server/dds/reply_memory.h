@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+namespace trammel {
+
+/// The last answers by request id, so that a repeat of a request is answered without being carried out again.
+/// Thread-safe.
+template <typename Reply>
+class ReplyMemory {
+ public:
+  explicit ReplyMemory(std::size_t capacity) : capacity_(capacity) {}
+
+  [[nodiscard]] std::optional<Reply> find(const std::string& request_id) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = replies_.find(request_id);
+    if (found == replies_.end()) return std::nullopt;
+    return found->second;
+  }
+
+  void remember(const std::string& request_id, Reply reply) {
+    const std::lock_guard lock(mutex_);
+    if (!replies_.emplace(request_id, std::move(reply)).second) return;
+    order_.push_back(request_id);
+    if (order_.size() > capacity_) {
+      replies_.erase(order_.front());
+      order_.pop_front();
+    }
+  }
+
+ private:
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::unordered_map<std::string, Reply> replies_;  // guarded by mutex_
+  std::deque<std::string> order_;                   // guarded by mutex_; oldest first
+};
+
+}  // namespace trammel

@@ -1,0 +1,165 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "idl/transport.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+#include "server/dds/reply_channels.h"
+#include "server/dds/reply_memory.h"
+
+namespace trammel {
+
+/// What all operations of a service share. Outlives them.
+struct ServiceCore {
+  std::string server_id;
+  wire::dds::DomainParticipant& participant;
+  wire::dds::Subscriber& subscriber;
+  Handlers& handlers;
+  ReplyChannels& channels;
+  std::atomic<std::uint64_t> requests{0};  ///< answered
+  std::atomic<std::uint64_t> refused{0};   ///< of them, not with RESULT_OK
+  std::atomic<std::uint64_t> unheard{0};   ///< of them, whose client had left
+};
+
+class RequestEndpointBase {
+ public:
+  virtual ~RequestEndpointBase() = default;
+};
+
+/// The reply to a request: the handler's, with its header; a remembered one for a repeat; an error for a wrong
+/// contract.
+template <typename Request, typename Reply>
+[[nodiscard]] Reply reply_to(const Request& request, Handlers& handlers, ReplyMemory<Reply>& memory,
+                             const std::string& server_id) {
+  const wire::RequestHeader& asked = request.header();
+  const std::string id = request_id_text(asked.request_id());
+  const bool once = happens_once(request);
+  if (once) {
+    if (auto known = memory.find(id)) return std::move(*known);
+  }
+
+  Reply reply;
+  const auto refuse = [&](wire::ResultCode code, const std::string& message) {
+    reply = Reply();
+    reply.header().result(code);
+    reply.header().message(message);
+  };
+  if (asked.contract_version() != wire::CONTRACT_VERSION) {
+    refuse(wire::RESULT_WRONG_CONTRACT, fmt::format("the request is of contract {}, this server speaks {}",
+                                                    asked.contract_version(), wire::CONTRACT_VERSION));
+  } else {
+    try {
+      Result<Reply> answer = handlers.answer(request);
+      if (answer) {
+        reply = std::move(*answer);
+      } else {
+        refuse(to_wire(answer.error().code), answer.error().message);
+      }
+    } catch (const std::exception& failed) {
+      refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
+    }
+  }
+  reply.header().related_request_id(asked.request_id());
+  reply.header().server(server_id);
+  reply.header().contract_version(wire::CONTRACT_VERSION);
+  if (once && reply.header().result() == wire::RESULT_OK) memory.remember(id, reply);
+  return reply;
+}
+
+/// One operation: its reader, and the worker threads that take requests, answer and reply. The listener only wakes
+/// them.
+template <typename Operation>
+class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
+ public:
+  using Request = typename Operation::Request::type;
+  using Reply = typename Operation::Reply::type;
+
+  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, int workers) {
+    std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core));
+    const auto request_topic = wire::make_request_topic<Operation>(core.participant);
+    if (!request_topic) return tl::make_unexpected(request_topic.error());
+    const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
+    if (!reply_topic) return tl::make_unexpected(reply_topic.error());
+    endpoint->reply_topic_ = *reply_topic;
+    endpoint->reader_ = core.subscriber.create_datareader(*request_topic, wire::call_reader_qos(wire::kRequestDepth),
+                                                          endpoint.get(), wire::dds::StatusMask::data_available());
+    if (endpoint->reader_ == nullptr) {
+      return failure(ErrorCode::kInternal, "cannot create the reader of {} requests", Operation::kName);
+    }
+    for (int i = 0; i < workers; ++i) {
+      endpoint->workers_.emplace_back([e = endpoint.get()](const std::stop_token& stop) { e->work(stop); });
+    }
+    return endpoint;
+  }
+
+  ~RequestEndpoint() override {
+    for (std::jthread& worker : workers_) worker.request_stop();
+    workers_.clear();
+    if (reader_ != nullptr) core_.subscriber.delete_datareader(reader_);
+  }
+
+ private:
+  static constexpr std::size_t kRepliesRemembered = 1024;
+
+  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered) {}
+
+  void on_data_available(wire::dds::DataReader*) override {
+    {
+      const std::lock_guard lock(mutex_);
+      ++arrivals_;
+    }
+    arrived_.notify_one();
+  }
+
+  void work(const std::stop_token& stop) {
+    Request request;
+    wire::dds::SampleInfo info;
+    while (!stop.stop_requested()) {
+      std::unique_lock lock(mutex_);
+      const std::uint64_t seen = arrivals_;
+      lock.unlock();
+      while (!stop.stop_requested() &&
+             reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+        if (info.valid_data) serve(request, stop);
+      }
+      lock.lock();
+      arrived_.wait(lock, stop, [&] { return arrivals_ != seen; });
+    }
+  }
+
+  void serve(const Request& request, const std::stop_token& stop) {
+    const std::string wanted = request.header().server().to_string();
+    if (!wanted.empty() && wanted != core_.server_id) return;
+    Reply reply = reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    ++core_.requests;
+    if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
+    if (!core_.channels.send(request.header().reply_partition().to_string(), reply_topic_, &reply, stop)) {
+      ++core_.unheard;
+    }
+  }
+
+  ServiceCore& core_;
+  wire::dds::Topic* reply_topic_ = nullptr;
+  wire::dds::DataReader* reader_ = nullptr;
+  ReplyMemory<Reply> memory_;
+  std::mutex mutex_;
+  std::condition_variable_any arrived_;
+  std::uint64_t arrivals_ = 0;  // guarded by mutex_
+  std::vector<std::jthread> workers_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,82 @@
+#include <algorithm>
+#include <charconv>
+#include <optional>
+
+#include "server/dds/handlers.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::size_t kVersionsInMemory = 4;
+
+/// The number of `@3`.
+std::optional<int> version_number(const std::string& model) {
+  if (model.size() < 2 || model.front() != '@') return std::nullopt;
+  int version = 0;
+  const char* end = model.data() + model.size();
+  const auto [stopped, error] = std::from_chars(model.data() + 1, end, version);
+  if (error != std::errc() || stopped != end || version < 1) return std::nullopt;
+  return version;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& context) const {
+  const auto found = trainer_.cells().find(context.cell());
+  if (found == trainer_.cells().end()) {
+    return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell());
+  }
+  if (context.controller_compensates()) {
+    return refused("cell {}: models are trained with a controller that does not compensate, this one does",
+                   context.cell());
+  }
+  const Cell& cell = *found->second;
+  if (!context.tool().empty() && !cell.tools.contains(context.tool())) {
+    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool());
+  }
+  if (!context.payload().empty() && !cell.payloads.contains(context.payload())) {
+    return refused("cell {}: unknown payload `{}`", context.cell(), context.payload());
+  }
+  return found->second;
+}
+
+Result<Subject> SubjectFinder::find(const wire::Context& context) {
+  if (const auto known = cell(context); !known) return tl::make_unexpected(known.error());
+  const auto in_force = registry_.in_force(context.cell());
+  Subject subject{in_force, true, {}, {}};
+  if (const auto wanted = version_number(context.model()); wanted && (!in_force || in_force->version != *wanted)) {
+    auto stored = version(context.cell(), *wanted);
+    if (!stored) return tl::make_unexpected(stored.error());
+    subject.served = std::move(*stored);
+    subject.in_force = false;
+  } else if (!in_force) {
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell());
+  } else if (!wanted && !context.model().empty() && context.model() != in_force->model.provenance().id &&
+             context.model() != in_force->model.provenance().hash) {
+    return failure(ErrorCode::kConflict, "cell {}: model `{}` is not in force, {} (version {}) is", context.cell(),
+                   context.model(), in_force->model.provenance().id, in_force->version);
+  }
+
+  const Cell& trained_for = subject.served->model.cell();
+  const auto tool = resolve_tool(trained_for, context.tool());
+  if (!tool) return tl::make_unexpected(tool.error());
+  const auto payload = resolve_payload(trained_for, context.payload());
+  if (!payload) return tl::make_unexpected(payload.error());
+  subject.tool = *tool;
+  subject.payload = *payload;
+  return subject;
+}
+
+Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell, int version) {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::find_if(loaded_.begin(), loaded_.end(),
+                                  [&](const auto& m) { return m->cell == cell && m->version == version; });
+  if (found != loaded_.end()) return *found;
+  auto model = store_.model(cell, version);
+  if (!model) return tl::make_unexpected(model.error());
+  loaded_.push_front(std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)}));
+  if (loaded_.size() > kVersionsInMemory) loaded_.pop_back();
+  return loaded_.front();
+}
+
+}  // namespace trammel
