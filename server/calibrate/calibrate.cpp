@@ -15,6 +15,8 @@ namespace trammel {
 namespace {
 
 constexpr int kMaxReweightings = 12;
+constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation, at most, is left of what was not known
+constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 /// Standard deviations with which residuals are weighed: the measurement's and, on top, the model's own.
 struct Weights {
@@ -23,6 +25,10 @@ struct Weights {
 };
 
 double position_sigma(const Measurement& m, const Cell& cell) { return m.sigma.value_or(cell.tracker.sigma); }
+
+bool has_unknown_tool(const Cell& cell) {
+  return std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
+}
 
 /// One measurement's residual in units of sigma; the parameters come in units of their prior scale.
 class PoseCost final : public ceres::CostFunction {
@@ -97,19 +103,31 @@ class PriorCost final : public ceres::CostFunction {
   Eigen::VectorXd prior_;
 };
 
-/// All there is to minimise, with the parameters in prior units.
+/// All there is to minimise, with the parameters in units of their priors.
 struct Scaled {
   std::vector<Parameter> parameters;
-  Eigen::VectorXd scale;
-  Eigen::VectorXd prior;  // in units of scale
+  Eigen::VectorXd scale;    // standard deviations of the priors
+  Eigen::VectorXd typical;  // the same where nothing was widened
+  Eigen::VectorXd prior;    // in units of scale
 };
 
+/// The priors stand around the model's values. Those of a frame that the cell calls unknown are wide: it was found with
+/// a chain that was still wrong.
 Scaled scaled(const PhysicalModel& model) {
-  Scaled s{model.parameters(), Eigen::VectorXd(model.parameter_count()), Eigen::VectorXd(model.parameter_count())};
-  for (std::size_t i = 0; i < s.parameters.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    s.scale(k) = s.parameters[i].prior_scale;
-    s.prior(k) = s.parameters[i].prior / s.parameters[i].prior_scale;
+  const Eigen::Index P = model.parameter_count();
+  Scaled s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P)};
+  Eigen::Index k = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const bool unknown =
+        (source->name() == "base" && !model.cell->X_WB) || (source->name() == "tool" && has_unknown_tool(*model.cell));
+    for (std::size_t i = 0; i < source->parameters().size(); ++i, ++k) {
+      Parameter& parameter = s.parameters[static_cast<std::size_t>(k)];
+      s.typical(k) = parameter.prior_scale;
+      parameter.prior = model.values(k);
+      parameter.prior_scale *= unknown ? kUnknownWidening : 1;
+      s.scale(k) = parameter.prior_scale;
+      s.prior(k) = parameter.prior / parameter.prior_scale;
+    }
   }
   return s;
 }
@@ -213,8 +231,9 @@ std::string joined(const std::vector<std::string>& names) {
 UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd& direction, const Scaled& s) {
   std::vector<std::size_t> order(s.parameters.size());
   std::iota(order.begin(), order.end(), 0u);
-  const auto weight = [&](std::size_t i) { return std::abs(direction(static_cast<Eigen::Index>(i))); };
-  // Compared in what they do: a wide prior does not make a parameter matter more.
+  // Compared in typical units: a wide prior does not make a parameter matter less.
+  const Eigen::VectorXd part = direction.cwiseProduct(s.scale).cwiseQuotient(s.typical).normalized();
+  const auto weight = [&](std::size_t i) { return std::abs(part(static_cast<Eigen::Index>(i))); };
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return weight(a) > weight(b); });
   UnidentifiableCombination combination;
   combination.singular_value = singular_value;
@@ -273,8 +292,15 @@ Status locate_unknown(PhysicalModel& model, const MeasurementBatch& batch) {
         model.tools[tool] = make_pose(Matrix3::Identity(), *point);
       }
     } else {
-      const Result<BaseAndTool> found =
-          full ? locate_base_and_tool(X_WT, X_BF_full) : locate_base_and_tool_point(p_W, X_BF);
+      Result<BaseAndTool> found = full ? locate_base_and_tool(X_WT, X_BF_full) : locate_base_and_tool_point(p_W, X_BF);
+      if (full && !found) {  // too few axes of rotation for the orientations alone; the positions still tell the base
+        found = locate_base_and_tool_point(p_W, X_BF);
+        if (found) {
+          std::vector<Pose> X_WF;
+          for (const Pose& X : X_BF_full) X_WF.push_back(found->X_WB * X);
+          found->X_FT.linear() = locate_tool(X_WT, X_WF)->linear();
+        }
+      }
       if (!found) return tl::make_unexpected(found.error());
       model.X_WB = found->X_WB;
       model.tools[tool] = found->X_FT;
@@ -282,10 +308,6 @@ Status locate_unknown(PhysicalModel& model, const MeasurementBatch& batch) {
     base_known = true;
   }
   return {};
-}
-
-bool anything_unknown(const Cell& cell) {
-  return !cell.X_WB || std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
 }
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
@@ -349,12 +371,9 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   }
   result.condition_number = result.rank > 0 ? seen.singular_values(P - 1) / least : 0;
   for (Eigen::Index i = 0; i < P; ++i) {
-    double from_prior = 0;
-    for (Eigen::Index k = 0; k < P; ++k) {
-      if (seen.singular_values(k) < 1) from_prior += variance(k) * seen.directions(i, k) * seen.directions(i, k);
-    }
-    result.parameters.push_back({s.parameters[static_cast<std::size_t>(i)], result.model.values(i),
-                                 std::sqrt(result.covariance(i, i)), from_prior < 0.5 * scaled_covariance(i, i)});
+    const Parameter& parameter = s.parameters[static_cast<std::size_t>(i)];
+    const double stddev = std::sqrt(result.covariance(i, i));
+    result.parameters.push_back({parameter, result.model.values(i), stddev, stddev < kIdentifiedShare * s.typical(i)});
   }
   return result;
 }
@@ -364,8 +383,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   if (Status located = locate_unknown(model, batch); !located) return located;
   std::vector<std::string> free;
   if (!model.cell->X_WB) free.emplace_back("base");
-  if (std::any_of(model.cell->tools.begin(), model.cell->tools.end(), [](const auto& t) { return !t.second; }) &&
-      model.cell->tools.size() == 1) {
+  if (has_unknown_tool(*model.cell) && model.cell->tools.size() == 1) {
     free.emplace_back("tool");
   }
   if (free.empty()) return {};
@@ -386,18 +404,47 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   return {};
 }
 
+/// A known base to be corrected starts, and has its prior, where SVD localisation of the nominal chain puts it, eqs.
+/// (3.8)-(3.10).
+void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    if (source->name() == "base") break;
+    first += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  if (first == model.values.size()) return;
+  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
+  Eigen::Matrix3Xd measured(3, n);
+  Eigen::Matrix3Xd nominal(3, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    measured.col(i) = model.X_WB.inverse() * m.p_W;
+    nominal.col(i) = model.X_WB.inverse() * model.nominal_pose_W(m.context).translation();
+  }
+  const Result<Pose> X_BB = fit_transform(measured, nominal);
+  if (!X_BB) return;  // too few points to localise: the nominal base is the start
+  const Vector3 zyx = X_BB->linear().eulerAngles(2, 1, 0);
+  const bool flipped = std::abs(zyx(1)) > kPi / 2;  // the other triple of the same rotation
+  model.values.segment<3>(first) = X_BB->translation();
+  model.values.segment<3>(first + 3) =
+      flipped ? Vector3(zyx(0) - std::copysign(kPi, zyx(0)), std::copysign(kPi, zyx(1)) - zyx(1),
+                        zyx(2) - std::copysign(kPi, zyx(2)))
+              : zyx;
+}
+
 }  // namespace
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
     return refused("batch {}: no measurements to calibrate with", problem.batch.id);
   CalibrationProblem complete = problem;
-  if (anything_unknown(*problem.model.cell)) {
+  if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {
       return tl::make_unexpected(
           Error{found.error().code, fmt::format("batch {}: {}", problem.batch.id, found.error().message)});
     }
   }
+  localise_base(complete.model, complete.batch);
   return identify(complete, options);
 }
 

@@ -23,7 +23,7 @@ struct IdentifiedParameter {
   Parameter parameter;
   double value = 0;         ///< SI
   double stddev = 0;        ///< SI, of the posterior
-  bool identified = false;  ///< false: the data say no more of it than the prior did
+  bool identified = false;  ///< false: more than half of the prior's standard deviation is left
 };
 
 /// A direction in parameter space that the data do not show (singular value below 1 in prior units).

@@ -8,7 +8,9 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLeastSpread = 1e-6;  // ratio of singular values below which points or rotations lie too close
+constexpr double kLeastSpread = 1e-6;   // ratio of singular values below which points lie on a line
+// rad^2: turning by less than 10 mrad is not told from the errors of the nominal chain.
+constexpr double kLeastTurning = 1e-4;
 constexpr int kMaxAlternations = 10000;
 
 /// The point t with R_i t ~ difference_i for all poses: the mean of R_iᵀ difference_i.
@@ -46,7 +48,7 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
   }
   const Eigen::JacobiSVD<Eigen::Matrix<double, 9, 9>> svd(K, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double count = static_cast<double>(X_WT.size());
-  if (!(svd.singularValues()(0) - svd.singularValues()(1) > 1e-4 * count)) {
+  if (!(svd.singularValues()(0) - svd.singularValues()(1) > kLeastTurning * count)) {
     return refused("base and tool: the poses turn too little about different axes to find both ({} poses)",
                    X_WT.size());
   }
@@ -70,7 +72,7 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
     right += row.transpose() * (X_WT[i].translation() - found.X_WB.linear() * X_BF[i].translation());
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(normal);
-  if (!(eigen.eigenvalues()(0) > 1e-8 * eigen.eigenvalues()(5))) {
+  if (!(eigen.eigenvalues()(0) > kLeastTurning * eigen.eigenvalues()(5))) {
     return refused("base and tool: the poses turn too little to tell the tool from the base ({} poses)", X_WT.size());
   }
   const Vector6 solution = normal.ldlt().solve(right);
@@ -86,7 +88,8 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
   for (const Pose& X : X_BF) mean_R += X.linear();
   mean_R /= static_cast<double>(X_BF.size());
   const double turning = 1 - Eigen::JacobiSVD<Matrix3>(mean_R).singularValues()(1);
-  if (!(turning > 1e-4)) return refused("base and tool: the flange turns too little to tell the tool from the base");
+  if (!(turning > kLeastTurning))
+    return refused("base and tool: the flange turns too little to tell the tool from the base");
   BaseAndTool found;
   Eigen::Matrix3Xd p_B(3, p_W.cols());
   for (int round = 0; round < kMaxAlternations; ++round) {
@@ -94,7 +97,8 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
     const Result<Pose> X_WB = fit_transform(p_W, p_B);
     if (!X_WB) return tl::make_unexpected(X_WB.error());
     found.X_WB = *X_WB;
-    // The step for the tool point, given the base, with the base translation free: variable projection.
+    // The tool point, given the base's rotation, with the base's translation free. What the flange's turning leaves
+    // open (a shift along its only axis) stays at its smallest.
     Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
     Vector6 right = Vector6::Zero();
     for (std::size_t i = 0; i < X_BF.size(); ++i) {
@@ -103,7 +107,10 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
       normal += row.transpose() * row;
       right += row.transpose() * (p_W.col(static_cast<int>(i)) - found.X_WB.linear() * X_BF[i].translation());
     }
-    const Vector6 solution = normal.ldlt().solve(right);
+    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix<double, 6, 6>> decomposition;
+    decomposition.setThreshold(kLeastTurning);
+    decomposition.compute(normal);
+    const Vector6 solution = decomposition.solve(right);
     const double step = (solution.tail<3>() - found.X_FT.translation()).norm();
     found.X_WB.translation() = solution.head<3>();
     found.X_FT.translation() = solution.tail<3>();

@@ -22,8 +22,9 @@ struct BaseAndTool {
 };
 [[nodiscard]] Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF);
 
-/// X_WB and the tool point p_FT from positions alone: alternates fit_transform() with a linear solve for the point
-/// until the step is below 1e-9 m. Refuses fewer than 6 poses and poses whose rotations leave the point undetermined.
+/// X_WB and the tool point p_FT from positions alone (the tool's rotation stays identity): alternates fit_transform()
+/// with a linear solve for the point until the step is below 1e-9 m. Where the flange turns about one axis only, the
+/// shift of the point along it is left at its smallest. Refuses fewer than 6 poses and a flange that does not turn.
 [[nodiscard]] Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W,
                                                              const std::vector<Pose>& X_BF);
 

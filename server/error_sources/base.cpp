@@ -6,7 +6,7 @@ namespace trammel {
 namespace {
 
 /// The base stands elsewhere than believed: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0) Rx(alpha0), eq. (3.5).
-/// The prior is wide: where a robot stands is found by measuring, not believed.
+/// Calibration centres the prior on the localised base: where a robot stands is measured, not believed.
 class Base final : public ErrorSource {
  public:
   std::string name() const override { return "base"; }
@@ -30,9 +30,9 @@ class Base final : public ErrorSource {
   }
 
  private:
-  const std::vector<Parameter> parameters_ = {length_parameter("x0", 100),   length_parameter("y0", 100),
-                                              length_parameter("z0", 100),   angle_parameter("gamma0", 0.1),
-                                              angle_parameter("beta0", 0.1), angle_parameter("alpha0", 0.1)};
+  const std::vector<Parameter> parameters_ = {length_parameter("x0", 2),      length_parameter("y0", 2),
+                                              length_parameter("z0", 2),      angle_parameter("gamma0", 5e-3),
+                                              angle_parameter("beta0", 5e-3), angle_parameter("alpha0", 5e-3)};
 };
 
 }  // namespace
