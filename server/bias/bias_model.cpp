@@ -108,6 +108,9 @@ struct BiasModel::Fitted {
   BiasFitReport report;
   std::vector<GaussianProcess> outputs;  // empty for `none`
   Vector3 stddev = Vector3::Zero();      // of the residual itself: all that `none` knows
+
+  static Result<std::shared_ptr<Fitted>> from(const BiasState& state);
+  MatrixXd leave_one_out_mean_B() const;
 };
 
 namespace {
@@ -141,7 +144,7 @@ BiasFitReport report_of_none(const MatrixXd& residual_B, const Vector3& stddev) 
 
 }  // namespace
 
-Result<BiasModel> BiasModel::restore(const BiasState& state) {
+Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state) {
   if (const Status fine = check(state.q, state.residual_B, state.sigma); !fine)
     return tl::make_unexpected(fine.error());
   auto fitted = std::make_shared<Fitted>();
@@ -150,7 +153,7 @@ Result<BiasModel> BiasModel::restore(const BiasState& state) {
     fitted->stddev = state.residual_B.colwise().squaredNorm().transpose() / static_cast<double>(state.q.rows());
     fitted->stddev = fitted->stddev.cwiseSqrt().eval();
     fitted->report = report_of_none(state.residual_B, fitted->stddev);
-    return BiasModel(std::move(fitted));
+    return fitted;
   }
   const auto kernel = find_kernel(state.kernel);
   if (!kernel) return tl::make_unexpected(kernel.error());
@@ -170,9 +173,21 @@ Result<BiasModel> BiasModel::restore(const BiasState& state) {
       return refused("bias output {}: the covariance of {} observations is not positive definite", kAxis[d], y.size());
     fitted->outputs.push_back(*std::move(output));
   }
-  BiasModel model(fitted);
-  fitted->report = report_of(fitted->outputs, state.residual_B - model.leave_one_out_mean_B());
-  return model;
+  fitted->report = report_of(fitted->outputs, state.residual_B - fitted->leave_one_out_mean_B());
+  return fitted;
+}
+
+MatrixXd BiasModel::Fitted::leave_one_out_mean_B() const {
+  MatrixXd mean = MatrixXd::Zero(state.q.rows(), kOutputs);
+  for (std::size_t d = 0; d < outputs.size(); ++d) {
+    const auto column = static_cast<Index>(d);
+    mean.col(column) = outputs[d].leave_one_out_mean().array() + state.offset[column];
+  }
+  return mean;
+}
+
+Result<BiasModel> BiasModel::restore(const BiasState& state) {
+  return Fitted::from(state).map([](std::shared_ptr<Fitted> fitted) { return BiasModel(std::move(fitted)); });
 }
 
 Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& options) {
@@ -205,12 +220,11 @@ Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& 
     state.hyperparameters.col(speaking[i]) = as_column(found.outputs[i]);
 
   // The same way in as a stored model, so that a restored one cannot differ.
-  Result<BiasModel> model = restore(state);
-  if (!model) return model;
-  auto fitted = std::make_shared<Fitted>(*model->fitted_);
-  fitted->report.starts_at_best = found.starts_at_best;
-  fitted->report.evaluations = found.evaluations;
-  return BiasModel(std::move(fitted));
+  const auto fitted = Fitted::from(state);
+  if (!fitted) return tl::make_unexpected(fitted.error());
+  (*fitted)->report.starts_at_best = found.starts_at_best;
+  (*fitted)->report.evaluations = found.evaluations;
+  return BiasModel(*fitted);
 }
 
 Vector3 BiasModel::mean_B(const JointVector& q) const { return mean_all_B(q.transpose()).row(0); }
@@ -256,14 +270,7 @@ VectorXd BiasModel::leave_one_out_prior_share() const {
   return share;
 }
 
-MatrixXd BiasModel::leave_one_out_mean_B() const {
-  MatrixXd mean = MatrixXd::Zero(fitted_->state.q.rows(), kOutputs);
-  if (fitted_->outputs.empty()) return mean;
-  for (Index d = 0; d < kOutputs; ++d) {
-    mean.col(d) = fitted_->outputs[static_cast<std::size_t>(d)].leave_one_out_mean().array() + fitted_->state.offset[d];
-  }
-  return mean;
-}
+MatrixXd BiasModel::leave_one_out_mean_B() const { return fitted_->leave_one_out_mean_B(); }
 
 const BiasState& BiasModel::state() const { return fitted_->state; }
 

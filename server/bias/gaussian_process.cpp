@@ -23,7 +23,9 @@ constexpr double kLogRatioMin =
 
 const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
 
-FeatureBlock rows_of(const MatrixXd& features, Index first, Index count) {
+// Of an AlignedMatrix or of a MatrixXd.
+template <typename Table>
+FeatureBlock rows_of(const Table& features, Index first, Index count) {
   return {features.data() + first, count, features.rows()};
 }
 
@@ -31,8 +33,8 @@ FeatureBlock rows_of(const MatrixXd& features, Index first, Index count) {
 Index leading_dimension(Index rows) { return rows % 64 == 0 ? rows + kTargetBlock : rows; }
 
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
-void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& features, double ratio,
-                        const VectorXd& noise_shape, const MatrixXd& y, MatrixXd* matrix) {
+void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
+                        const VectorXd& noise_shape, const MatrixXd& y, AlignedMatrix* matrix) {
   const Index n = noise_shape.size();
   const Index ld = matrix->rows();
   for (Index j = 0; j < n; j += kTile) {
@@ -44,15 +46,26 @@ void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const 
   }
   for (Index j = 0; j < n; ++j) {
     (*matrix)(j, j) += ratio * noise_shape[j];
-    matrix->col(j).segment(n, y.cols()) = y.row(j);
-    matrix->col(j).tail(ld - n - y.cols()).setZero();
+    matrix->map().col(j).segment(n, y.cols()) = y.row(j);
+    matrix->map().col(j).tail(ld - n - y.cols()).setZero();
   }
-  matrix->rightCols(matrix->cols() - n).setZero();
+  matrix->map().rightCols(matrix->cols() - n).setZero();
 }
 
-MatrixXd augmented_storage(Index n, Index outputs) {
+AlignedMatrix augmented_storage(Index n, Index outputs) {
   const Index rows = padded_rows(n + outputs);
-  return MatrixXd::Zero(leading_dimension(rows), rows);
+  return {leading_dimension(rows), rows};
+}
+
+AlignedMatrix feature_table(const Kernel& kernel, const MatrixXd& q) {
+  return {padded_rows(q.rows()), kernel.feature_count(q.cols())};
+}
+
+// Targets need no padding: their rows are taken one by one.
+MatrixXd target_features(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
+  MatrixXd table(q.rows(), kernel.feature_count(q.cols()));
+  kernel.features(parameters, q, table.data(), table.rows());
+  return table;
 }
 
 }  // namespace
@@ -61,7 +74,9 @@ ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpD
     : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)) {
   TRAMMEL_CHECK(data_.y.rows() == size() && data_.noise_shape.size() == size());
   matrix_ = augmented_storage(size(), data_.y.cols());
-  work_.resize(numerics().work_size(size() + data_.y.cols()));
+  features_ = feature_table(*kernel_, data_.q);
+  alpha_ = {padded_rows(size()), data_.y.cols()};
+  work_ = {numerics().work_size(size() + data_.y.cols()), 1};
 }
 
 bool ProfiledLikelihood::evaluate(const VectorXd& parameters, Evaluation* out) {
@@ -74,20 +89,19 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, Evaluation* out) {
   const double ratio = std::exp(log_ratio);
 
   const VectorXd kernel_parameters = parameters.head(count);
-  features_ = kernel_->features(kernel_parameters, data_.q);
+  kernel_->features(kernel_parameters, data_.q, features_.data(), features_.rows());
   assemble_augmented(*kernel_, kernel_parameters, features_, ratio, data_.noise_shape, data_.y, &matrix_);
   double log_det = 0;
   if (!numerics().sweep(n, outputs, matrix_.data(), matrix_.rows(), work_.data(), &log_det)) return false;
 
-  alpha_ = MatrixXd::Zero(padded_rows(n), outputs);
-  alpha_.topRows(n) = matrix_.block(n, 0, outputs, n).transpose();
+  alpha_.map().topRows(n) = matrix_.map().block(n, 0, outputs, n).transpose();
   const auto points = static_cast<double>(n);
   signal_variance_.resize(outputs);
   VectorXd weights(outputs);
   out->value = 0.5 * static_cast<double>(outputs) * log_det;
   double noise_slope = 0;  // of the noise prior, along log η at fixed σ_f²
   for (Index d = 0; d < outputs; ++d) {
-    const double quadratic = data_.y.col(d).dot(alpha_.col(d).head(n));
+    const double quadratic = data_.y.col(d).dot(alpha_.map().col(d).head(n));
     const double variance = std::max(quadratic, 0.0) / points + kSmallestSignal * kSmallestSignal;
     signal_variance_[d] = variance;
     out->value += 0.5 * points * (std::log(variance) + 1.0 + kLogTwoPi);
@@ -117,14 +131,15 @@ VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, 
   const Index ld = matrix_.rows();
   const auto outputs = static_cast<double>(data_.y.cols());
   VectorXd gradient = VectorXd::Zero(parameters.size() + 1);
-  MatrixXd g(kTile, kTile);
+  AlignedMatrix tile(kTile, kTile);
+  Eigen::Map<MatrixXd> g = tile.map();
   VectorXd column_weights(output_weights.size());
   for (Index j = 0; j < n; j += kTile) {
     const Index cols = std::min(kTile, n - j);
     for (Index i = j; i < n; i += kTile) {
       const Index rows = std::min(kTile, n - i);
       for (Index c = 0; c < cols; ++c) {
-        column_weights = output_weights.cwiseProduct(alpha_.row(j + c).transpose());
+        column_weights = output_weights.cwiseProduct(alpha_.map().row(j + c).transpose());
         numerics().weight_column(rows, -outputs, matrix_.data() + i + (j + c) * ld, column_weights.size(),
                                  alpha_.data() + i, alpha_.rows(), column_weights.data(), g.col(c).data());
         g.col(c).tail(kTile - rows).setZero();
@@ -142,7 +157,7 @@ VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, 
 
 double ProfiledLikelihood::leave_one_out_rms() const {
   double total = 0;
-  for (Index i = 0; i < size(); ++i) total += alpha_.row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
+  for (Index i = 0; i < size(); ++i) total += alpha_.map().row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
   return std::sqrt(total / static_cast<double>(size()));
 }
 
@@ -154,32 +169,34 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   gp.kernel_ = std::move(kernel);
   gp.parameters_ = hyperparameters.kernel;
   gp.size_ = n;
-  gp.features_ = gp.kernel_->features(gp.parameters_, q);
+  gp.features_ = feature_table(*gp.kernel_, q);
+  gp.kernel_->features(gp.parameters_, q, gp.features_.data(), gp.features_.rows());
   gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
   gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
   const double ratio = gp.noise_variance_ / gp.signal_variance_;
 
-  MatrixXd matrix = augmented_storage(n, 1);
-  VectorXd work(numerics().work_size(n + 1));
+  AlignedMatrix matrix = augmented_storage(n, 1);
+  AlignedMatrix work(numerics().work_size(n + 1), 1);
   assemble_augmented(*gp.kernel_, gp.parameters_, gp.features_, ratio, noise_shape, y, &matrix);
   VectorXd prior(n);
-  for (Index i = 0; i < n; ++i) prior[i] = matrix(i, i) - ratio * noise_shape[i];
+  gp.kernel_->diagonal(gp.parameters_, rows_of(gp.features_, 0, n), prior.data());
   double log_det = 0;
   if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &log_det)) return std::nullopt;
 
-  gp.weights_ = VectorXd::Zero(padded_rows(n));
-  gp.weights_.head(n) = -matrix.row(n).head(n).transpose();
-  gp.root_.resize(static_cast<std::size_t>(numerics().packed_size(n)));
+  gp.weights_ = {padded_rows(n), 1};
+  const auto weights = gp.weights_.map().col(0);
+  gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
+  gp.root_ = {numerics().packed_size(n), 1};
   numerics().pack_lower(n, matrix.data(), matrix.rows(), gp.root_.data());
 
   const auto points = static_cast<double>(n);
-  gp.log_likelihood_ = -0.5 * (y.dot(gp.weights_.head(n)) / gp.signal_variance_ + log_det +
+  gp.log_likelihood_ = -0.5 * (y.dot(weights.head(n)) / gp.signal_variance_ + log_det +
                                points * (std::log(gp.signal_variance_) + kLogTwoPi));
   gp.leave_one_out_mean_.resize(n);
   gp.leave_one_out_share_.resize(n);
   for (Index i = 0; i < n; ++i) {
-    const double inverse_diagonal = matrix.col(i).segment(i, n - i).squaredNorm();  // of M⁻¹ = L⁻ᵀ L⁻¹
-    gp.leave_one_out_mean_[i] = y[i] - gp.weights_[i] / inverse_diagonal;
+    const double inverse_diagonal = matrix.map().col(i).segment(i, n - i).squaredNorm();  // of M⁻¹ = L⁻ᵀ L⁻¹
+    gp.leave_one_out_mean_[i] = y[i] - weights[i] / inverse_diagonal;
     const double share = (1.0 / inverse_diagonal - ratio * noise_shape[i]) / prior[i];
     gp.leave_one_out_share_[i] = std::clamp(share, 0.0, 1.0);
   }
@@ -187,30 +204,29 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
 }
 
 void GaussianProcess::mean(const MatrixXd& q, double* out) const {
-  const MatrixXd targets = kernel_->features(parameters_, q);
+  const MatrixXd targets = target_features(*kernel_, parameters_, q);
   kernel_->weighted_sum(parameters_, rows_of(features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(), out);
 }
 
 std::vector<GaussianProcess::Variance> GaussianProcess::variance(const MatrixXd& q) const {
-  const MatrixXd targets = kernel_->features(parameters_, q);
+  const MatrixXd targets = target_features(*kernel_, parameters_, q);
   const Index block = q.rows() == 1 ? 1 : kTargetBlock;
   const Index ld = padded_rows(size_);
-  MatrixXd cross = MatrixXd::Zero(ld, block);
+  AlignedMatrix cross(ld, block);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> interleaved(size_, block);
+  VectorXd prior(q.rows());
+  kernel_->diagonal(parameters_, rows_of(targets, 0, q.rows()), prior.data());
   std::vector<Variance> variances(static_cast<std::size_t>(q.rows()));
   for (Index first = 0; first < q.rows(); first += block) {
     const Index count = std::min(block, q.rows() - first);
     kernel_->tile(parameters_, rows_of(features_, 0, size_), rows_of(targets, first, count), cross.data(), ld);
-    interleaved = cross.topRows(size_);
+    interleaved = cross.map().topRows(size_);
     double explained[kTargetBlock];
     numerics().square_norms(size_, root_.data(), block, interleaved.data(), explained);
     for (Index j = 0; j < count; ++j) {
-      double padded[kRowPadding];
-      const FeatureBlock target = rows_of(targets, first + j, 1);
-      kernel_->tile(parameters_, target, target, padded, kRowPadding);
-      const double prior = signal_variance_ * padded[0];
-      const double posterior = std::clamp(prior - signal_variance_ * explained[j], 0.0, prior);
-      variances[static_cast<std::size_t>(first + j)] = {posterior, prior};
+      const double prior_variance = signal_variance_ * prior[first + j];
+      const double posterior = std::clamp(prior_variance - signal_variance_ * explained[j], 0.0, prior_variance);
+      variances[static_cast<std::size_t>(first + j)] = {posterior, prior_variance};
     }
   }
   return variances;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/bias/aligned_matrix.h"
 #include "server/bias/bfgs.h"
 #include "server/bias/kernel.h"
 
@@ -46,17 +47,16 @@ class ProfiledLikelihood {
   [[nodiscard]] const GpData& data() const { return data_; }
 
  private:
-  void assemble(const Eigen::VectorXd& parameters, double ratio);
   [[nodiscard]] Eigen::VectorXd contract(const Eigen::VectorXd& parameters, double ratio,
                                          const Eigen::VectorXd& output_weights);
 
   std::shared_ptr<const Kernel> kernel_;
   GpData data_;
   GpPrior prior_;
-  Eigen::MatrixXd matrix_;  // [M Yᵀ], then [-M⁻¹; Y M⁻¹]; lower triangle
-  Eigen::MatrixXd features_;
-  Eigen::MatrixXd alpha_;  // M⁻¹ Y, padded
-  Eigen::VectorXd work_;
+  AlignedMatrix matrix_;  // [M Yᵀ], then [-M⁻¹; Y M⁻¹]; lower triangle
+  AlignedMatrix features_;
+  AlignedMatrix alpha_;  // M⁻¹ Y
+  AlignedMatrix work_;
   Eigen::VectorXd signal_variance_;
 };
 
@@ -100,9 +100,9 @@ class GaussianProcess {
   std::shared_ptr<const Kernel> kernel_;
   Eigen::VectorXd parameters_;
   Eigen::Index size_ = 0;
-  Eigen::MatrixXd features_;
-  Eigen::VectorXd weights_;   // M⁻¹ y, padded
-  std::vector<double> root_;  // packed L⁻¹, M = L Lᵀ
+  AlignedMatrix features_;
+  AlignedMatrix weights_;  // M⁻¹ y
+  AlignedMatrix root_;     // packed L⁻¹, M = L Lᵀ
   double signal_variance_ = 0;
   double noise_variance_ = 0;
   double log_likelihood_ = 0;

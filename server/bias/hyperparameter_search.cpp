@@ -161,7 +161,7 @@ class Search {
     const Index sizes[] = {std::min(all(), kCarryPoints), std::max(share, kCarryPoints), all()};
     const BfgsOptions limits[] = {{.max_evaluations = 30, .tolerance = 0.02},
                                   {.max_evaluations = 10, .tolerance = 0.05},
-                                  {.max_evaluations = 4, .tolerance = 0.1}};
+                                  {.max_evaluations = 3, .tolerance = 0.3}};
     const auto outputs = static_cast<double>(data_.y.cols());
     Optimum now = shared;
     now.inverse_hessian *= outputs;

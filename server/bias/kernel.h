@@ -8,7 +8,8 @@
 /// Covariance functions of joint vectors (source eqs. 3.18-3.24), without amplitude: σ_f² is the process', not theirs.
 namespace trammel {
 
-/// A table of features: one column per feature, one row per joint vector; the rows that pad it are zero.
+/// Rows of a table of features: one column per feature, one row per joint vector. As `a` below the block must be
+/// followed by the padding of its table (padded_rows) or by more rows.
 struct FeatureBlock {
   const double* data = nullptr;
   Eigen::Index rows = 0;
@@ -33,9 +34,12 @@ class Kernel {
   [[nodiscard]] virtual Eigen::Index feature_count(Eigen::Index joints) const = 0;
   [[nodiscard]] virtual SearchBox search_box(const Eigen::MatrixXd& q) const = 0;
 
-  /// Joint vectors (rows of `q`, rad) as features, padded_rows(N) x feature_count.
-  [[nodiscard]] virtual Eigen::MatrixXd features(const Eigen::VectorXd& parameters, const Eigen::MatrixXd& q) const = 0;
+  /// Joint vectors (rows of `q`, rad) as features, into the first rows of a table with leading dimension `ld`.
+  virtual void features(const Eigen::VectorXd& parameters, const Eigen::MatrixXd& q, double* table,
+                        Eigen::Index ld) const = 0;
 
+  /// k(x, x) of every row of `a`.
+  virtual void diagonal(const Eigen::VectorXd& parameters, const FeatureBlock& a, double* k) const = 0;
   /// k(i, j) of rows i of `a` and j of `b`, column-major with leading dimension `ldk` >= padded_rows(a.rows).
   virtual void tile(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,
                     Eigen::Index ldk) const = 0;

@@ -10,7 +10,7 @@ constexpr Index kLanes = TRAMMEL_VECTOR_LANES;
 constexpr Index kTileVectors = 3;                     // micro-tile rows, in vectors
 constexpr Index kTileRows = kTileVectors * kLanes;    // 24, 12, 6: all divide kRowPadding
 constexpr Index kTileColumns = TRAMMEL_TILE_COLUMNS;  // 8, 4, 4: accumulators fill the register file
-constexpr Index kMaxBlock = 64;
+constexpr Index kMaxBlock = 96;
 
 typedef double Vec __attribute__((vector_size(kLanes * sizeof(double))));
 typedef double Loose __attribute__((vector_size(kLanes * sizeof(double)), aligned(8), may_alias));
@@ -19,6 +19,17 @@ typedef long long Bits __attribute__((vector_size(kLanes * sizeof(double))));
 inline Vec load(const double* p) { return *reinterpret_cast<const Loose*>(p); }
 inline void store(double* p, Vec v) { *reinterpret_cast<Loose*>(p) = v; }
 inline Vec broadcast(double x) { return Vec{} + x; }
+// Masked, since the plain AVX-512 intrinsics of GCC 12 warn of an operand that they leave undefined.
+#if TRAMMEL_VECTOR_LANES == 8
+inline Vec largest(Vec a, Vec b) { return _mm512_maskz_max_pd(0xff, a, b); }
+inline Vec square_root(Vec x) { return _mm512_maskz_sqrt_pd(0xff, x); }
+#elif TRAMMEL_VECTOR_LANES == 4
+inline Vec largest(Vec a, Vec b) { return _mm256_max_pd(a, b); }
+inline Vec square_root(Vec x) { return _mm256_sqrt_pd(x); }
+#else
+inline Vec largest(Vec a, Vec b) { return _mm_max_pd(a, b); }
+inline Vec square_root(Vec x) { return _mm_sqrt_pd(x); }
+#endif
 inline double sum(Vec v) {
   double total = 0;
   for (Index i = 0; i < kLanes; ++i) total += v[i];
@@ -30,8 +41,7 @@ inline Index round_up(Index n, Index step) { return (n + step - 1) / step * step
 // e^x for x <= 0, 4e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n ln 2 + r, |r| <=
 // ln 2 / 2, Chebyshev polynomial of degree 10 in r; adding 1.5 * 2^52 leaves n in the low bits of the mantissa.
 inline Vec exp_of_negative(Vec x) {
-  const Vec lowest = broadcast(-708.0);
-  x = x > lowest ? x : lowest;
+  x = largest(x, broadcast(-708.0));
   constexpr double kShift = 0x1.8p52;
   const Vec shifted = x * 0x1.71547652b82fep+0 + kShift;
   const Vec n = shifted - kShift;
@@ -48,12 +58,6 @@ inline Vec exp_of_negative(Vec x) {
   return reinterpret_cast<Vec>(reinterpret_cast<Bits>(p) + (reinterpret_cast<Bits>(shifted) << 52));
 }
 
-inline Vec square_root(Vec x) {
-  Vec root = x;
-  for (Index i = 0; i < kLanes; ++i) root[i] = __builtin_sqrt(x[i]);
-  return root;
-}
-
 // ---- covariance ------------------------------------------------------------------------------------------------
 
 // Value at h = r²/2 and, for the gradient, s(h) with dk/dlog l_d = s(h) (z_d - z'_d)².
@@ -63,23 +67,23 @@ struct SquaredExponential {
 };
 struct Matern32 {
   static Vec value(Vec h) {
-    const Vec t = square_root(6.0 * h);
+    const Vec t = square_root(6.0 * largest(h, Vec{}));
     return (1.0 + t) * exp_of_negative(-t);
   }
-  static Vec slope(Vec h) { return 3.0 * exp_of_negative(-square_root(6.0 * h)); }
+  static Vec slope(Vec h) { return 3.0 * exp_of_negative(-square_root(6.0 * largest(h, Vec{}))); }
 };
 struct Matern52 {
   static Vec value(Vec h) {
-    const Vec t = square_root(10.0 * h);
+    const Vec t = square_root(10.0 * largest(h, Vec{}));
     return (1.0 + t + t * t * (1.0 / 3.0)) * exp_of_negative(-t);
   }
   static Vec slope(Vec h) {
-    const Vec t = square_root(10.0 * h);
+    const Vec t = square_root(10.0 * largest(h, Vec{}));
     return (5.0 / 3.0) * (1.0 + t) * exp_of_negative(-t);
   }
 };
 
-// r²/2 = |z|²/2 + |z'|²/2 - z·z' for kUnroll vectors of rows at once; rounding must not make it negative.
+// r²/2 = |z|²/2 + |z'|²/2 - z·z' for kCount vectors of rows at once; rounding may make it a little negative.
 constexpr Index kUnroll = 4;
 
 template <Index kCount>
@@ -90,8 +94,6 @@ inline void half_square_distance(Index dims, const double* a, Index lda, const d
     const Vec z = broadcast(b[d * ldb]);
     for (Index u = 0; u < kCount; ++u) h[u] -= load(a + d * lda + u * kLanes) * z;
   }
-  const Vec zero = {};
-  for (Index u = 0; u < kCount; ++u) h[u] = h[u] > zero ? h[u] : zero;
 }
 
 template <typename Shape, Index kCount>
@@ -303,13 +305,13 @@ void pack_columns_transposed(Index cols, Index depth, const double* t, Index ldt
 // A diagonal block of `size` <= kMaxBlock, factored: lower-triangular inverse and its transpose, zero-padded to
 // kMaxBlock columns so that they can be packed.
 struct Block {
-  double inverse[kMaxBlock * kMaxBlock];    // W = L⁻¹, column-major
-  double transpose[kMaxBlock * kMaxBlock];  // Wᵀ, column-major
-  double packed[kMaxBlock * kMaxBlock];
+  alignas(64) double inverse[kMaxBlock * kMaxBlock];    // W = L⁻¹, column-major
+  alignas(64) double transpose[kMaxBlock * kMaxBlock];  // Wᵀ, column-major
+  alignas(64) double packed[kMaxBlock * kMaxBlock];
 };
 
 bool factor_block(Index size, const double* a, Index ld, Block* block, double* log_det) {
-  double lower[kMaxBlock * kMaxBlock];
+  alignas(64) double lower[kMaxBlock * kMaxBlock];
   const Index end = round_up(size, kLanes);
   for (Index j = 0; j < size; ++j) {
     for (Index i = 0; i < end; ++i) lower[i + j * kMaxBlock] = i < size && i >= j ? a[i + j * ld] : 0.0;
@@ -350,18 +352,24 @@ bool factor_block(Index size, const double* a, Index ld, Block* block, double* l
   return true;
 }
 
-// out (rows x size) = packed_a (rows x size) * B, where `t` is Bᵀ with leading dimension kMaxBlock.
+// out (rows x size) = packed_a (rows x size) * B, where `t` is Bᵀ with leading dimension kMaxBlock; B is upper or lower
+// triangular, and the zero half is not multiplied.
+template <bool kUpper>
 void multiply_block(Index rows, Index size, const double* packed_a, const double* t, double* packed_b, double* out,
                     Index ldo) {
   const Index columns = round_up(size, kTileColumns);
   pack_columns_transposed(columns, size, t, kMaxBlock, packed_b);
   for (Index i = 0; i < rows; i += kTileRows) {
-    for (Index j = 0; j < columns; j += kTileColumns)
-      micro_tile<false>(size, packed_a + i * size, packed_b + j * size, 1.0, out + i + j * ldo, ldo);
+    for (Index j = 0; j < columns; j += kTileColumns) {
+      const Index first = kUpper ? 0 : j;
+      const Index depth = kUpper ? least(size, j + kTileColumns) : size - j;
+      micro_tile<false>(depth, packed_a + i * size + first * kTileRows, packed_b + j * size + first * kTileColumns, 1.0,
+                        out + i + j * ldo, ldo);
+    }
   }
 }
 
-Index block_size(Index n) { return n <= 400 ? 32 : n <= 1000 ? 48 : 64; }
+Index block_size(Index n) { return n <= 400 ? 32 : n <= 1000 ? 48 : n <= 1500 ? 64 : 96; }
 
 struct Workspace {
   double *panel, *factor, *packed_a, *packed_b;
@@ -399,14 +407,14 @@ bool sweep(Index n, Index extra, double* a, Index ld, double* work, double* log_
              static_cast<size_t>(rows - k - size) * sizeof(double));
     }
     pack_rows(rows, size, w.panel, rows, w.packed_a);
-    multiply_block(rows, size, w.packed_a, block.inverse, block.packed, w.factor, rows);  // T = A_:k L⁻ᵀ
+    multiply_block<true>(rows, size, w.packed_a, block.inverse, block.packed, w.factor, rows);  // T = A_:k L⁻ᵀ
     pack_rows(rows, size, w.factor, rows, w.packed_a);
     pack_columns_transposed(rows, size, w.factor, rows, w.packed_b);
     for (Index i = 0; i < rows; i += kTileRows) {
       for (Index j = 0; j < i + kTileRows; j += kTileColumns)
         micro_tile<true>(size, w.packed_a + i * size, w.packed_b + j * size, -1.0, a + i + j * ld, ld);
     }
-    multiply_block(rows, size, w.packed_a, block.transpose, block.packed, w.panel, rows);  // A_:k D = T L⁻¹
+    multiply_block<false>(rows, size, w.packed_a, block.transpose, block.packed, w.panel, rows);  // A_:k D = T L⁻¹
     for (Index i = 0; i < k; ++i) {
       for (Index c = 0; c < size; ++c) a[k + c + i * ld] = w.panel[i + c * rows];
     }
@@ -446,7 +454,7 @@ bool inverse_root(Index n, Index extra, double* a, Index ld, double* work, doubl
     // Transposed, row j of the factor is column j of the update: L_kk⁻¹ X_kj = W_kj before k, L_kk⁻¹ of the identity in
     // k, T_j = A_jk L_kk⁻ᵀ after k.
     pack_rows(rows, size, w.panel, rows, w.packed_a);
-    multiply_block(rows, size, w.packed_a, block.inverse, block.packed, w.factor, rows);
+    multiply_block<true>(rows, size, w.packed_a, block.inverse, block.packed, w.factor, rows);
     for (Index c = 0; c < size; ++c) {
       memcpy(w.factor + k + c * rows, block.transpose + c * kMaxBlock, static_cast<size_t>(size) * sizeof(double));
       for (Index i = 0; i <= k + c; ++i) a[k + c + i * ld] = w.factor[i + c * rows];

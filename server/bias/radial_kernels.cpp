@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "server/bias/kernel.h"
@@ -27,12 +28,21 @@ class RadialKernel : public Kernel {
   }
 
   // z = q / l, and |z|²/2 so that a squared distance is a dot product.
-  Eigen::MatrixXd features(const Eigen::VectorXd& parameters, const Eigen::MatrixXd& q) const override {
+  void features(const Eigen::VectorXd& parameters, const Eigen::MatrixXd& q, double* table,
+                Eigen::Index ld) const override {
+    const Eigen::VectorXd inverse_scale = (-parameters).array().exp();
     const Eigen::Index n = q.cols();
-    Eigen::MatrixXd table = Eigen::MatrixXd::Zero(padded_rows(q.rows()), n + 1);
-    for (Eigen::Index k = 0; k < n; ++k) table.col(k).head(q.rows()) = q.col(k) * std::exp(-parameters[k]);
-    for (Eigen::Index k = 0; k < n; ++k) table.col(n) += 0.5 * table.col(k).cwiseAbs2();
-    return table;
+    Eigen::Map<Eigen::VectorXd> half_square(table + n * ld, q.rows());
+    half_square.setZero();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      Eigen::Map<Eigen::VectorXd> z(table + k * ld, q.rows());
+      z = q.col(k) * inverse_scale[k];
+      half_square += 0.5 * z.cwiseAbs2();
+    }
+  }
+
+  void diagonal(const Eigen::VectorXd& /*parameters*/, const FeatureBlock& a, double* k) const override {
+    std::fill_n(k, a.rows, 1.0);
   }
 
   void tile(const Eigen::VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,

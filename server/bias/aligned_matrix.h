@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+
+namespace trammel {
+
+/// A column-major matrix of doubles, zero at first, that starts on a cache line; a large one asks for huge pages, since
+/// the sweep touches a page for each column and would live on address translation otherwise. Movable, not copyable.
+class AlignedMatrix {
+ public:
+  AlignedMatrix() = default;
+  AlignedMatrix(Eigen::Index rows, Eigen::Index cols);
+
+  [[nodiscard]] Eigen::Index rows() const { return rows_; }
+  [[nodiscard]] Eigen::Index cols() const { return cols_; }
+  [[nodiscard]] double* data() { return data_.get(); }
+  [[nodiscard]] const double* data() const { return data_.get(); }
+  [[nodiscard]] double& operator()(Eigen::Index row, Eigen::Index col) { return data_[index(row, col)]; }
+  [[nodiscard]] double operator()(Eigen::Index row, Eigen::Index col) const { return data_[index(row, col)]; }
+  [[nodiscard]] Eigen::Map<Eigen::MatrixXd> map() { return {data(), rows_, cols_}; }
+  [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> map() const { return {data(), rows_, cols_}; }
+
+ private:
+  struct Release {
+    void operator()(double* data) const;
+  };
+  [[nodiscard]] std::size_t index(Eigen::Index row, Eigen::Index col) const {
+    return static_cast<std::size_t>(row + col * rows_);
+  }
+
+  Eigen::Index rows_ = 0;
+  Eigen::Index cols_ = 0;
+  std::unique_ptr<double[], Release> data_;
+};
+
+}  // namespace trammel
