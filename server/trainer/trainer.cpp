@@ -11,6 +11,7 @@
 #include "server/base/check.h"
 #include "server/base/hash.h"
 #include "server/base/units.h"
+#include "server/bias/kernel.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/measurement.h"
 
@@ -246,6 +247,9 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
     for (const std::string& spec : *specs) {
       if (auto source = make_error_source(spec, **cell_found); !source) return tl::make_unexpected(source.error());
     }
+  }
+  if (!bias.empty() && bias != "none" && !make_kernel(bias)) {
+    return refused("bias {}: unknown; known are none {}", bias, kernel_names());
   }
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());

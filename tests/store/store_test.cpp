@@ -2,6 +2,8 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -338,6 +340,59 @@ TEST_F(StoreTest, LetsAnotherProcessReadWhileItIsOpen) {
   SQLite::Database reader(path_, SQLite::OPEN_READONLY);
   EXPECT_EQ(reader.execAndGet("PRAGMA journal_mode").getString(), "wal");
   EXPECT_EQ(reader.execAndGet("SELECT COUNT(*) FROM batches").getInt(), 1) << "another process may read";
+}
+
+/// Adds batches and models, saying each on `pipe` once it is acknowledged, until it is killed.
+[[noreturn]] void write_until_killed(const std::string& path, const StoredBatch& first, const CompensatedModel& model,
+                                     int pipe) {
+  auto store = Store::open(path);
+  if (!store) ::_exit(1);
+  for (int i = 0;; ++i) {
+    StoredBatch batch = first;
+    batch.id = batch.request_id = std::to_string(i);
+    StoredJob job;
+    job.cell = batch.cell;
+    const auto accepted = (*store)->add_batch(batch, job);
+    if (!accepted || !(*store)->add_model(batch.cell, model, accepted->id, true, "made")) ::_exit(1);
+    if (::write(pipe, &i, sizeof i) != sizeof i) ::_exit(1);
+  }
+}
+
+TEST_F(StoreTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
+  store_.reset();
+  const CompensatedModel model = test::nominal_model(cell_, 1);
+  const StoredBatch first = batch("0", std::string(20000, 'x'));
+  for (int round = 1; round <= 8; ++round) {
+    std::filesystem::remove(path_);
+    std::filesystem::remove(path_ + "-wal");
+    int pipe[2];
+    ASSERT_EQ(::pipe(pipe), 0);
+    const pid_t writer = ::fork();
+    ASSERT_GE(writer, 0);
+    if (writer == 0) write_until_killed(path_, first, model, pipe[1]);
+    ::close(pipe[1]);
+    int acknowledged = -1;
+    while (acknowledged < 5 * round && ::read(pipe[0], &acknowledged, sizeof acknowledged) == sizeof acknowledged) {
+    }
+    ::kill(writer, SIGKILL);
+    while (::read(pipe[0], &acknowledged, sizeof acknowledged) == sizeof acknowledged) {
+    }
+    ::close(pipe[0]);
+    int status = 0;
+    ASSERT_EQ(::waitpid(writer, &status, 0), writer);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the writer ended by itself";
+
+    open();
+    const auto batches = store_->batches("cell-7");
+    const auto models = store_->models("cell-7");
+    EXPECT_GE(static_cast<int>(models->size()), acknowledged + 1);
+    EXPECT_GE(batches->size(), models->size());
+    EXPECT_LE(batches->size(), models->size() + 1);
+    EXPECT_EQ(store_->unfinished_jobs()->size(), batches->size() - models->size());
+    EXPECT_EQ(in_force(), static_cast<int>(models->size())) << "a model and its being in force are one transaction";
+    EXPECT_EQ(store_->batch("cell-7", std::to_string(acknowledged))->csv, first.csv);
+    store_.reset();
+  }
 }
 
 }  // namespace

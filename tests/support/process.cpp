@@ -3,8 +3,8 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -42,7 +42,7 @@ Process::Process(const std::vector<std::string>& argv) {
   }
   ::close(out[1]);
   ::close(err[1]);
-  pidfd_ = ::pidfd_open(pid_, 0);
+  pidfd_ = static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0));
   TRAMMEL_CHECK(pidfd_ >= 0);
   out_reader_ = std::jthread([this, descriptor = out[0]] { read(descriptor, out_); });
   err_reader_ = std::jthread([this, descriptor = err[0]] { read(descriptor, err_); });

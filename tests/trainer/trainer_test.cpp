@@ -262,6 +262,7 @@ TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
   EXPECT_EQ(trainer_->retrain("cell-7", {"b"}, "", "").error().code, ErrorCode::kNotFound);
   EXPECT_FALSE(trainer_->retrain("cell-7", {"a", "a"}, "", ""));
   EXPECT_FALSE(trainer_->retrain("cell-7", {"a"}, "M1,no_such_cause", ""));
+  EXPECT_FALSE(trainer_->retrain("cell-7", {"a"}, "", "no_such_kernel"));
   EXPECT_EQ(trainer_->retrain("cell-9", {}, "", "").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }
@@ -275,8 +276,10 @@ TEST_F(TrainerTest, RetrainsFromTheNewestBatchWhenNoneIsNamed) {
 }
 
 TEST_F(TrainerTest, AFailedTrainingSaysWhyAndTheNextOneGoesOn) {
+  cells_["cell-7"] = test::small_cell("cell-7", "se");
+  make_trainer();
   start();
-  const JobProgress failed = train("tiny", {.poses = 1});
+  const JobProgress failed = train("tiny", {.poses = 5});
   EXPECT_EQ(failed.stage, JobStage::kFailed);
   EXPECT_FALSE(failed.what.empty());
   EXPECT_EQ(store_->job(failed.job)->state, JobState::kFailed);

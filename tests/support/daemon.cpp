@@ -1,0 +1,55 @@
+#include "tests/support/daemon.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include "tests/support/virtual_cell.h"
+
+namespace trammel::test {
+namespace {
+
+constexpr std::chrono::seconds kLimit{30};
+
+// DDS derives ports from the domain, 7400 + 250 a domain: these stay below the servers' ports, those below the ports
+// that the kernel hands out.
+std::uint32_t domain_of_this_process() { return 1 + static_cast<std::uint32_t>(::getpid()) % 40; }
+std::uint16_t port_of_this_process() { return static_cast<std::uint16_t>(20000 + 4 * (::getpid() % 3000)); }
+
+}  // namespace
+
+std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
+
+Daemon::Daemon() : port_(port_of_this_process()), domain_(domain_of_this_process()) {
+  folder_.write("server.yaml", "version: 1\nserver: test\ncells: [" + shipped_cell_file() +
+                                   "]\nstore: trammel.db\nlog: {level: debug}\n");
+}
+
+std::vector<std::string> Daemon::command_line() const {
+  return {trammeld_path(),       "--config", config_path(),          "--port",
+          std::to_string(port_), "--domain", std::to_string(domain_)};
+}
+
+void Daemon::start() {
+  process_ = std::make_unique<Process>(command_line());
+  EXPECT_TRUE(process_->wait_for_line("ready", kLimit)) << process_->standard_error();
+}
+
+void Daemon::kill() {
+  process_->signal(SIGKILL);
+  EXPECT_EQ(process_->wait(kLimit), 128 + SIGKILL);
+}
+
+std::optional<int> Daemon::stop() {
+  process_->signal(SIGTERM);
+  return process_->wait(kLimit);
+}
+
+client::SessionOptions Daemon::session_options() const {
+  client::SessionOptions options;
+  options.domain = domain_;
+  options.server_ports = {port_};
+  return options;
+}
+
+}  // namespace trammel::test

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/session/session.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel::test {
+
+[[nodiscard]] std::string trammeld_path();
+
+/// A trammeld that serves the shipped virtual cell from a folder of its own, on a port and domain that no test running
+/// at the same time has: they come from this process's id. May be stopped, killed and started again on the same store.
+class Daemon {
+ public:
+  Daemon();
+
+  /// Until it says that it is ready; fails the test when it does not.
+  void start();
+  /// SIGKILL, and until it is gone.
+  void kill();
+  /// SIGTERM; its exit code.
+  [[nodiscard]] std::optional<int> stop();
+
+  [[nodiscard]] Process& process() { return *process_; }
+  /// What starts it, for tests that start another like it.
+  [[nodiscard]] std::vector<std::string> command_line() const;
+  [[nodiscard]] std::string store_path() const { return folder_.file("trammel.db"); }
+  [[nodiscard]] std::string config_path() const { return folder_.file("server.yaml"); }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::uint32_t domain() const { return domain_; }
+  [[nodiscard]] client::SessionOptions session_options() const;
+
+ private:
+  TemporaryFolder folder_;
+  std::uint16_t port_;
+  std::uint32_t domain_;
+  std::unique_ptr<Process> process_;
+};
+
+}  // namespace trammel::test
