@@ -201,7 +201,10 @@ std::string to_csv(const MeasurementBatch& batch) {
                        [&](const Measurement& m) { return column.field(m).empty(); });
   });
   std::string text;
-  for (const WrittenColumn& column : columns) text += (text.empty() ? "" : ",") + csv_field(column.name);
+  for (const WrittenColumn& column : columns) {
+    if (!text.empty()) text += ',';
+    text += csv_field(column.name);
+  }
   text += '\n';
   for (const Measurement& measurement : batch.measurements) {
     for (std::size_t k = 0; k < columns.size(); ++k) {

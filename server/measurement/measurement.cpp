@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/measurement/pose_check.h"
+#include "server/measurement/pose_columns.h"
 #include "server/measurement/spread_check.h"
 
 namespace trammel {
@@ -13,9 +14,7 @@ namespace trammel {
 Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& cell) {
   const std::string where = batch.where.empty() ? "batch " + batch.id : batch.where;
   if (batch.measurements.empty()) return refused("{}: no measurements, at least 1 is needed", where);
-  if (batch.joint_types.empty()) {
-    for (int j = 0; j < cell.robot.size(); ++j) batch.joint_types.push_back(cell.robot.joint(j).type);
-  }
+  if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
     return tl::make_unexpected(columns.error());
   }

@@ -133,6 +133,12 @@ std::string joint_column(int joint, JointType type) {
   return fmt::format("q{}_{}", joint + 1, type == JointType::kRevolute ? "deg" : "mm");
 }
 
+std::vector<JointType> joint_types(const Chain& robot) {
+  std::vector<JointType> types;
+  for (int j = 0; j < robot.size(); ++j) types.push_back(robot.joint(j).type);
+  return types;
+}
+
 double joint_to_column(double value, JointType type) {
   return type == JointType::kRevolute ? to_deg(value) : to_mm(value);
 }

@@ -41,6 +41,8 @@ class PoseColumns {
 
 /// `q3_deg`, or `q3_mm` of a prismatic joint; `joint` counts from 0.
 [[nodiscard]] std::string joint_column(int joint, JointType type);
+/// Of all joints of a robot.
+[[nodiscard]] std::vector<JointType> joint_types(const Chain& robot);
 /// A joint value as its column holds it.
 [[nodiscard]] double joint_to_column(double value, JointType type);
 /// The joint value and its unit for messages: `241.2 deg`.

@@ -1,0 +1,187 @@
+#include "clients/cli/answers.h"
+
+#include <map>
+
+#include "server/base/units.h"
+#include "server/measurement/csv_table.h"
+#include "server/measurement/pose_columns.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kPoseColumns = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
+
+std::string pose_fields(const client::PoseMm& pose) {
+  std::string fields;
+  for (const double value : {pose.x_mm, pose.y_mm, pose.z_mm, pose.qw, pose.qx, pose.qy, pose.qz}) {
+    if (!fields.empty()) fields += ',';
+    fields += csv_number(value);
+  }
+  return fields;
+}
+
+ordered_json pose_json(const client::PoseMm& pose) {
+  return {{"x_mm", pose.x_mm}, {"y_mm", pose.y_mm}, {"z_mm", pose.z_mm}, {"qw", pose.qw},
+          {"qx", pose.qx},     {"qy", pose.qy},     {"qz", pose.qz}};
+}
+
+/// False: there is nothing to command, so no numbers are handed out that a program could take for some.
+bool has_command(const client::CorrectedTarget& target) {
+  return target.status == "ok" || target.status == "out_of_domain";
+}
+
+/// A joint of the wire as its column holds it: deg, of a prismatic joint mm.
+double wire_to_column(double value, JointType type) { return type == JointType::kRevolute ? to_deg(value) : value; }
+
+JointType type_of(const std::vector<JointType>& types, std::size_t joint) {
+  return joint < types.size() ? types[joint] : JointType::kRevolute;
+}
+
+std::size_t joint_count(const Corrections& corrections) {
+  std::size_t joints = corrections.joint_types.size();
+  for (const client::CorrectedTarget& item : corrections.items) joints = std::max(joints, item.q_rad.size());
+  return joints;
+}
+
+}  // namespace
+
+client::PoseMm to_wire(const Pose& X_BT) {
+  const Eigen::Quaterniond R(X_BT.linear());
+  const Vector3 p = X_BT.translation() * to_mm(1);
+  return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
+}
+
+client::PredictedError to_wire(const ErrorPrediction& prediction) {
+  const Vector3 e = prediction.error_B * to_mm(1);
+  const Vector3 s = prediction.stddev_B * to_mm(1);
+  return {to_wire(prediction.X_BT_nominal),
+          to_wire(prediction.X_BT_predicted),
+          e.x(),
+          e.y(),
+          e.z(),
+          s.x(),
+          s.y(),
+          s.z(),
+          prediction.in_domain};
+}
+
+std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types) {
+  std::vector<double> wire;
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    const bool revolute = type_of(joint_types, static_cast<std::size_t>(j)) == JointType::kRevolute;
+    wire.push_back(revolute ? q(j) : to_mm(q(j)));
+  }
+  return wire;
+}
+
+client::CorrectedTarget to_wire(const Correction& correction, const std::vector<JointType>& joint_types) {
+  return {std::string(to_string(correction.status)),
+          to_wire(correction.X_BT_commanded),
+          to_wire(correction.q, joint_types),
+          to_mm(correction.error_before),
+          to_mm(correction.error_after),
+          to_mm(correction.stddev),
+          correction.iterations,
+          correction.message};
+}
+
+client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types) {
+  return {to_wire(target.X_BT), target.seed ? to_wire(*target.seed, joint_types) : std::vector<double>(), target.conf,
+          target.joint_target};
+}
+
+std::string predictions_csv(const JointList& list, const Predictions& predictions) {
+  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id\n", kPoseColumns);
+  for (std::size_t i = 0; i < predictions.items.size(); ++i) {
+    const client::PredictedError& item = predictions.items[i];
+    for (const double value : {item.dx_mm, item.dy_mm, item.dz_mm, item.sx_mm, item.sy_mm, item.sz_mm}) {
+      text += csv_number(value) + ",";
+    }
+    text += fmt::format("{},{},{},{}\n", item.in_domain ? 1 : 0, pose_fields(item.predicted),
+                        csv_field(list.poses[i].pose_id), predictions.model_id);
+  }
+  return text;
+}
+
+ordered_json predictions_json(const JointList& list, const Predictions& predictions) {
+  ordered_json items = ordered_json::array();
+  for (std::size_t i = 0; i < predictions.items.size(); ++i) {
+    const client::PredictedError& item = predictions.items[i];
+    items.push_back({{"pose_id", list.poses[i].pose_id},
+                     {"dx_mm", item.dx_mm},
+                     {"dy_mm", item.dy_mm},
+                     {"dz_mm", item.dz_mm},
+                     {"sx_mm", item.sx_mm},
+                     {"sy_mm", item.sy_mm},
+                     {"sz_mm", item.sz_mm},
+                     {"in_domain", item.in_domain},
+                     {"nominal", pose_json(item.nominal)},
+                     {"predicted", pose_json(item.predicted)}});
+  }
+  return {{"model", predictions.model_id}, {"predictions", items}};
+}
+
+std::string corrections_csv(const TargetFile& file, const Corrections& corrections) {
+  const std::size_t joints = joint_count(corrections);
+  std::string text = fmt::format("row,status,{}", kPoseColumns);
+  for (std::size_t j = 0; j < joints; ++j) {
+    text += ',' + joint_column(static_cast<int>(j), type_of(corrections.joint_types, j));
+  }
+  text += ",error_before_mm,error_after_mm,sigma_mm,iterations,model_id,message\n";
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    const bool command = has_command(item);
+    text += fmt::format("{},{},{}", file.rows[i].row, item.status, command ? pose_fields(item.commanded) : ",,,,,,");
+    for (std::size_t j = 0; j < joints; ++j) {
+      text += ',';
+      if (command && j < item.q_rad.size()) {
+        text += csv_number(wire_to_column(item.q_rad[j], type_of(corrections.joint_types, j)));
+      }
+    }
+    text += command ? fmt::format(",{},{},{}", csv_number(item.error_before_mm), csv_number(item.error_after_mm),
+                                  csv_number(item.sigma_mm))
+                    : ",,,";
+    text += fmt::format(",{},{},{}\n", item.iterations, corrections.model_id, csv_field(item.message));
+  }
+  return text;
+}
+
+ordered_json corrections_json(const TargetFile& file, const Corrections& corrections) {
+  ordered_json items = ordered_json::array();
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    ordered_json json = {{"row", file.rows[i].row}, {"status", item.status}, {"message", item.message}};
+    if (has_command(item)) {
+      ordered_json joints = ordered_json::object();
+      for (std::size_t j = 0; j < item.q_rad.size(); ++j) {
+        const JointType type = type_of(corrections.joint_types, j);
+        joints[joint_column(static_cast<int>(j), type)] = wire_to_column(item.q_rad[j], type);
+      }
+      json["commanded"] = pose_json(item.commanded);
+      json["joints"] = joints;
+      json["error_before_mm"] = item.error_before_mm;
+      json["error_after_mm"] = item.error_after_mm;
+      json["sigma_mm"] = item.sigma_mm;
+    }
+    json["iterations"] = item.iterations;
+    items.push_back(json);
+  }
+  return {{"model", corrections.model_id}, {"targets", items}};
+}
+
+std::string corrections_summary(const Corrections& corrections) {
+  std::map<std::string, int> counts;
+  for (const client::CorrectedTarget& item : corrections.items) ++counts[item.status];
+  std::string text = fmt::format("{} targets:", corrections.items.size());
+  const char* separator = " ";
+  for (const auto& [status, count] : counts) {
+    text += fmt::format("{}{} {}", separator, count, status);
+    separator = ", ";
+  }
+  return text + "\n";
+}
+
+}  // namespace trammel::cli

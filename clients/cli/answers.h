@@ -1,0 +1,44 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "clients/cli/target_file.h"
+#include "clients/session/session.h"
+#include "server/compensate/compensated_model.h"
+#include "server/measurement/joint_list.h"
+
+/// Predictions and corrections in the units of files and of the wire, whether this program or a service made them.
+namespace trammel::cli {
+
+[[nodiscard]] client::PoseMm to_wire(const Pose& X_BT);
+[[nodiscard]] client::PredictedError to_wire(const ErrorPrediction& prediction);
+[[nodiscard]] client::CorrectedTarget to_wire(const Correction& correction, const std::vector<JointType>& joint_types);
+/// rad, of a prismatic joint mm.
+[[nodiscard]] std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types);
+[[nodiscard]] client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types);
+
+/// Answers with the id of the one model that gave them.
+struct Predictions {
+  std::string model_id;
+  std::vector<client::PredictedError> items;  ///< one a pose of the list
+};
+struct Corrections {
+  std::string model_id;
+  std::vector<JointType> joint_types;
+  std::vector<client::CorrectedTarget> items;  ///< one a target
+};
+
+/// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`.
+[[nodiscard]] std::string predictions_csv(const JointList& list, const Predictions& predictions);
+[[nodiscard]] nlohmann::ordered_json predictions_json(const JointList& list, const Predictions& predictions);
+
+/// `row` (line in the target file), `status`, the pose and joints to command, expected errors, `iterations`,
+/// `model_id`, `message`. A target that has no correction has no numbers either.
+[[nodiscard]] std::string corrections_csv(const TargetFile& file, const Corrections& corrections);
+[[nodiscard]] nlohmann::ordered_json corrections_json(const TargetFile& file, const Corrections& corrections);
+/// `12 targets: 10 ok, 2 unreachable`
+[[nodiscard]] std::string corrections_summary(const Corrections& corrections);
+
+}  // namespace trammel::cli

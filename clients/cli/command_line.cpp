@@ -1,0 +1,62 @@
+#include "clients/cli/command_line.h"
+
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/commands.h"
+
+namespace trammel::cli {
+
+namespace {
+
+constexpr int kWrongUsage = 2;
+constexpr int kRefusedData = 3;
+constexpr int kNoService = 4;
+
+}  // namespace
+
+int exit_code(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kUsage:
+      return kWrongUsage;
+    case ErrorCode::kBusy:
+    case ErrorCode::kUnreachable:
+      return kNoService;
+    case ErrorCode::kRefused:
+    case ErrorCode::kNotFound:
+    case ErrorCode::kConflict:
+    case ErrorCode::kTooLarge:
+    case ErrorCode::kInternal:
+      return kRefusedData;
+  }
+  return kRefusedData;
+}
+
+int run_command_line(int argc, const char* const* argv) {
+  CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
+  app.set_version_flag("--version", TRAMMEL_VERSION);
+  app.require_subcommand(0, 1);
+  app.footer(
+      "Exit codes: 0 done, 2 wrong usage, 3 refused data, 4 unreachable or busy service.\n"
+      "A file named '-' is standard output.");
+  Action chosen;
+  add_pose_commands(app, chosen);
+  add_model_commands(app, chosen);
+  add_apply_commands(app, chosen);
+  add_service_commands(app, chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  if (!chosen) {
+    fmt::print(stderr, "A command is required\n{}", app.help());
+    return kWrongUsage;
+  }
+  const std::string command = app.get_subcommands().front()->get_name();
+  const Status done = chosen();
+  if (done) return 0;
+  fmt::print(stderr, "trammel {}: {}\n", command, done.error().message);
+  return exit_code(done.error().code);
+}
+
+}  // namespace trammel::cli

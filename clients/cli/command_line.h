@@ -1,0 +1,13 @@
+#pragma once
+
+#include "server/base/result.h"
+
+namespace trammel::cli {
+
+/// The program `trammel`: reads the command line, does what it says, writes errors to standard error. Returns the exit
+/// code: 0, 2 wrong usage, 3 refused data, 4 unreachable or busy service.
+[[nodiscard]] int run_command_line(int argc, const char* const* argv);
+
+[[nodiscard]] int exit_code(ErrorCode code);
+
+}  // namespace trammel::cli

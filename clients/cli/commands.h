@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+
+#include "server/base/result.h"
+
+namespace CLI {
+class App;
+}
+
+/// The commands, a file a group. Each add function adds its commands to `app`; the action of the one that the command
+/// line names is put into `chosen`.
+namespace trammel::cli {
+
+using Action = std::function<Status()>;
+
+void add_pose_commands(CLI::App& app, Action& chosen);     // plan, simulate
+void add_model_commands(CLI::App& app, Action& chosen);    // train, evaluate, report
+void add_apply_commands(CLI::App& app, Action& chosen);    // predict, correct
+void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
+
+}  // namespace trammel::cli

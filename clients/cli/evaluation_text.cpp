@@ -1,0 +1,105 @@
+#include "clients/cli/evaluation_text.h"
+
+#include "server/base/units.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json figures_json(const ErrorFigures& figures) {
+  ordered_json axes;
+  for (int k = 0; k < 3; ++k) {
+    axes[std::string(1, "xyz"[k])] = {{"mean_mm", to_mm(figures.axis_mean(k))},
+                                      {"std_mm", to_mm(figures.axis_stddev(k))}};
+  }
+  return {{"rms_mm", to_mm(figures.rms)},
+          {"mean_mm", to_mm(figures.mean)},
+          {"p997_mm", to_mm(figures.p997)},
+          {"max_mm", to_mm(figures.max)},
+          {"axis", axes}};
+}
+
+std::string figures_line(const char* level, const ErrorFigures& figures) {
+  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms), to_mm(figures.mean),
+                     to_mm(figures.p997), to_mm(figures.max));
+}
+
+}  // namespace
+
+std::string evaluation_table(const Evaluation& evaluation) {
+  return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+         figures_line("nominal", evaluation.nominal) + figures_line("calibrated", evaluation.calibrated) +
+         figures_line("compensated", evaluation.compensated) +
+         fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
+                     evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95);
+}
+
+ordered_json evaluation_json(const Evaluation& evaluation) {
+  ordered_json json = {{"poses", evaluation.poses}};
+  json.update(figures_json(evaluation.compensated));
+  json["levels"] = {{"nominal", figures_json(evaluation.nominal)},
+                    {"calibrated", figures_json(evaluation.calibrated)},
+                    {"compensated", figures_json(evaluation.compensated)}};
+  json["coverage_95"] = evaluation.coverage_95;
+  json["in_domain"] = evaluation.in_domain;
+  return json;
+}
+
+std::string model_text(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  std::string text =
+      fmt::format("model {} of cell {}: {}, bias {}\n", provenance.id, model.cell().name,
+                  provenance.level.empty() ? "nominal" : provenance.level, parts.bias ? parts.bias->kernel : "none");
+  text += fmt::format("trained on {} poses of batch {}; {} of {} parameters identified (rank {})\n",
+                      provenance.training_poses, provenance.batch_id,
+                      std::count_if(parts.parameters.begin(), parts.parameters.end(),
+                                    [](const IdentifiedParameter& p) { return p.identified; }),
+                      parts.parameters.size(), parts.rank);
+  if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
+  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
+    text += fmt::format("  {}\n", combination.sentence);
+  }
+  return text;
+}
+
+ordered_json model_json(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  ordered_json parameters = ordered_json::array();
+  for (const IdentifiedParameter& identified : parts.parameters) {
+    const Parameter& parameter = identified.parameter;
+    parameters.push_back({{"name", parameter.name},
+                          {"unit", parameter.unit},
+                          {"value", parameter.scale * identified.value},
+                          {"u95", 2 * parameter.scale * identified.stddev},
+                          {"identified", identified.identified}});
+  }
+  ordered_json combinations = ordered_json::array();
+  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
+    combinations.push_back({{"parameters", combination.parameters},
+                            {"singular_value", combination.singular_value},
+                            {"sentence", combination.sentence}});
+  }
+  ordered_json json = {{"model", provenance.id},
+                       {"hash", provenance.hash},
+                       {"cell", model.cell().name},
+                       {"level", provenance.level},
+                       {"bias", parts.bias ? parts.bias->kernel : "none"},
+                       {"batch", provenance.batch_id},
+                       {"batch_hash", provenance.batch_hash},
+                       {"trained_at_unix_s", provenance.trained_at},
+                       {"training_poses", provenance.training_poses},
+                       {"seed", provenance.seed},
+                       {"rank", parts.rank},
+                       {"condition_number", parts.condition_number},
+                       {"parameters", parameters},
+                       {"not_identifiable", combinations},
+                       {"training", evaluation_json(parts.training)}};
+  if (parts.validation) json["validation"] = evaluation_json(*parts.validation);
+  return json;
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "server/compensate/compensated_model.h"
+
+/// An evaluation and a model, told to people and to programs.
+namespace trammel::cli {
+
+/// `nominal`, `calibrated` and `compensated`, a line each, mm.
+[[nodiscard]] std::string evaluation_table(const Evaluation& evaluation);
+/// The keys of `evaluate --json`.
+[[nodiscard]] nlohmann::ordered_json evaluation_json(const Evaluation& evaluation);
+
+/// Id, level, batch and what was not identifiable.
+[[nodiscard]] std::string model_text(const CompensatedModel& model);
+/// Provenance, parameters with U(k=2), what was not identifiable, errors at three levels.
+[[nodiscard]] nlohmann::ordered_json model_json(const CompensatedModel& model);
+
+}  // namespace trammel::cli

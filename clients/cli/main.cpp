@@ -1,0 +1,3 @@
+#include "clients/cli/command_line.h"
+
+int main(int argc, char** argv) { return trammel::cli::run_command_line(argc, argv); }

@@ -1,0 +1,146 @@
+#include <CLI/CLI.hpp>
+#include <chrono>
+
+#include "clients/cli/commands.h"
+#include "clients/cli/evaluation_text.h"
+#include "clients/cli/options.h"
+#include "clients/cli/output.h"
+#include "server/report/model_page.h"
+#include "server/trainer/train.h"
+
+namespace trammel::cli {
+
+namespace {
+
+std::int64_t unix_time() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+struct TrainArguments {
+  std::string cell, batch, output, json;
+  std::optional<std::string> level, bias;
+  std::uint64_t seed = 1;
+  double validation_share = 0;
+};
+
+Status train_model(const TrainArguments& arguments) {
+  Result<Cell> cell = read_cell(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<MeasurementBatch> batch = read_batch_csv(arguments.batch);
+  if (!batch) return tl::make_unexpected(batch.error());
+  TrainOptions options;
+  options.level = arguments.level;
+  options.bias = arguments.bias;
+  options.seed = arguments.seed;
+  options.validation_share = arguments.validation_share;
+  options.trained_at = unix_time();
+  const Result<CompensatedModel> model = [&] {
+    ProgressLine progress;
+    options.progress = [&](const std::string& stage, double share) {
+      progress.show(stage, share);
+      return true;
+    };
+    return train(std::make_shared<const Cell>(std::move(*cell)), *batch, options);
+  }();
+  if (!model) return tl::make_unexpected(model.error());
+  if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
+  const auto& parts = model->parts();
+  tell(model_text(*model) +
+           (parts.validation
+                ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
+                : fmt::format("on the {} poses it was trained on (none were held out):\n", parts.training.poses) +
+                      evaluation_table(parts.training)),
+       {arguments.output, arguments.json});
+  return write_json(arguments.json, model_json(*model));
+}
+
+struct EvaluateArguments {
+  std::string model, batch, json;
+};
+
+/// The batch, ready for the model's cell.
+Result<MeasurementBatch> read_checked_batch(const std::string& path, const CompensatedModel& model) {
+  return read_batch_csv(path).and_then(
+      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), model.cell()); });
+}
+
+Status evaluate(const EvaluateArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Result<MeasurementBatch> batch = read_checked_batch(arguments.batch, *model);
+  if (!batch) return tl::make_unexpected(batch.error());
+  const Evaluation evaluation = model->evaluate(*batch);
+  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id) +
+           evaluation_table(evaluation),
+       {arguments.json});
+  return write_json(arguments.json, evaluation_json(evaluation));
+}
+
+struct ReportArguments {
+  std::string model, batch, output, json;
+};
+
+Status report(const ReportArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  std::optional<MeasurementBatch> batch;
+  if (!arguments.batch.empty()) {
+    Result<MeasurementBatch> checked = read_checked_batch(arguments.batch, *model);
+    if (!checked) return tl::make_unexpected(checked.error());
+    batch = std::move(*checked);
+  }
+  if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
+  tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
+       {arguments.output, arguments.json});
+  return write_json(arguments.json, model_json(*model));
+}
+
+void add_train(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot and learn what calibration leaves over");
+  command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--level", arguments->level,
+                      "What to identify instead of the cell's error sources: M0, M1 (base), M2 (+ geometry), M3 (+ "
+                      "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
+  command->add_option("--bias", arguments->bias,
+                      "Kernel of the learned bias instead of the cell's: se, matern52, none");
+  command->add_option("--seed", arguments->seed, "Seed of the search and of the rows held out")->capture_default_str();
+  command
+      ->add_option("--validation-share", arguments->validation_share,
+                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command->add_option("-o,--output", arguments->output, "Model to write")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
+}
+
+void add_evaluate(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<EvaluateArguments>();
+  CLI::App* command = app.add_subcommand("evaluate", "Compare a model with measurements; errors in mm");
+  command->add_option("--model", arguments->model, "Model file")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
+}
+
+void add_report(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<ReportArguments>();
+  CLI::App* command = app.add_subcommand("report", "Write a model's report as a page that opens offline");
+  command->add_option("--model", arguments->model, "Model file")->required();
+  command->add_option("--batch", arguments->batch, "Measurements to compare it with (CSV: deg, mm)");
+  command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });
+}
+
+}  // namespace
+
+void add_model_commands(CLI::App& app, Action& chosen) {
+  add_train(app, chosen);
+  add_evaluate(app, chosen);
+  add_report(app, chosen);
+}
+
+}  // namespace trammel::cli

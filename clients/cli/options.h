@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/session/session.h"
+#include "server/base/result.h"
+
+namespace CLI {
+class App;
+}
+
+/// Options that several commands have.
+namespace trammel::cli {
+
+/// Whether to ask a service, and which.
+struct ServiceOptions {
+  bool service = false;
+  std::uint32_t domain = 0;
+  std::vector<std::uint16_t> ports = {17500};
+  double timeout_s = 5;
+};
+void add_service_options(CLI::App& command, ServiceOptions& options);
+[[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
+
+void add_json_option(CLI::App& command, std::string& path);
+void add_tool_options(CLI::App& command, std::string& tool, std::string& payload);
+
+/// `cell` or `cell@version`, as --model and --service name a model.
+struct ModelReference {
+  std::string cell;
+  int version = 0;  ///< 0: the one in force
+};
+[[nodiscard]] Result<ModelReference> parse_model_reference(const std::string& text);
+
+/// The id of a cell from what --cell says: the id, or a cell file that holds it.
+[[nodiscard]] Result<std::string> cell_id(const std::string& id_or_file);
+
+}  // namespace trammel::cli

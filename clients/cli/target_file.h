@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/compensate/compensated_model.h"
+
+namespace trammel::cli {
+
+/// A target with its line in the file.
+struct TargetRow {
+  int row = 0;
+  Target target;
+};
+
+struct TargetFile {
+  std::string where;
+  std::vector<JointType> joint_types;  ///< of the joint columns; empty when there are none
+  std::vector<TargetRow> rows;
+};
+
+/// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or `q1_deg`... as the seed,
+/// or `q1_deg`... alone. Other columns are passed over. Refuses as batches are, and a pose with neither conf nor seed.
+[[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
+[[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
+
+/// Refuses joint columns that are not the robot's, and conf where the robot's branches have no closed form.
+[[nodiscard]] Status check_targets(const TargetFile& file, const Chain& robot);
+
+}  // namespace trammel::cli

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string_view>
+
+/// Files that are part of the program, see embed.cmake.
+namespace trammel::embedded {
+
+extern const std::string_view chart_js;         ///< Chart.js 3, minified; MIT licence, its notice inside
+extern const std::string_view model_page_html;  ///< the page of a model, with `{{...}}` where its content goes
+
+}  // namespace trammel::embedded

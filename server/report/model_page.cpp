@@ -1,0 +1,259 @@
+#include "server/report/model_page.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "server/base/units.h"
+#include "server/measurement/pose_columns.h"
+#include "server/report/embedded.h"
+#include "server/report/html.h"
+
+namespace trammel {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kFewestBins = 12;
+
+/// What the page compares the model with.
+struct Compared {
+  Evaluation evaluation;
+  std::string text;  ///< of which poses
+};
+
+Compared compared_with(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
+  const CompensatedModel::Parts& parts = model.parts();
+  if (batch) {
+    Evaluation evaluation = model.evaluate(*batch);
+    return {evaluation, fmt::format("On the {} poses of batch {}.", evaluation.poses, batch->id)};
+  }
+  if (parts.validation) {
+    return {*parts.validation, fmt::format("On {} poses of batch {} that were held out from training.",
+                                           parts.validation->poses, parts.provenance.batch_id)};
+  }
+  return {parts.training,
+          fmt::format("On the {} poses of batch {} that the model was trained on: the compensated error "
+                      "is smaller here than on new poses.",
+                      parts.training.poses, parts.provenance.batch_id)};
+}
+
+std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evaluation& evaluation) {
+  return {{{"nominal", &evaluation.nominal},
+           {"calibrated", &evaluation.calibrated},
+           {"compensated", &evaluation.compensated}}};
+}
+
+std::string tiles(const Evaluation& evaluation) {
+  std::string html;
+  for (const auto& [level, figures] : levels_of(evaluation)) {
+    html += fmt::format(R"(<div class="tile {0}"><b>{1:.3f} mm</b><span>{0}, rms</span></div>)", level,
+                        to_mm(figures->rms));
+  }
+  return html;
+}
+
+std::string figures_table(const Evaluation& evaluation) {
+  std::string table =
+      html_row({"mm", "rms", "mean", "99.7 %", "max", "x mean ± std", "y mean ± std", "z mean ± std"}, "th");
+  for (const auto& [level, figures] : levels_of(evaluation)) {
+    std::vector<std::string> cells = {level};
+    for (const double value : {figures->rms, figures->mean, figures->p997, figures->max}) {
+      cells.push_back(fmt::format("{:.4f}", to_mm(value)));
+    }
+    for (int k = 0; k < 3; ++k) {
+      cells.push_back(fmt::format("{:.4f} ± {:.4f}", to_mm(figures->axis_mean(k)), to_mm(figures->axis_stddev(k))));
+    }
+    table += html_row(cells);
+  }
+  return table;
+}
+
+std::string date_of(std::int64_t unix_time) {
+  const std::time_t time = unix_time;
+  std::tm utc{};
+  ::gmtime_r(&time, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S UTC", &utc);
+  return text.data();
+}
+
+std::string bias_text(const CompensatedModel::Parts& parts) {
+  if (!parts.bias) return "none";
+  return fmt::format("Gaussian process on the joints, kernel {}, {} observations", parts.bias->kernel,
+                     parts.bias->q.rows());
+}
+
+std::string trained_ranges(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  std::string text;
+  for (int j = 0; j < model.cell().robot.size(); ++j) {
+    const JointType type = model.cell().robot.joint(j).type;
+    text += fmt::format("{}q{}\u00a0{:.1f}\u00a0…\u00a0{:.1f}\u00a0{}", j == 0 ? "" : " · ", j + 1,
+                        joint_to_column(parts.q_min(j), type), joint_to_column(parts.q_max(j), type),
+                        type == JointType::kRevolute ? "deg" : "mm");
+  }
+  return text;
+}
+
+std::string provenance_table(const CompensatedModel& model, const Evaluation& evaluation) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  const auto line = [](const std::string& name, const std::string& value) {
+    return html_row({name, html_text(value)});
+  };
+  return line("model", provenance.id) + line("hash (SHA-256)", provenance.hash) +
+         line("robot", model.cell().robot.name()) +
+         line("error sources", provenance.level.empty() ? "none (nominal)" : provenance.level) +
+         line("learned bias", bias_text(parts)) + line("batch", provenance.batch_id) +
+         line("batch hash (SHA-256)", provenance.batch_hash) +
+         line("trained", fmt::format("{}, {} poses, seed {}, trammel {}", date_of(provenance.trained_at),
+                                     provenance.training_poses, provenance.seed, provenance.program_version)) +
+         line("joints of the training", trained_ranges(model)) +
+         line("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses)) +
+         line("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95)) +
+         line("left over beyond the tracker's sigma",
+              fmt::format("{:.4f} mm per axis, calibrated", to_mm(parts.discrepancy)));
+}
+
+std::string parameter_row(const IdentifiedParameter& identified) {
+  const Parameter& parameter = identified.parameter;
+  const ShownValue shown =
+      show_with_uncertainty(parameter.scale * identified.value, 2 * parameter.scale * identified.stddev);
+  const std::string row = html_row({html_text(parameter.name), shown.value, shown.expanded, html_text(parameter.unit),
+                                    identified.identified ? "" : "not identified by itself"});
+  return identified.identified ? row : "<tr class=\"unknown\">" + row.substr(4);
+}
+
+std::string parameter_table(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  if (parts.parameters.empty()) return "<p>Nothing: the model is the nominal robot.</p>\n";
+  std::string table =
+      "<table class=\"parameters\">\n" + html_row({"parameter", "value", "U (k = 2)", "unit", ""}, "th");
+  std::size_t next = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    table += fmt::format("<tr class=\"cause\"><td colspan=\"5\">{} <span>{}</span></td></tr>\n",
+                         html_text(source->name()), html_text(source->explanation()));
+    for (std::size_t k = 0; k < source->parameters().size(); ++k) table += parameter_row(parts.parameters[next++]);
+  }
+  return table + "</table>\n";
+}
+
+std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
+  if (parts.unidentifiable.empty()) {
+    return parts.parameters.empty() ? "<p>Nothing was asked of them.</p>\n"
+                                    : "<p>Nothing: every combination of parameters shows in them.</p>\n";
+  }
+  std::string html = fmt::format(
+      "<p>{} of {} directions in parameter space are determined. In the others the measurements say less than what was "
+      "believed before, so the model keeps that belief:</p>\n<ul>\n",
+      parts.rank, parts.parameters.size());
+  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
+    html += "<li>" + html_text(combination.sentence) + "</li>\n";
+  }
+  return html + "</ul>\n";
+}
+
+/// |error| of each pose, mm, at two levels.
+struct PoseErrors {
+  std::vector<double> calibrated, compensated;
+  std::string title;
+};
+
+PoseErrors errors_of(const CompensatedModel& model, const MeasurementBatch& batch) {
+  PoseErrors errors{{}, {}, fmt::format("Poses of batch {} by their error", batch.id)};
+  for (const Measurement& measurement : batch.measurements) {
+    MeasurementBatch one;
+    one.measurements = {measurement};
+    const Evaluation evaluation = model.evaluate(one);
+    errors.calibrated.push_back(to_mm(evaluation.calibrated.rms));
+    errors.compensated.push_back(to_mm(evaluation.compensated.rms));
+  }
+  return errors;
+}
+
+/// What each training pose would show if it were new: the bias predicts it from all the others.
+PoseErrors errors_of_training(const BiasState& state) {
+  PoseErrors errors{{}, {}, "Training poses by their error, each left out of the bias"};
+  const Result<BiasModel> bias = BiasModel::restore(state);
+  if (!bias) return errors;
+  const Eigen::MatrixXd left = state.residual_B - bias->leave_one_out_mean_B();
+  for (Eigen::Index i = 0; i < left.rows(); ++i) {
+    errors.calibrated.push_back(to_mm(state.residual_B.row(i).norm()));
+    errors.compensated.push_back(to_mm(left.row(i).norm()));
+  }
+  return errors;
+}
+
+/// The largest of 1, 2, 5, 10, 20... that is not above `limit`, which is positive.
+double round_width(double limit) {
+  const double power = std::pow(10, std::floor(std::log10(limit)));
+  for (const double digit : {5., 2.}) {
+    if (digit * power <= limit) return digit * power;
+  }
+  return power;
+}
+
+ordered_json histogram_json(const PoseErrors& errors) {
+  double largest = 1e-6;  // mm
+  for (const double error : errors.calibrated) largest = std::max(largest, error);
+  for (const double error : errors.compensated) largest = std::max(largest, error);
+  const double width = round_width(largest / kFewestBins);
+  const std::size_t bins = static_cast<std::size_t>(largest / width) + 1;
+  const auto counts = [&](const std::vector<double>& values) {
+    std::vector<int> counted(bins, 0);
+    for (const double value : values) ++counted[static_cast<std::size_t>(value / width)];
+    return counted;
+  };
+  std::vector<std::string> labels;
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    labels.push_back(fmt::format("{:.3g}", (static_cast<double>(bin) + 0.5) * width));
+  }
+  return {{"title", errors.title},
+          {"labels_mm", labels},
+          {"calibrated", counts(errors.calibrated)},
+          {"compensated", counts(errors.compensated)}};
+}
+
+/// For the charts. `<` is escaped so that no text can end the script that holds it.
+std::string chart_data(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
+                       const Evaluation& evaluation) {
+  ordered_json data;
+  for (const auto& [level, figures] : levels_of(evaluation)) {
+    data["levels"][level] = {to_mm(figures->rms), to_mm(figures->mean), to_mm(figures->p997), to_mm(figures->max)};
+  }
+  const auto& bias = model.parts().bias;
+  if (batch) {
+    data["histogram"] = histogram_json(errors_of(model, *batch));
+  } else if (bias) {
+    data["histogram"] = histogram_json(errors_of_training(*bias));
+  }
+  std::string text = data.dump(-1, ' ', true, ordered_json::error_handler_t::replace);
+  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
+    text.replace(at, 1, "\\u003c");
+  return text;
+}
+
+}  // namespace
+
+std::string model_page(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
+  const Compared compared = compared_with(model, batch);
+  const std::string title = html_text(fmt::format("Cell {}: model {}", model.cell().name, model.provenance().id));
+  return fill_in(embedded::model_page_html,
+                 {{"title", title},
+                  {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
+                                                     date_of(model.provenance().trained_at)))},
+                  {"tiles", tiles(compared.evaluation)},
+                  {"compared", html_text(compared.text)},
+                  {"figures", figures_table(compared.evaluation)},
+                  {"provenance", provenance_table(model, compared.evaluation)},
+                  {"parameters", parameter_table(model)},
+                  {"unidentifiable", unidentifiable_text(model.parts())},
+                  {"data", chart_data(model, batch, compared.evaluation)},
+                  {"chart_js", std::string(embedded::chart_js)}});
+}
+
+}  // namespace trammel
