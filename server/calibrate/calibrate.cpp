@@ -197,6 +197,19 @@ double surplus(const Eigen::Matrix3Xd& r, const Eigen::VectorXd& sigma, double f
   return 0.5 * (low + high);
 }
 
+double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation) {
+  double sum = 0;
+  const auto add = [&](const auto& residual, double sigma, double discrepancy) {
+    const double variance = sigma * sigma + discrepancy * discrepancy;
+    sum -= 0.5 * residual.squaredNorm() / variance + 1.5 * std::log(2 * kPi * variance);
+  };
+  for (Eigen::Index i = 0; i < r.position.cols(); ++i) add(r.position.col(i), r.sigma(i), weights.discrepancy);
+  for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {
+    add(r.rotation.col(i), sigma_rotation, weights.discrepancy_rotation);
+  }
+  return sum;
+}
+
 /// What the data say, in prior units: eigenvectors and singular values of the whitened Jacobian.
 struct Information {
   Eigen::VectorXd singular_values;  // ascending
@@ -349,6 +362,7 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.model.values = x.cwiseProduct(s.scale);
   result.discrepancy = weights.discrepancy;
   result.discrepancy_rotation = weights.discrepancy_rotation;
+  result.log_likelihood = log_likelihood(r, weights, model.cell->tracker.sigma_rotation);
   result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
   result.converged = P == 0 || summary.termination_type == ceres::CONVERGENCE;
   result.message = P == 0 ? "nothing to identify" : summary.message;
@@ -446,6 +460,30 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   }
   localise_base(complete.model, complete.batch);
   return identify(complete, options);
+}
+
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+  std::vector<std::vector<std::string>> candidates = {{}};
+  for (const std::string& spec : specs) {
+    std::vector<std::vector<std::string>> longer;
+    for (const auto& candidate : candidates) {
+      for (const std::string& form : alternatives(spec)) {
+        longer.push_back(candidate);
+        longer.back().push_back(form);
+      }
+    }
+    candidates = std::move(longer);
+  }
+  Result<CalibrationResult> best = tl::make_unexpected(Error{});
+  for (const auto& candidate : candidates) {
+    Result<PhysicalModel> model = make_physical_model(cell, candidate);
+    if (!model) return tl::make_unexpected(model.error());
+    Result<CalibrationResult> result = calibrate({std::move(*model), batch}, options);
+    if (!result) return result;
+    if (!best || result->log_likelihood > best->log_likelihood) best = std::move(result);
+  }
+  return best;
 }
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct CalibrationResult {
   int rank = 0;                ///< directions with singular value >= 1
   std::vector<UnidentifiableCombination> unidentifiable;
   double condition_number = 0;      ///< of the identified directions, prior units
+  double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
   double rms = 0;                   ///< m, Euclidean residual of the training positions
   double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
@@ -54,5 +56,11 @@ struct CalibrationResult {
 /// and orientations, good and bad points keep their proper weights. Refuses: fewer equations than identifiable
 /// parameters; a base or tool that the data cannot determine.
 [[nodiscard]] Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options);
+
+/// Calibrates `cell` with the sources that `specs` name. Where a cause has several forms, the one under which the data
+/// are likeliest is kept (all have the same number of parameters).
+[[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
+                                                  const std::vector<std::string>& specs, const MeasurementBatch& batch,
+                                                  const CalibrateOptions& options);
 
 }  // namespace trammel

@@ -8,7 +8,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLeastSpread = 1e-6;   // ratio of singular values below which points lie on a line
+constexpr double kLeastSpread = 1e-6;  // ratio of singular values below which points lie on a line
 // rad^2: turning by less than 10 mrad is not told from the errors of the nominal chain.
 constexpr double kLeastTurning = 1e-4;
 constexpr int kMaxAlternations = 10000;

@@ -22,7 +22,9 @@ constexpr Known kKnown[] = {
     {"base", false, make_base},
     {"tool", false, make_tool},
     {"geometry", false, make_geometry},
-    {"compliance", false, make_compliance},
+    {"compliance_first_order", false, make_compliance_first_order},
+    {"compliance_equilibrium", false, make_compliance_equilibrium},
+    {"compliance_linear", false, make_compliance_linear},
 };
 
 std::string known_names() {
@@ -33,7 +35,13 @@ std::string known_names() {
 
 }  // namespace
 
+std::vector<std::string> alternatives(const std::string& spec) {
+  if (spec != "compliance") return {spec};
+  return {"compliance_first_order", "compliance_equilibrium", "compliance_linear"};
+}
+
 Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell) {
+  if (const auto forms = alternatives(spec); forms.front() != spec) return make_error_source(forms.front(), cell);
   const std::size_t colon = spec.find(':');
   const std::string name = spec.substr(0, colon);
   const auto* known =

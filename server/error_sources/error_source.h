@@ -41,7 +41,12 @@ class ErrorSource {
 
 using ErrorSourcePtr = std::shared_ptr<const ErrorSource>;
 
-/// The source that `spec` names (`geometry`, `gear_transmission:3`) for this cell. Refuses an unknown name or joint.
+/// The forms of a cause between which the data decide, the first being the usual one: `compliance` has three. All other
+/// specs stand for themselves.
+[[nodiscard]] std::vector<std::string> alternatives(const std::string& spec);
+
+/// The source that `spec` names (`geometry`, `gear_transmission:3`) for this cell, in its usual form. Refuses an
+/// unknown name or joint.
 [[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
 
 /// Expands a level into source names: `M0`..`M3`, a list, or a level and more: `M2,gear_transmission:3`.

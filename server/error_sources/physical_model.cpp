@@ -9,7 +9,7 @@ namespace trammel {
 namespace {
 
 /// The order in which causes act on the arm: frames and geometry first, what depends on the loaded posture last.
-int stage(const std::string& source_name) { return source_name == "compliance" ? 1 : 0; }
+int stage(const std::string& source_name) { return source_name.starts_with("compliance") ? 1 : 0; }
 
 }  // namespace
 

@@ -39,6 +39,11 @@ ArmKinematics::ArmKinematics(const ArmState& state)
   }
   X_WF_ = X;
   X_WT_ = X * state.X_FT;
+  kinematic_tip_W_ = X_WT_.translation();
+  X_WT_.translation() += state.tip_W.head<3>();
+  if (!state.tip_W.tail<3>().isZero(0)) {
+    X_WT_.linear() = (rotation_exp(state.tip_W.tail<3>()) * X_WT_.linear()).eval();
+  }
   p_cog_W_ = X * state.payload.p_FoCog_F;
   force_W_ = state.payload.mass * kGravity * gravity_W_;
 }
@@ -71,7 +76,7 @@ ArmKinematics::Motion ArmKinematics::link_motion(int row) const {
 Eigen::MatrixXd ArmKinematics::pose_jacobian() const {
   const StateRows rows(chain_->size());
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, rows.size());
-  const Vector3& p = X_WT_.translation();
+  const Vector3& p = kinematic_tip_W_;
   for (int row = 0; row < rows.base(0); ++row) {
     const Motion motion = link_motion(row);
     J.col(row).head<3>() = motion.v + motion.w.cross(p - motion.origin);
@@ -84,7 +89,52 @@ Eigen::MatrixXd ArmKinematics::pose_jacobian() const {
   J.block<3, 3>(0, rows.tool(0)) = R_WF;
   J.block<3, 3>(0, rows.tool(3)) = -skew(p - X_WF_.translation()) * R_WF;
   J.block<3, 3>(3, rows.tool(3)) = R_WF;
+  // The tip's rotation turns what the kinematics turned; it is small, so its own derivative is taken at zero.
+  J.block<6, 6>(0, rows.tip(0)).setIdentity();
   return J;
+}
+
+Eigen::MatrixXd ArmKinematics::deflection_jacobian() const {
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, chain_->size());
+  for (int j = 0; j < chain_->size(); ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    if (chain_->joint(j).type == JointType::kRevolute) {
+      J.col(j).head<3>() = z_[k].cross(kinematic_tip_W_ - p_[k]);
+      J.col(j).tail<3>() = z_[k];
+    } else {
+      J.col(j).head<3>() = z_[k];
+    }
+  }
+  return J;
+}
+
+Eigen::MatrixXd ArmKinematics::deflection_jacobian_derivative(const Eigen::VectorXd& deflection) const {
+  const StateRows rows(chain_->size());
+  const Eigen::MatrixXd J = deflection_jacobian();
+  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(6, rows.size());
+  const auto turn = [&](int row, int joint, const Vector3& w) {  // the joint's whole column turns with what is upstream
+    D.col(row).head<3>() += deflection(joint) * w.cross(J.col(joint).head<3>());
+    D.col(row).tail<3>() += deflection(joint) * w.cross(J.col(joint).tail<3>());
+  };
+  const auto shift = [&](int row, int joint, const Vector3& tip_motion) {  // only its lever changes
+    D.col(row).head<3>() += deflection(joint) * J.col(joint).tail<3>().cross(tip_motion);
+  };
+  for (int j = 0; j < chain_->size(); ++j) {
+    for (int row = 0; row < rows.base(0); ++row) {
+      const Motion motion = link_motion(row);
+      if (row / 5 < j) {
+        turn(row, j, motion.w);
+      } else {
+        shift(row, j, motion.v + motion.w.cross(kinematic_tip_W_ - motion.origin));
+      }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      turn(rows.base(3 + axis), j, Vector3::Unit(axis));
+      shift(rows.tool(axis), j, X_WF_.linear().col(axis));
+      shift(rows.tool(3 + axis), j, X_WF_.linear().col(axis).cross(kinematic_tip_W_ - X_WF_.translation()));
+    }
+  }
+  return D;
 }
 
 Eigen::VectorXd ArmKinematics::gravity_torque() const {

@@ -24,12 +24,13 @@ struct ArmState {
   Pose X_FT = Pose::Identity();
   Payload payload;
   Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
+  Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation; rotation vector] in W
 
   /// Adds `delta` (rad, m) to the joint as its encoder would: through signs and couplings.
   void add_to_joint(int joint, double delta);
 };
 
-/// Where each number of an ArmState stands in a derivative: five rows a link, then base, tool, payload.
+/// Where each number of an ArmState stands in a derivative: five rows a link, then base, tool, payload, tip.
 /// Base and tool rows are small motions [translation; rotation vector]: of B seen in W, about the origin of B; of T
 /// seen in F, about the origin of F.
 class StateRows {
@@ -44,7 +45,8 @@ class StateRows {
   [[nodiscard]] int tool(int k) const { return 5 * joints_ + 6 + k; }
   [[nodiscard]] int mass() const { return 5 * joints_ + 12; }
   [[nodiscard]] int cog(int k) const { return 5 * joints_ + 13 + k; }
-  [[nodiscard]] int size() const { return 5 * joints_ + 16; }
+  [[nodiscard]] int tip(int k) const { return 5 * joints_ + 16 + k; }
+  [[nodiscard]] int size() const { return 5 * joints_ + 22; }
 
  private:
   int joints_;
@@ -78,6 +80,10 @@ class ArmKinematics {
   [[nodiscard]] Eigen::VectorXd gravity_torque() const;
   /// n x StateRows::size(): derivative of gravity_torque().
   [[nodiscard]] Eigen::MatrixXd gravity_torque_jacobian() const;
+  /// 6 x n: the tool's motion in W per joint deflection (signs and couplings do not enter), the J of eq. (3.6).
+  [[nodiscard]] Eigen::MatrixXd deflection_jacobian() const;
+  /// 6 x StateRows::size(): derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
+  [[nodiscard]] Eigen::MatrixXd deflection_jacobian_derivative(const Eigen::VectorXd& deflection) const;
 
  private:
   struct Motion {  // what is downstream moves by [v + w x (p - origin); w]
@@ -91,6 +97,7 @@ class ArmKinematics {
   std::vector<Vector3> z_, p_, x_, y_,
       q_;  // per link, in W: joint axis and a point on it; x and y axis at the link's end q
   Pose X_WB_, X_WF_, X_WT_;
+  Vector3 kinematic_tip_W_;  // before the tip's own motion
   Vector3 p_cog_W_, force_W_, gravity_W_;
 };
 

@@ -64,11 +64,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
 
   const Result<std::vector<std::string>> sources = sources_of(*cell, options);
   if (!sources) return tl::make_unexpected(sources.error());
-  Result<PhysicalModel> nominal = make_physical_model(cell, *sources);
-  if (!nominal) return tl::make_unexpected(nominal.error());
-
   if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
-  Result<CalibrationResult> calibration = calibrate({*nominal, split.train}, {});
+  Result<CalibrationResult> calibration = calibrate(cell, *sources, split.train, {});
   if (!calibration) return tl::make_unexpected(calibration.error());
 
   CompensatedModel::Parts parts;
