@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <fastdds/dds/topic/TopicDataType.hpp>
 #include <mutex>
 
 #include "idl/valid.h"

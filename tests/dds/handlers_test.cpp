@@ -1,0 +1,318 @@
+#include "server/dds/handlers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "server/dds/codec.h"
+#include "server/dds/reply_memory.h"
+#include "server/dds/request_endpoint.h"
+#include "tests/dds/backend.h"
+
+namespace trammel {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+const wire::Joints kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+
+class HandlersTest : public testing::Test {
+ protected:
+  wire::PredictErrorRequest predict_request(int count = 1) const {
+    wire::PredictErrorRequest request;
+    request.about().cell("cell-7");
+    request.joints_rad(std::vector<wire::Joints>(static_cast<std::size_t>(count), kJoints));
+    return request;
+  }
+  wire::CorrectTargetRequest correct_request() const {
+    wire::CorrectTargetRequest request;
+    request.about().cell("cell-7");
+    wire::Target target;
+    target.kind(wire::TARGET_JOINTS);
+    target.joints_rad(kJoints);
+    request.targets({target});
+    return request;
+  }
+  wire::SubmitMeasurementsRequest submit_request(const std::string& batch) const {
+    wire::SubmitMeasurementsRequest request;
+    request.header().request_id().sequence_number(5);
+    request.about().cell("cell-7");
+    request.batch_id(batch);
+    request.csv(test::small_batch_csv(*backend_.cell, {}));
+    return request;
+  }
+  wire::ManageModelsRequest manage_request(wire::ManageAction action, int version = 0) const {
+    wire::ManageModelsRequest request;
+    request.about().cell("cell-7");
+    request.action(action);
+    request.version(version);
+    return request;
+  }
+  template <typename Request>
+  ErrorCode refusal(const Request& request, const std::string& part) {
+    const auto answer = handlers_.answer(request);
+    if (answer) {
+      ADD_FAILURE() << "was answered";
+      return ErrorCode::kInternal;
+    }
+    EXPECT_NE(answer.error().message.find(part), std::string::npos) << answer.error().message;
+    return answer.error().code;
+  }
+
+  test::Backend backend_;
+  Handlers handlers_{*backend_.trainer, *backend_.store, backend_.registry};
+};
+
+TEST_F(HandlersTest, PredictAnswersFromTheModelInForceAndNamesIt) {
+  const auto served = backend_.serve(3);
+  const auto reply = handlers_.answer(predict_request(2));
+  ASSERT_TRUE(reply) << reply.error().message;
+  ASSERT_EQ(reply->predictions().size(), 2u);
+  EXPECT_NEAR(reply->predictions()[1].dx_mm(), 0.3, 1e-9);
+  EXPECT_NEAR(reply->predictions()[1].predicted().x_mm() - reply->predictions()[1].nominal().x_mm(), 0.3, 1e-9);
+  EXPECT_EQ(reply->model().version(), 3);
+  EXPECT_EQ(reply->model().hash(), served->model.provenance().hash);
+  EXPECT_TRUE(reply->model().in_force());
+  EXPECT_GT(reply->model().data_age_s(), 0);
+}
+
+TEST_F(HandlersTest, AnEmptyRequestIsAnsweredEmpty) {
+  backend_.serve(1);
+  const auto reply = handlers_.answer(predict_request(0));
+  ASSERT_TRUE(reply) << reply.error().message;
+  EXPECT_TRUE(reply->predictions().empty());
+  EXPECT_EQ(reply->model().version(), 1);
+}
+
+TEST_F(HandlersTest, ACellWithoutModelIsNotAnswered) {
+  EXPECT_EQ(refusal(predict_request(), "no model in force"), ErrorCode::kNotFound);
+}
+
+TEST_F(HandlersTest, TheContextMustFit) {
+  backend_.serve(1);
+  auto request = predict_request();
+  request.about().cell("cell-9");
+  EXPECT_EQ(refusal(request, "cell-9"), ErrorCode::kNotFound);
+  request = predict_request();
+  request.about().tool("gripper");
+  EXPECT_EQ(refusal(request, "gripper"), ErrorCode::kRefused);
+  request = predict_request();
+  request.about().payload("anvil");
+  EXPECT_EQ(refusal(request, "anvil"), ErrorCode::kRefused);
+  request = predict_request();
+  request.about().controller_compensates(true);
+  EXPECT_EQ(refusal(request, "does not compensate"), ErrorCode::kRefused);
+}
+
+TEST_F(HandlersTest, AModelIdMustBeTheOneInForce) {
+  const auto served = backend_.serve(2);
+  auto request = predict_request();
+  request.about().model(served->model.provenance().id);
+  EXPECT_TRUE(handlers_.answer(request));
+  request.about().model(served->model.provenance().hash);
+  EXPECT_TRUE(handlers_.answer(request));
+  request.about().model("@2");
+  EXPECT_TRUE(handlers_.answer(request));
+  request.about().model("0123456789ab");
+  EXPECT_EQ(refusal(request, "0123456789ab"), ErrorCode::kConflict);
+  request.about().model("@2x");
+  EXPECT_EQ(refusal(request, "@2x"), ErrorCode::kConflict);
+}
+
+TEST_F(HandlersTest, AStoredVersionAnswersWhenItIsNamed) {
+  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 5e-4), 0, false, ""));
+  backend_.serve(2);
+  auto request = predict_request();
+  request.about().model("@1");
+  for (int again = 0; again < 2; ++again) {
+    const auto reply = handlers_.answer(request);
+    ASSERT_TRUE(reply) << reply.error().message;
+    EXPECT_NEAR(reply->predictions()[0].dx_mm(), 0.5, 1e-9);
+    EXPECT_EQ(reply->model().version(), 1);
+    EXPECT_FALSE(reply->model().in_force());
+  }
+  request.about().model("@7");
+  EXPECT_EQ(refusal(request, "7"), ErrorCode::kNotFound);
+}
+
+TEST_F(HandlersTest, WrongNumbersAreRefusedWithTheirPlace) {
+  backend_.serve(1);
+  auto request = predict_request(3);
+  request.joints_rad()[2] = {1, 2, 3};
+  EXPECT_EQ(refusal(request, "joint vector 3: 3 joint values"), ErrorCode::kRefused);
+  request.joints_rad()[2] = {1, 2, kNaN, 4, 5, 6};
+  EXPECT_EQ(refusal(request, "joint vector 3: joint 3 is not finite"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(predict_request(static_cast<int>(wire::MAX_TARGETS) + 1), "10001"), ErrorCode::kTooLarge);
+
+  auto correct = correct_request();
+  correct.targets()[0].kind(wire::TARGET_POSE_NEAR_JOINTS);
+  correct.targets()[0].pose().qw(0.5);
+  EXPECT_EQ(refusal(correct, "target 1: the quaternion has length 0.5"), ErrorCode::kRefused);
+  correct.targets()[0].pose().qw(1);
+  correct.targets()[0].pose().x_mm(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(refusal(correct, "target 1: the pose is not finite"), ErrorCode::kRefused);
+  correct.targets()[0].pose().x_mm(0);
+  correct.targets()[0].kind(wire::TARGET_POSE_ON_BRANCH);
+  correct.targets()[0].conf(8);
+  EXPECT_EQ(refusal(correct, "branch 8"), ErrorCode::kRefused);
+}
+
+TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
+  backend_.serve(8);
+  const auto reply = handlers_.answer(correct_request());
+  ASSERT_TRUE(reply) << reply.error().message;
+  ASSERT_EQ(reply->corrections().size(), 1u);
+  const wire::CorrectedTarget& corrected = reply->corrections()[0];
+  EXPECT_EQ(corrected.status(), wire::TARGET_OK) << corrected.message();
+  EXPECT_NEAR(corrected.error_before_mm(), 0.8, 1e-6);
+  EXPECT_LT(corrected.error_after_mm(), 1e-3);
+
+  wire::PredictErrorRequest check = predict_request();
+  check.joints_rad({kJoints, corrected.joints_rad()});
+  const auto there = handlers_.answer(check);
+  ASSERT_TRUE(there) << there.error().message;
+  EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(), 1e-3);
+}
+
+TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
+  const auto first = handlers_.answer(submit_request("lt-07"));
+  ASSERT_TRUE(first) << first.error().message;
+  EXPECT_TRUE(backend_.store->batch("cell-7", "lt-07"));
+  const auto repeat = handlers_.answer(submit_request("lt-07"));
+  ASSERT_TRUE(repeat) << repeat.error().message;
+  EXPECT_EQ(repeat->job(), first->job());
+
+  auto another = submit_request("lt-07");
+  another.header().request_id().sequence_number(6);
+  EXPECT_EQ(refusal(another, "lt-07"), ErrorCode::kConflict);
+  EXPECT_EQ(refusal(submit_request(""), "without an id"), ErrorCode::kRefused);
+  auto bad = submit_request("lt-08");
+  bad.csv("q1_deg,x_mm\n1,2\n");
+  EXPECT_EQ(refusal(bad, "lt-08"), ErrorCode::kRefused);
+}
+
+TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
+  wire::TrainRequest request;
+  request.about().cell("cell-7");
+  EXPECT_EQ(refusal(request, "cell-7"), ErrorCode::kNotFound);
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  request.batch_ids({"lt-07"});
+  const auto job = handlers_.answer(request);
+  ASSERT_TRUE(job) << job.error().message;
+  auto look = manage_request(wire::MANAGE_JOB);
+  look.job(job->job());
+  const auto state = handlers_.answer(look);
+  ASSERT_TRUE(state) << state.error().message;
+  EXPECT_EQ(state->job().stage(), wire::JOB_QUEUED);
+  look.job(99);
+  EXPECT_EQ(refusal(look, "99"), ErrorCode::kNotFound);
+}
+
+TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
+  for (const int version : {1, 2}) {
+    ASSERT_TRUE(
+        backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, "by hand"));
+  }
+  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ROLLBACK), "cell-7"), ErrorCode::kNotFound);
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 2)));
+  EXPECT_EQ(backend_.registry.in_force("cell-7")->version, 2);
+  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ACTIVATE, 9), "9"), ErrorCode::kNotFound);
+  const auto back = handlers_.answer(manage_request(wire::MANAGE_ROLLBACK));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->version(), 1);
+
+  const auto list = handlers_.answer(manage_request(wire::MANAGE_LIST));
+  ASSERT_TRUE(list);
+  ASSERT_EQ(list->models().size(), 2u);
+  EXPECT_TRUE(list->models()[0].in_force());
+  EXPECT_FALSE(list->models()[1].in_force());
+
+  const auto exported = handlers_.answer(manage_request(wire::MANAGE_EXPORT, 2));
+  ASSERT_TRUE(exported) << exported.error().message;
+  const auto in_force = handlers_.answer(manage_request(wire::MANAGE_EXPORT));
+  ASSERT_TRUE(in_force);
+  EXPECT_EQ(in_force->version(), 1);
+  EXPECT_NE(in_force->text(), exported->text());
+  auto import = manage_request(wire::MANAGE_IMPORT);
+  import.text(exported->text());
+  const auto imported = handlers_.answer(import);
+  ASSERT_TRUE(imported) << imported.error().message;
+  EXPECT_EQ(imported->version(), 2);
+  import.text("{}");
+  EXPECT_FALSE(handlers_.answer(import));
+}
+
+TEST_F(HandlersTest, DiagnoseSaysThatItIsNotOffered) {
+  wire::DiagnoseRequest request;
+  request.about().cell("cell-7");
+  const auto reply = handlers_.answer(request);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->header().result(), wire::RESULT_UNSUPPORTED);
+  EXPECT_NE(reply->header().message().find("not offered"), std::string::npos);
+}
+
+TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
+  ReplyMemory<wire::PredictErrorReply> memory(4);
+  auto request = predict_request();
+  request.header().contract_version(wire::CONTRACT_VERSION);
+  request.header().request_id().sequence_number(77);
+  request.header().request_id().writer_guid()[3] = 9;
+  const auto reply = reply_to(request, handlers_, memory, "server-a");
+  EXPECT_EQ(reply.header().result(), wire::RESULT_NOT_FOUND);
+  EXPECT_EQ(reply.header().related_request_id().sequence_number(), 77);
+  EXPECT_EQ(reply.header().related_request_id().writer_guid()[3], 9);
+  EXPECT_EQ(reply.header().server().to_string(), "server-a");
+}
+
+TEST_F(HandlersTest, AnotherContractIsRefusedUnread) {
+  ReplyMemory<wire::PredictErrorReply> memory(4);
+  auto request = predict_request();
+  request.header().contract_version(wire::CONTRACT_VERSION + 1);
+  EXPECT_EQ(reply_to(request, handlers_, memory, "server-a").header().result(), wire::RESULT_WRONG_CONTRACT);
+}
+
+TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  ReplyMemory<wire::TrainReply> memory(4);
+  wire::TrainRequest request;
+  request.header().contract_version(wire::CONTRACT_VERSION);
+  request.header().request_id().sequence_number(8);
+  request.about().cell("cell-7");
+  const auto first = reply_to(request, handlers_, memory, "server-a");
+  const auto repeat = reply_to(request, handlers_, memory, "server-a");
+  ASSERT_EQ(first.header().result(), wire::RESULT_OK) << first.header().message();
+  EXPECT_EQ(repeat.job(), first.job());
+  request.header().request_id().sequence_number(9);
+  EXPECT_NE(reply_to(request, handlers_, memory, "server-a").job(), first.job());
+}
+
+TEST(ReplyMemory, ForgetsTheOldest) {
+  ReplyMemory<int> memory(2);
+  memory.remember("a", 1);
+  memory.remember("b", 2);
+  memory.remember("c", 3);
+  EXPECT_FALSE(memory.find("a"));
+  EXPECT_EQ(memory.find("b"), 2);
+  EXPECT_EQ(memory.find("c"), 3);
+}
+
+TEST(Codec, PrismaticJointsTravelInMillimetres) {
+  Joint rail;
+  rail.type = JointType::kPrismatic;
+  const Chain chain = Chain::make("rail and hinge", {rail, Joint{}}).value();
+  JointVector q(2);
+  q << 1.5, 0.25;
+  EXPECT_EQ(to_wire(q, chain), (wire::Joints{1500, 0.25}));
+  EXPECT_TRUE(from_wire(to_wire(q, chain), chain, "here")->isApprox(q));
+}
+
+TEST(Codec, PosesComeBack) {
+  const Pose X = pose_zyx({0.1, -0.2, 1.3}, 0.4, -0.5, 0.6);
+  const auto back = from_wire(to_wire(X), "here");
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_TRUE(back->isApprox(X, 1e-12));
+}
+
+}  // namespace
+}  // namespace trammel

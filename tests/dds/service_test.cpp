@@ -1,0 +1,410 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "clients/session/session.h"
+#include "server/dds/dds_service.h"
+#include "tests/dds/backend.h"
+#include "tests/dds/raw_client.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::chrono::seconds kLimit{30};
+const std::vector<double> kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+client::CallContext context_of(const std::string& cell) {
+  client::CallContext context;
+  context.cell = cell;
+  return context;
+}
+const client::CallContext kCell7 = context_of("cell-7");
+
+client::TargetMm joint_target() {
+  client::TargetMm target;
+  target.seed_rad = kJoints;
+  target.joint_target = true;
+  return target;
+}
+
+std::unique_ptr<client::Session> open_session(const DdsOptions& options,
+                                              std::chrono::milliseconds timeout = std::chrono::seconds(10)) {
+  auto session = client::Session::open({options.domain, {options.port}, timeout});
+  if (!session) throw std::runtime_error(session.error().message);
+  return std::move(*session);
+}
+
+/// A service on a backend of its own, wired as the daemon does it.
+class Server {
+ public:
+  explicit Server(DdsOptions options) : options_(std::move(options)) {
+    backend_.trainer->set_listeners([this](const JobProgress& progress) { service_.publish_progress(progress); },
+                                    [this](const ServedModel& model, bool in_force) {
+                                      if (in_force) service_.publish_model(model.cell);
+                                    });
+  }
+  void start() {
+    const Status started = service_.start();
+    if (!started) throw std::runtime_error(started.error().message);
+  }
+  void start_trainer() { ASSERT_TRUE(backend_.trainer->start()); }
+  void stop() { service_.stop(); }
+  DdsService& service() { return service_; }
+  test::Backend& backend() { return backend_; }
+  const DdsOptions& options() const { return options_; }
+
+ private:
+  const DdsOptions options_;
+  test::Backend backend_;
+  DdsService service_{options_, *backend_.trainer, *backend_.store, backend_.registry};
+};
+
+class ServiceTest : public testing::Test {
+ protected:
+  Server server_{test::test_dds_options()};
+};
+
+TEST_F(ServiceTest, AnswersAClientThatCameLater) {
+  server_.backend().serve(4);
+  server_.start();
+  const auto session = open_session(server_.options());
+  const auto answer = session->predict_error(kCell7, {kJoints, kJoints});
+  ASSERT_TRUE(answer) << answer.error().message;
+  ASSERT_EQ(answer->items.size(), 2u);
+  EXPECT_NEAR(answer->items[0].dx_mm, 0.4, 1e-9);
+  EXPECT_EQ(answer->model.version, 4);
+}
+
+TEST_F(ServiceTest, AnswersAClientThatCameFirst) {
+  server_.backend().serve(4);
+  const auto session = open_session(server_.options());
+  auto answer = std::async(std::launch::async, [&] { return session->predict_error(kCell7, {kJoints}); });
+  server_.start();
+  const auto got = answer.get();
+  EXPECT_TRUE(got) << got.error().message;
+}
+
+TEST_F(ServiceTest, AnswersAgainAfterARestart) {
+  server_.backend().serve(4);
+  const auto session = open_session(server_.options());
+  for (int round = 0; round < 3; ++round) {
+    server_.start();
+    const auto answer = session->predict_error(kCell7, {kJoints});
+    EXPECT_TRUE(answer) << answer.error().message;
+    server_.stop();
+  }
+}
+
+TEST_F(ServiceTest, NobodyThereIsUnreachable) {
+  const auto session = open_session(server_.options(), std::chrono::milliseconds(300));
+  const auto answer = session->predict_error(kCell7, {kJoints});
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::kUnreachable);
+  EXPECT_NE(answer.error().message.find(std::to_string(server_.options().port)), std::string::npos);
+  EXPECT_FALSE(session->servers());
+}
+
+TEST_F(ServiceTest, WhatTheServerRefusesArrivesWithItsCode) {
+  server_.backend().serve(1);
+  server_.start();
+  const auto session = open_session(server_.options());
+  EXPECT_EQ(session->predict_error(context_of("cell-9"), {kJoints}).error().code, ErrorCode::kNotFound);
+  client::CallContext compensating = kCell7;
+  compensating.controller_compensates = true;
+  EXPECT_EQ(session->predict_error(compensating, {kJoints}).error().code, ErrorCode::kRefused);
+  EXPECT_EQ(session->predict_error(kCell7, {{1, 2}}).error().code, ErrorCode::kRefused);
+  EXPECT_EQ(session->submit_measurements("cell-7", "lt-07", "no csv").error().code, ErrorCode::kRefused);
+  EXPECT_EQ(session->activate("cell-7", 9).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(session->submit_measurements("cell-7", "lt-07", std::string(33u << 20, 'x')).error().code,
+            ErrorCode::kTooLarge);
+}
+
+TEST_F(ServiceTest, LongCallsGoInParts) {
+  server_.backend().serve(2);
+  server_.start();
+  const auto session = open_session(server_.options());
+  const std::vector<std::vector<double>> joints(2 * wire::MAX_TARGETS + 1, kJoints);
+  const auto answer = session->predict_error(kCell7, joints);
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_EQ(answer->items.size(), joints.size());
+
+  const std::vector<client::TargetMm> targets(wire::kTargetsPerRequest + 3, joint_target());
+  const auto corrected = session->correct_targets(kCell7, targets);
+  ASSERT_TRUE(corrected) << corrected.error().message;
+  ASSERT_EQ(corrected->items.size(), targets.size());
+  EXPECT_EQ(corrected->items.back().status, "ok");
+  EXPECT_NEAR(corrected->items.back().error_before_mm, 0.2, 1e-6);
+}
+
+TEST_F(ServiceTest, TheLargestRequestAndItsReplyFit) {
+  server_.backend().serve(2);
+  server_.start();
+  test::RawClient<wire::CorrectTarget> client(server_.options().domain, server_.options().port, "raw-1");
+  ASSERT_TRUE(client.wait_for_server());
+  wire::CorrectTargetRequest request;
+  request.about().cell("cell-7");
+  wire::Target target;
+  target.kind(wire::TARGET_JOINTS);
+  target.joints_rad(kJoints);
+  request.targets(std::vector<wire::Target>(wire::MAX_TARGETS, target));
+  client.send(request, 1);
+  auto replies = client.wait_for_replies(1);
+  ASSERT_EQ(replies.size(), 1u);
+  EXPECT_EQ(replies[0].corrections().size(), wire::MAX_TARGETS);
+  request.targets().push_back(target);
+  client.send(request, 2);
+  replies = client.wait_for_replies(2);
+  ASSERT_EQ(replies.size(), 2u);
+  EXPECT_EQ(replies[1].header().result(), wire::RESULT_TOO_LARGE);
+}
+
+TEST_F(ServiceTest, EveryRequestHasExactlyOneAnswer) {
+  server_.backend().serve(1);
+  server_.start();
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
+  test::RawClient<wire::PredictError> other(server_.options().domain, server_.options().port, "raw-2");
+  ASSERT_TRUE(client.wait_for_server());
+  ASSERT_TRUE(other.wait_for_server());
+  wire::PredictErrorRequest request;
+  request.about().cell("cell-7");
+  request.joints_rad({kJoints});
+  constexpr int kCount = 200;
+  for (int i = 1; i <= kCount; ++i) {
+    client.send(request, i);
+    other.send(request, 1000 + i);
+  }
+  request.header().server("somebody-else");
+  client.send(request, kCount + 1);  // not for this server
+  request.header().server("server-a");
+  client.send(request, kCount + 2);
+  other.send(request, 1000 + kCount + 2);
+  for (auto* one : {&client, &other}) {
+    std::multiset<std::int64_t> ids;
+    for (const auto& reply : one->wait_for_replies(kCount + 1)) {
+      EXPECT_EQ(reply.header().result(), wire::RESULT_OK) << reply.header().message();
+      ids.insert(reply.header().related_request_id().sequence_number() % 1000);
+    }
+    std::multiset<std::int64_t> expected{kCount + 2};
+    for (int i = 1; i <= kCount; ++i) expected.insert(i);
+    EXPECT_EQ(ids, expected);
+  }
+}
+
+TEST_F(ServiceTest, HostileSamplesDoNotStopAReader) {
+  server_.backend().serve(1);
+  server_.start();
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
+  ASSERT_TRUE(client.wait_for_server());
+  wire::PredictErrorRequest request;
+  request.about().cell("cell-7");
+  request.joints_rad({kJoints});
+  request.header().contract_version(wire::CONTRACT_VERSION);
+  request.header().reply_partition("*");
+  const test::Bytes reaches_all = test::to_bytes<wire::PredictError::Request>(request);
+  request.header().reply_partition("raw-1");
+  const test::Bytes good = test::to_bytes<wire::PredictError::Request>(request);
+  test::Bytes encapsulation = good;
+  encapsulation[1] = 0x77;
+  for (int i = 1; i <= 10; ++i) {
+    client.send(encapsulation);
+    client.send(test::Bytes(good.begin(), good.begin() + 60));
+    client.send(test::Bytes(4, 0xff));
+    client.send(reaches_all);
+    client.send(test::Bytes(wire::kMaxComputeSample + 1000, 1));
+    client.send(request, i);
+  }
+  const auto replies = client.wait_for_replies(10);
+  ASSERT_EQ(replies.size(), 10u);
+  for (const auto& reply : replies) EXPECT_EQ(reply.header().result(), wire::RESULT_OK);
+}
+
+TEST_F(ServiceTest, EveryAnswerComesWholeFromTheModelItNames) {
+  constexpr int kSwaps = 25;
+  std::map<int, std::string> hashes;  // by version
+  hashes[1] = server_.backend().serve(1)->model.provenance().hash;
+  std::vector<std::shared_ptr<const ServedModel>> models;
+  for (int version = 2; version <= kSwaps; ++version) {
+    models.push_back(std::make_shared<const ServedModel>(
+        ServedModel{"cell-7", version, test::shifted_model(server_.backend().cell, version * 1e-4)}));
+    hashes[version] = models.back()->model.provenance().hash;
+  }
+  server_.start();
+
+  std::mutex mutex;
+  std::condition_variable answered;
+  int newest[2] = {0, 0};  // guarded by mutex: version that each client saw last
+  std::atomic<bool> enough = false;
+  const auto load = [&](int index) {
+    const auto session = open_session(server_.options());
+    int wrong = 0;
+    while (!enough) {
+      const auto answer = session->predict_error(kCell7, std::vector<std::vector<double>>(50, kJoints));
+      if (!answer) {
+        ADD_FAILURE() << answer.error().message;
+        enough = true;
+      } else {
+        const int version = answer->model.version;
+        if (answer->model.hash != hashes.at(version)) ++wrong;
+        for (const auto& item : answer->items) wrong += std::abs(item.dx_mm - 0.1 * version) > 1e-9 ? 1 : 0;
+        const std::lock_guard lock(mutex);
+        newest[index] = version;
+      }
+      answered.notify_all();
+    }
+    return wrong;
+  };
+  auto first = std::async(std::launch::async, load, 0);
+  auto second = std::async(std::launch::async, load, 1);
+  const auto wait_until_served = [&](int version) {
+    std::unique_lock lock(mutex);
+    return answered.wait_for(lock, kLimit, [&] { return enough || (newest[0] >= version && newest[1] >= version); });
+  };
+  EXPECT_TRUE(wait_until_served(1));
+  for (const auto& model : models) {
+    server_.backend().registry.publish(model);
+    server_.service().publish_model("cell-7");
+    EXPECT_TRUE(wait_until_served(model->version)) << model->version;
+  }
+  enough = true;
+  EXPECT_EQ(first.get(), 0);
+  EXPECT_EQ(second.get(), 0);
+}
+
+TEST_F(ServiceTest, TwoSessionsAndTheirThreadsDoNotMixTheirAnswers) {
+  server_.backend().serve(3);
+  server_.start();
+  const auto one = open_session(server_.options());
+  const auto two = open_session(server_.options());
+  const auto load = [](client::Session& session, std::size_t count) {
+    for (int i = 0; i < 50; ++i) {
+      const auto answer = session.predict_error(kCell7, std::vector<std::vector<double>>(count, kJoints));
+      if (!answer || answer->items.size() != count) return false;
+    }
+    return true;
+  };
+  std::vector<std::future<bool>> done;
+  for (const std::size_t count : {1, 2, 3}) {
+    done.push_back(std::async(std::launch::async, load, std::ref(*one), count));
+    done.push_back(std::async(std::launch::async, load, std::ref(*two), count + 10));
+  }
+  for (auto& each : done) EXPECT_TRUE(each.get());
+}
+
+TEST_F(ServiceTest, ALongCorrectionDoesNotHoldUpAPrediction) {
+  server_.backend().serve(1);
+  server_.start();
+  const auto session = open_session(server_.options(), kLimit);
+  ASSERT_TRUE(session->predict_error(kCell7, {kJoints}));
+  std::atomic<bool> corrected = false;
+  auto long_call = std::async(std::launch::async, [&] {
+    const std::vector<client::TargetMm> targets(30000, joint_target());
+    const bool good = session->correct_targets(kCell7, targets).has_value();
+    corrected = true;
+    return good;
+  });
+  int meanwhile = 0;
+  while (!corrected && meanwhile < 20) {
+    ASSERT_TRUE(session->predict_error(kCell7, {kJoints}));
+    ++meanwhile;
+  }
+  EXPECT_EQ(meanwhile, 20);
+  EXPECT_TRUE(long_call.get());
+}
+
+TEST_F(ServiceTest, ASubmittedBatchIsTrainedWatchedAndPutInForce) {
+  server_.start();
+  server_.start_trainer();
+  const auto session = open_session(server_.options());
+  const auto job = session->submit_measurements("cell-7", "lt-07", test::small_batch_csv(*server_.backend().cell, {}));
+  ASSERT_TRUE(job) << job.error().message;
+  int heard = 0;
+  const auto status = session->wait_for_job(*job, kLimit, [&](const client::JobStatus&) { ++heard; });
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(status->stage, "done") << status->what;
+  EXPECT_GT(heard, 0);
+  const auto in_force = session->model_status();
+  ASSERT_TRUE(in_force);
+  ASSERT_EQ(in_force->size(), 1u);
+  EXPECT_EQ(in_force->front().version, status->model_version);
+  EXPECT_EQ(in_force->front().batch_id, "lt-07");
+  const auto models = session->models("cell-7");
+  ASSERT_TRUE(models);
+  EXPECT_EQ(models->size(), 1u);
+  const auto again = session->train("cell-7", {"lt-07"}, "", "");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_NE(*again, *job);
+  EXPECT_TRUE(session->wait_for_job(*again, kLimit, nullptr));
+  const auto text = session->export_model("cell-7", 1);
+  ASSERT_TRUE(text);
+  EXPECT_EQ(session->import_model("cell-7", *text).value_or(0), 1);
+  EXPECT_EQ(session->activate("cell-7", 1).value_or(0), 1);
+  EXPECT_EQ(session->wait_for_job(99, kLimit, nullptr).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(ServiceTest, TellsWhoServesWhat) {
+  server_.backend().serve(6);
+  server_.start();
+  const auto session = open_session(server_.options());
+  const auto servers = session->servers();
+  ASSERT_TRUE(servers) << servers.error().message;
+  ASSERT_EQ(servers->size(), 1u);
+  EXPECT_EQ(servers->front().server_id, "server-a");
+  EXPECT_EQ(servers->front().state, "serving");
+  EXPECT_EQ(servers->front().cells, (std::vector<std::string>{"cell-7", "cell-8"}));
+  const auto models = session->model_status();
+  ASSERT_TRUE(models) << models.error().message;
+  ASSERT_EQ(models->size(), 1u);
+  EXPECT_EQ(models->front().version, 6);
+}
+
+TEST_F(ServiceTest, AnotherReplicaAnswersWhenOneHasGone) {
+  DdsOptions options = server_.options();
+  options.server_id = "server-b";
+  options.port = static_cast<std::uint16_t>(options.port + 2);
+  Server replica(options);
+  server_.backend().serve(1);
+  replica.backend().serve(2);
+  server_.start();
+  replica.start();
+  auto session = client::Session::open({options.domain, {server_.options().port, options.port}, kLimit});
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ((*session)->servers().value().size(), 2u);
+  EXPECT_TRUE((*session)->predict_error(kCell7, {kJoints}));
+  server_.stop();
+  const auto answer = (*session)->predict_error(kCell7, {kJoints});
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_EQ(answer->model.version, 2);
+}
+
+TEST_F(ServiceTest, ASecondServerOnThePortIsRefused) {
+  server_.start();
+  Server second(server_.options());
+  const Status started = second.service().start();
+  ASSERT_FALSE(started);
+  EXPECT_EQ(started.error().code, ErrorCode::kConflict);
+}
+
+TEST_F(ServiceTest, AnAddressThatIsNotThisHostsIsRefused) {
+  DdsOptions options = server_.options();
+  options.address = "192.0.2.1";
+  Server elsewhere(options);
+  EXPECT_FALSE(elsewhere.service().start());
+  options.address = "here";
+  Server nowhere(options);
+  EXPECT_EQ(nowhere.service().start().error().code, ErrorCode::kUsage);
+}
+
+TEST_F(ServiceTest, NamesThatDoNotFitTheWireAreRefused) {
+  DdsOptions options = server_.options();
+  for (const std::string& id : {std::string(), std::string("a b"), std::string(65, 'a')}) {
+    options.server_id = id;
+    Server server(options);
+    EXPECT_FALSE(server.service().start()) << id;
+  }
+}
+
+}  // namespace
+}  // namespace trammel
