@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "server/base/check.h"
 #include "server/base/units.h"
+#include "tests/support/demand.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel::test {
@@ -23,9 +23,8 @@ std::string small_cell_yaml(const std::string& name, const std::string& bias) {
 }
 
 std::shared_ptr<const Cell> small_cell(const std::string& name, const std::string& bias) {
-  auto cell = parse_cell(small_cell_yaml(name, bias), small_robot_yaml(), name + ".yaml");
-  TRAMMEL_CHECK(cell.has_value());
-  return std::make_shared<const Cell>(std::move(*cell));
+  return std::make_shared<const Cell>(
+      demand(parse_cell(small_cell_yaml(name, bias), small_robot_yaml(), name + ".yaml")));
 }
 
 std::string small_batch_csv(const Cell& cell, const SmallBatch& batch) {
@@ -51,18 +50,14 @@ std::string small_batch_csv(const Cell& cell, const SmallBatch& batch) {
 }
 
 CompensatedModel nominal_model(const std::shared_ptr<const Cell>& cell, int training_poses) {
-  auto physics = make_physical_model(cell, {});
-  TRAMMEL_CHECK(physics.has_value());
   CompensatedModel::Parts parts;
-  parts.physics = std::move(*physics);
+  parts.physics = demand(make_physical_model(cell, {}));
   parts.q_min = JointVector::Constant(cell->robot.size(), from_deg(-60));
   parts.q_max = JointVector::Constant(cell->robot.size(), from_deg(60));
   parts.provenance.level = "none";
   parts.provenance.batch_id = "by-hand";
   parts.provenance.training_poses = training_poses;
-  auto model = CompensatedModel::make(std::move(parts));
-  TRAMMEL_CHECK(model.has_value());
-  return *model;
+  return demand(CompensatedModel::make(std::move(parts)));
 }
 
 }  // namespace trammel::test

@@ -3,16 +3,14 @@
 #include <memory>
 #include <random>
 
-#include "server/base/check.h"
 #include "server/simulate/simulate.h"
+#include "tests/support/demand.h"
 
 namespace trammel::test {
 namespace {
 
 std::shared_ptr<const Cell> shipped_cell() {
-  auto cell = read_cell(shipped_cell_file());
-  TRAMMEL_CHECK(cell.has_value());
-  return std::make_shared<const Cell>(std::move(*cell));
+  return std::make_shared<const Cell>(demand(read_cell(shipped_cell_file())));
 }
 
 Eigen::MatrixXd draw_joints(const Cell& cell, int poses, std::uint64_t seed) {
@@ -34,13 +32,10 @@ std::string shipped_cell_file() { return TRAMMEL_SOURCE_DIR "/config/cell-7.yaml
 
 std::string virtual_batch_csv(int poses, std::uint64_t seed) {
   const auto cell = shipped_cell();
-  const auto robot = read_virtual_robot(TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", cell);
-  TRAMMEL_CHECK(robot.has_value());
+  const VirtualRobot robot = demand(read_virtual_robot(TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml", cell));
   SimulateOptions options;
   options.seed = seed;
-  const auto batch = simulate(*robot, draw_joints(*cell, poses, seed), options);
-  TRAMMEL_CHECK(batch.has_value());
-  return to_csv(*batch);
+  return to_csv(demand(simulate(robot, draw_joints(*cell, poses, seed), options)));
 }
 
 std::vector<std::vector<double>> virtual_joints(int poses, std::uint64_t seed) {
