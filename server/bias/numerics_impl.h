@@ -38,6 +38,31 @@ inline double sum(Vec v) {
 inline Index least(Index a, Index b) { return a < b ? a : b; }
 inline Index round_up(Index n, Index step) { return (n + step - 1) / step * step; }
 
+#if TRAMMEL_VECTOR_LANES == 8
+
+// e^x for x <= 0, 1e-15 + |x| 1e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n/8 ln 2
+// + r, |r| <= ln 2 / 16: 2^(n/8) is one permutation of eight doubles and an integer addition, e^r a Chebyshev
+// polynomial of degree 6. Adding 1.5 * 2^52 leaves n in the low bits of the mantissa; the table has n mod 8 taken off
+// where n << 49 puts it.
+inline Vec exp_of_negative(Vec x) {
+  constexpr Bits kPowers = {0x3ff0000000000000, 0x3fef72b83c7d517b, 0x3fef06fe0a31b715, 0x3feebfdad5362a27,
+                            0x3feea09e667f3bcd, 0x3feeace5422aa0db, 0x3feee89f995ad3ad, 0x3fef5818dcfba487};
+  constexpr double kShift = 0x1.8p52;
+  x = largest(x, broadcast(-708.0));
+  const Vec shifted = x * 0x1.71547652b82fep+3 + kShift;
+  const Vec r = x - (shifted - kShift) * 0x1.62e42fefa39efp-4;
+  const Bits n = reinterpret_cast<Bits>(shifted);
+  const Vec power = reinterpret_cast<Vec>(__builtin_shuffle(kPowers, n) + (n << 49));
+  const Vec p = 0x1.0000000000000p+0 +
+                r * (0x1.0000000000287p+0 +
+                     r * (0x1.0000000000172p-1 +
+                          r * (0x1.555555404e1f0p-3 +
+                               r * (0x1.5555554650340p-5 + r * (0x1.111689121f9ffp-7 + r * 0x1.6c1d016b94860p-10)))));
+  return p * power;
+}
+
+#else
+
 // e^x for x <= 0, 4e-16 relative; below -708 it stays at e^-708, which is 0 for any sum here. x = n ln 2 + r, |r| <=
 // ln 2 / 2, Chebyshev polynomial of degree 10 in r; adding 1.5 * 2^52 leaves n in the low bits of the mantissa.
 inline Vec exp_of_negative(Vec x) {
@@ -57,6 +82,8 @@ inline Vec exp_of_negative(Vec x) {
   const Vec p = (p01 + r2 * p23) + r4 * high;
   return reinterpret_cast<Vec>(reinterpret_cast<Bits>(p) + (reinterpret_cast<Bits>(shifted) << 52));
 }
+
+#endif
 
 // ---- covariance ------------------------------------------------------------------------------------------------
 
@@ -87,7 +114,8 @@ struct Matern52 {
 constexpr Index kUnroll = 4;
 
 template <Index kCount>
-inline void half_square_distance(Index dims, const double* a, Index lda, const double* b, Index ldb, Vec* h) {
+[[gnu::always_inline]] inline void half_square_distance(Index dims, const double* a, Index lda, const double* b,
+                                                        Index ldb, Vec* h) {
   const Vec half_b = broadcast(b[dims * ldb]);
   for (Index u = 0; u < kCount; ++u) h[u] = load(a + dims * lda + u * kLanes) + half_b;
   for (Index d = 0; d < dims; ++d) {
@@ -116,7 +144,8 @@ void tile(Index dims, Index rows, const double* a, Index lda, Index cols, const 
 }
 
 template <typename Shape, Index kCount>
-inline Vec weighted_rows(Index dims, const double* a, Index lda, const double* b, Index ldb, const double* weights) {
+[[gnu::always_inline]] inline Vec weighted_rows(Index dims, const double* a, Index lda, const double* b, Index ldb,
+                                                const double* weights) {
   Vec h[kCount];
   half_square_distance<kCount>(dims, a, lda, b, ldb, h);
   Vec total = {};
@@ -126,8 +155,8 @@ inline Vec weighted_rows(Index dims, const double* a, Index lda, const double* b
 
 // Rows in chunks that stay in the first-level cache while every column passes over them.
 template <typename Shape>
-void weighted_sum(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
-                  const double* weights, double* out) {
+[[gnu::always_inline]] inline void weighted_sum_of(Index dims, Index rows, const double* a, Index lda, Index cols,
+                                                   const double* b, Index ldb, const double* weights, double* out) {
   constexpr Index kChunk = 512;
   for (Index j = 0; j < cols; ++j) out[j] = 0;
   const Index end = round_up(rows, kLanes);
@@ -142,6 +171,14 @@ void weighted_sum(Index dims, Index rows, const double* a, Index lda, Index cols
       out[j] += sum(total);
     }
   }
+}
+
+// The loop over six joints is unrolled.
+template <typename Shape>
+void weighted_sum(Index dims, Index rows, const double* a, Index lda, Index cols, const double* b, Index ldb,
+                  const double* weights, double* out) {
+  if (dims == 6) return weighted_sum_of<Shape>(6, rows, a, lda, cols, b, ldb, weights, out);
+  weighted_sum_of<Shape>(dims, rows, a, lda, cols, b, ldb, weights, out);
 }
 
 // With the number of joints known at compile time (kDims > 0) the squared differences and the totals stay in registers.
