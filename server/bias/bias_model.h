@@ -33,7 +33,8 @@ struct BiasPrediction {
   Vector3 mean_B = Vector3::Zero();             ///< m
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one noisy measurement of it
-  double prior_share = 1.0;  ///< posterior variance of the function / prior variance, largest coordinate, in [0, 1]
+  double prior_share =
+      1.0;  ///< posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not
 };
 
 /// All that must be kept to restore a fitted model exactly: no factor, no table.
@@ -59,9 +60,13 @@ struct BiasFitReport {
 /// copies share their tables. Thread-safe.
 class BiasModel {
  public:
-  /// Refuses fewer than 10 observations, non-finite numbers, an unknown kernel name.
+  /// Same problem, options and build of numerics.h, same model bit for bit. `none` predicts zero, with the rms of the
+  /// residual as its stddev. The noise of observation i has variance σ_n² sigma_i²/median(sigma²), the ratio kept
+  /// within [1/4, 4]; σ_n is learned for each output, with a weak prior against values below metrology's. Refuses fewer
+  /// than 10 observations, non-finite numbers, an unknown kernel name, and to go on when told to stop.
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
-  /// Same state, same predictions, bit for bit.
+  /// Same state, same predictions, bit for bit on processors that run the same build of numerics.h (the last bits
+  /// differ between AVX2 and AVX-512). Refuses what fit refuses, and hyperparameters of the wrong shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
   [[nodiscard]] BiasPrediction predict(const JointVector& q) const;
@@ -72,7 +77,8 @@ class BiasModel {
   /// Many at once; rows of `q` are joint vectors.
   [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q) const;
 
-  /// Posterior-to-prior variance share of every training pose when it is left out: what "known" looks like.
+  /// N, in [0, 1]: `prior_share` of every training pose when it is left out: what "known" looks like. A target whose
+  /// own share is above, say, the 99 % quantile of these is farther from the data than they are from each other.
   [[nodiscard]] Eigen::VectorXd leave_one_out_prior_share() const;
   /// N x 3: prediction of every training pose from all the others, m.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
