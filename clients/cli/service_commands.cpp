@@ -186,7 +186,7 @@ Status import_model(client::Session& session, const ServiceArguments& arguments)
   if (!text) return tl::make_unexpected(text.error());
   const Result<int> version = session.import_model(*cell, *text);
   if (!version) return tl::make_unexpected(version.error());
-  tell(fmt::format("cell {}: version {}, not in force\n", *cell, *version), {arguments.json});
+  tell(fmt::format("cell {}: the model is version {}\n", *cell, *version), {arguments.json});
   return write_json(arguments.json, {{"cell", *cell}, {"version", *version}});
 }
 
@@ -271,7 +271,7 @@ void add_service_commands(CLI::App& app, Action& chosen) {
     command.add_option("--model", arguments.model, "cell (its model in force) or cell@version")->required();
     command.add_option("-o,--output", arguments.output, "Model file to write")->required();
   });
-  commands.add("import", "Add a model file to a cell's history, not in force", import_model,
+  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
                [](CLI::App& command, ServiceArguments& arguments) {
                  add_cell(command, arguments);
                  command.add_option("--model", arguments.model, "Model file")->required();

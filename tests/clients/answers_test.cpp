@@ -1,0 +1,92 @@
+#include "clients/cli/answers.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "server/measurement/csv_table.h"
+
+namespace trammel::cli {
+namespace {
+
+TargetFile targets(int count) {
+  TargetFile file{"t.csv", {}, {}};
+  for (int i = 0; i < count; ++i) file.rows.push_back({i + 2, Target{}});
+  return file;
+}
+
+client::CorrectedTarget corrected(const std::string& status) {
+  client::CorrectedTarget target;
+  target.status = status;
+  target.commanded = {1, 2, 3, .5, .5, -.5, .5};
+  target.q_rad = {kPi / 2, 250};
+  target.error_before_mm = 1.5;
+  target.error_after_mm = 1e-5;
+  target.sigma_mm = .04;
+  target.iterations = 3;
+  target.message = status == "ok" ? "" : "because, so";
+  return target;
+}
+
+const std::vector<JointType> kTypes = {JointType::kRevolute, JointType::kPrismatic};
+
+TEST(Answers, CorrectionsAreWrittenWithRowStatusPoseJointsAndErrors) {
+  EXPECT_EQ(corrections_csv(targets(1), {"abc", kTypes, {corrected("ok")}}),
+            "row,status,x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg,q2_mm,error_before_mm,error_after_mm,sigma_mm,iterations,"
+            "model_id,message\n"
+            "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,\n");
+}
+
+TEST(Answers, ATargetWithoutACorrectionHasNoNumbersThatCouldBeCommanded) {
+  for (const char* status : {"unreachable", "joint_limit", "singular", "not_converged", "refused"}) {
+    const std::string text = corrections_csv(targets(1), {"abc", kTypes, {corrected(status)}});
+    const CsvTable table = CsvTable::parse(text, "c.csv").value();
+    for (std::size_t column = 2; column <= 13; ++column) EXPECT_EQ(table.field(0, column), "") << status;
+    EXPECT_EQ(table.field(0, table.require("message").value()), "because, so");
+    EXPECT_FALSE(
+        corrections_json(targets(1), {"abc", kTypes, {corrected(status)}})["targets"][0].contains("commanded"));
+  }
+}
+
+TEST(Answers, OutOfDomainIsACorrectionAndSaysSo) {
+  const std::string text = corrections_csv(targets(1), {"abc", kTypes, {corrected("out_of_domain")}});
+  const CsvTable table = CsvTable::parse(text, "c.csv").value();
+  EXPECT_EQ(table.field(0, 1), "out_of_domain");
+  EXPECT_EQ(table.field(0, 2), "1");
+}
+
+TEST(Answers, TheSummaryCountsStatuses) {
+  EXPECT_EQ(corrections_summary({"abc", kTypes, {corrected("ok"), corrected("unreachable"), corrected("ok")}}),
+            "3 targets: 2 ok, 1 unreachable\n");
+}
+
+TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
+  JointList list{"j.csv", kTypes, {CommandedPose{}}};
+  list.poses[0].pose_id = "p, 1";
+  client::PredictedError item;
+  item.predicted = {1, 2, 3, 1, 0, 0, 0};
+  item.dx_mm = .5;
+  item.sx_mm = .25;
+  item.in_domain = true;
+  EXPECT_EQ(predictions_csv(list, {"abc", {item}}),
+            "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id\n"
+            "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc\n");
+  EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["dx_mm"], .5);
+}
+
+TEST(Answers, TheWireHasMillimetresAndRadians) {
+  Pose X_BT = Pose::Identity();
+  X_BT.translation() = Vector3(.001, -.002, 3);
+  const client::PoseMm pose = to_wire(X_BT);
+  EXPECT_DOUBLE_EQ(pose.x_mm, 1);
+  EXPECT_DOUBLE_EQ(pose.y_mm, -2);
+  EXPECT_DOUBLE_EQ(pose.z_mm, 3000);
+  EXPECT_DOUBLE_EQ(pose.qw, 1);
+  EXPECT_EQ(to_wire(Eigen::Vector2d(1, .25), kTypes), (std::vector<double>{1, 250}));
+  Target target;
+  target.conf = 2;
+  EXPECT_TRUE(to_wire(target, kTypes).seed_rad.empty());
+  EXPECT_EQ(to_wire(target, kTypes).conf, 2);
+}
+
+}  // namespace
+}  // namespace trammel::cli

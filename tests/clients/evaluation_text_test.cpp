@@ -1,0 +1,64 @@
+#include "clients/cli/evaluation_text.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "tests/support/small_cell.h"
+
+namespace trammel::cli {
+namespace {
+
+Evaluation evaluation() {
+  Evaluation evaluation;
+  evaluation.poses = 7;
+  evaluation.in_domain = 6;
+  evaluation.coverage_95 = .9;
+  evaluation.nominal.rms = 3e-3;
+  evaluation.calibrated.rms = 4e-4;
+  evaluation.compensated = {1e-4, 9e-5, 2e-4, 3e-4, Vector3(1e-5, 2e-5, -3e-5), Vector3(4e-5, 5e-5, 6e-5)};
+  return evaluation;
+}
+
+TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {
+  const std::string compensated =
+      R"("rms_mm":0.1,"mean_mm":0.09,"p997_mm":0.2,"max_mm":0.3,"axis":{"x":{"mean_mm":0.01,"std_mm":0.04},)"
+      R"("y":{"mean_mm":0.02,"std_mm":0.05},"z":{"mean_mm":-0.03,"std_mm":0.06}})";
+  auto json = evaluation_json(evaluation());
+  EXPECT_EQ(json["levels"]["nominal"]["rms_mm"], 3.0);
+  EXPECT_EQ(json["levels"]["calibrated"]["rms_mm"], 0.4);
+  json["levels"].erase("nominal");
+  json["levels"].erase("calibrated");
+  const auto expected = nlohmann::json::parse("{\"poses\":7," + compensated + ",\"levels\":{\"compensated\":{" +
+                                              compensated + "}},\"coverage_95\":0.9,\"in_domain\":6}");
+  // Through text with 12 digits: a factor of 1000 may cost the last bit.
+  std::function<nlohmann::json(const nlohmann::json&)> rounded = [&](const nlohmann::json& value) -> nlohmann::json {
+    if (value.is_number_float()) return fmt::format("{:.12g}", value.get<double>());
+    if (!value.is_structured()) return value;
+    nlohmann::json copy = value;
+    for (auto& item : copy) item = rounded(item);
+    return copy;
+  };
+  EXPECT_EQ(rounded(nlohmann::json::parse(json.dump())), rounded(expected));
+}
+
+TEST(EvaluationTable, HasALineForEachLevel) {
+  const std::string table = evaluation_table(evaluation());
+  EXPECT_NE(table.find("nominal         3.0000"), std::string::npos) << table;
+  EXPECT_NE(table.find("calibrated      0.4000"), std::string::npos) << table;
+  EXPECT_NE(table.find("compensated     0.1000    0.0900    0.2000    0.3000"), std::string::npos) << table;
+  EXPECT_NE(table.find("6 of 7 poses in domain; 90.0 %"), std::string::npos) << table;
+}
+
+TEST(ModelText, SaysWhatCouldNotBeIdentified) {
+  CompensatedModel::Parts parts = test::nominal_model(test::small_cell("cell-3"), 12).parts();
+  parts.unidentifiable.push_back({0.1, {"q1", "gamma0"}, "q1 and gamma0 turn the same way"});
+  const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
+  const std::string text = model_text(model);
+  EXPECT_NE(text.find("cell cell-3"), std::string::npos) << text;
+  EXPECT_NE(text.find("q1 and gamma0 turn the same way"), std::string::npos) << text;
+  EXPECT_EQ(model_json(model)["not_identifiable"][0]["parameters"][1], "gamma0");
+}
+
+}  // namespace
+}  // namespace trammel::cli

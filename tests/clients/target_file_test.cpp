@@ -1,0 +1,84 @@
+#include "clients/cli/target_file.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "tests/support/small_cell.h"
+
+namespace trammel::cli {
+namespace {
+
+const std::string kPose = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
+
+std::string refusal(const std::string& text) {
+  const auto file = parse_targets_csv(text, "t.csv");
+  return file ? "accepted" : file.error().message;
+}
+
+TEST(TargetFile, ReadsPosesWithABranch) {
+  const auto file = parse_targets_csv("conf," + kPose + ",note\n3,1000,-200,1500,0,1,0,0,hole 7\n", "t.csv");
+  ASSERT_TRUE(file) << file.error().message;
+  ASSERT_EQ(file->rows.size(), 1u);
+  const Target& target = file->rows[0].target;
+  EXPECT_EQ(file->rows[0].row, 2);
+  EXPECT_EQ(target.conf, 3);
+  EXPECT_FALSE(target.seed);
+  EXPECT_FALSE(target.joint_target);
+  EXPECT_TRUE(target.X_BT.translation().isApprox(Vector3(1, -.2, 1.5)));
+  EXPECT_TRUE(target.X_BT.linear().isApprox(Vector3(1, -1, -1).asDiagonal().toDenseMatrix()));
+}
+
+TEST(TargetFile, ReadsPosesWithASeed) {
+  const auto file = parse_targets_csv(kPose + ",q1_deg,q2_deg\n1,2,3,1,0,0,0,90,-45\n", "t.csv");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_TRUE(file->rows[0].target.seed.value().isApprox(Eigen::Vector2d(kPi / 2, -kPi / 4)));
+  EXPECT_FALSE(file->rows[0].target.conf);
+}
+
+TEST(TargetFile, EachRowMaySayItsBranchInItsOwnWay) {
+  const auto file = parse_targets_csv(kPose + ",conf,q1_deg\n1,2,3,1,0,0,0,5,\n1,2,3,1,0,0,0,,90\n", "t.csv");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->rows[0].target.conf, 5);
+  EXPECT_FALSE(file->rows[0].target.seed);
+  EXPECT_FALSE(file->rows[1].target.conf);
+  EXPECT_TRUE(file->rows[1].target.seed);
+}
+
+TEST(TargetFile, ReadsJointTargetsAlone) {
+  const auto file = parse_targets_csv("q1_deg,q2_mm\n180,250\n", "t.csv");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_TRUE(file->rows[0].target.joint_target);
+  EXPECT_TRUE(file->rows[0].target.seed.value().isApprox(Eigen::Vector2d(kPi, .25)));
+}
+
+TEST(TargetFile, RefusesWhatIsNoTarget) {
+  EXPECT_EQ(refusal(""), "t.csv: empty file, expected a header line with column names");
+  EXPECT_EQ(refusal("a,b\n1,2\n"),
+            "t.csv: neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...); the header has: a,b");
+  EXPECT_EQ(refusal(kPose + "\n1,2,3,1,0,0,0\n"), "t.csv: missing column conf, or q1_deg... as the seed of the poses");
+  EXPECT_EQ(refusal("x_mm,y_mm,q1_deg\n1,2,3\n"),
+            "t.csv: missing column z_mm; x_mm, y_mm, z_mm, qw, qx, qy, qz come all together or not at all");
+  EXPECT_EQ(refusal(kPose + ",conf\n"), "t.csv: no targets below the header, at least 1 is needed");
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), "t.csv row 2: neither conf nor joints as the seed of the pose");
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), "t.csv row 2: conf is 8, expected a whole number from 0 to 7");
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"),
+            "t.csv row 2: quaternion qw,qx,qy,qz has length 1.00499, expected 1 (limit 0.001)");
+  EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), "t.csv row 3: q1_deg is nan, expected a finite number");
+}
+
+TEST(TargetFile, IsHeldAgainstTheRobot) {
+  const Chain robot = test::small_cell("c")->robot;
+  const auto check = [&](const std::string& text, const Chain& chain) {
+    const Status checked = check_targets(parse_targets_csv(text, "t.csv").value(), chain);
+    return checked ? "fits" : checked.error().message;
+  };
+  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", robot), "fits");
+  EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), "t.csv: 2 joint columns, robot " + robot.name() + " has 6");
+  const Chain one = Chain::make("turntable", {Joint{}}).value();
+  EXPECT_EQ(check("q1_deg\n1\n", one), "fits");
+  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one),
+            "t.csv row 2: conf is 1, but robot turntable has no spherical wrist to number branches by; give q1_deg...");
+}
+
+}  // namespace
+}  // namespace trammel::cli

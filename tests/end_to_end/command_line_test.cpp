@@ -1,0 +1,410 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "server/measurement/csv_table.h"
+#include "tests/support/daemon.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_cell.h"
+
+namespace trammel {
+namespace {
+
+using nlohmann::json;
+using test::Finished;
+
+constexpr int kWrongUsage = 2;
+constexpr int kRefusedData = 3;
+constexpr int kNoService = 4;
+
+const std::string kTruth = TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml";
+
+/// The program in a folder of its own.
+class CommandLine : public testing::Test {
+ protected:
+  static Finished trammel(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
+    return test::run(arguments);
+  }
+  /// Fails the test when the program does.
+  static Finished must(const std::vector<std::string>& arguments) {
+    Finished finished = trammel(arguments);
+    EXPECT_EQ(finished.exit_code, 0) << finished.err;
+    return finished;
+  }
+  std::string file(const std::string& name) const { return folder_.file(name); }
+
+  /// `name`.csv: a batch of the shipped cell's virtual robot at `poses` planned poses.
+  std::string measure(const std::string& name, int poses, int seed) {
+    must({"plan", "--cell", cell_, "--count", std::to_string(poses), "--seed", std::to_string(seed), "-o",
+          file(name + "-plan.csv")});
+    must({"simulate", "--cell", cell_, "--truth", kTruth, "--plan", file(name + "-plan.csv"), "--seed",
+          std::to_string(seed), "-o", file(name + ".csv")});
+    return file(name + ".csv");
+  }
+  std::string train(const std::string& batch, const std::string& level) {
+    must({"train", "--cell", cell_, "--batch", batch, "--level", level, "--bias", "none", "-o", file("cell.model")});
+    return file("cell.model");
+  }
+  /// The batch with each row's field in `column` put through `change`, as a file of its own.
+  std::string changed(const std::string& batch, const std::string& column,
+                      const std::function<std::string(std::size_t row, const std::string& field)>& change) {
+    const CsvTable table = CsvTable::parse(test::read_file(batch), batch).value();
+    const std::size_t at = table.require(column).value();
+    std::string text = fmt::format("{}\n", fmt::join(table.columns(), ","));
+    for (std::size_t row = 0; row < table.size(); ++row) {
+      for (std::size_t k = 0; k < table.columns().size(); ++k) {
+        text += k == 0 ? "" : ",";
+        text += k == at ? change(row, table.field(row, k)) : table.field(row, k);
+      }
+      text += "\n";
+    }
+    return folder_.write("changed.csv", text);
+  }
+
+  /// Refused with 3, nothing written, and all of `parts` in the message.
+  void expect_refused(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) {
+    const Finished finished = trammel(arguments);
+    EXPECT_EQ(finished.exit_code, kRefusedData) << finished.err;
+    for (const std::string& part : parts) {
+      EXPECT_NE(finished.err.find(part), std::string::npos) << "'" << part << "' is not in: " << finished.err;
+    }
+    EXPECT_FALSE(std::filesystem::exists(file("out"))) << "something was written";
+  }
+  void expect_training_refused(const std::string& batch, const std::vector<std::string>& parts) {
+    expect_refused({"train", "--cell", cell_, "--batch", batch, "-o", file("out")}, parts);
+  }
+
+  const std::string cell_ = test::shipped_cell_file();
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(CommandLine, HelpOfEveryCommandEndsWith0AndNamesItsOptions) {
+  const std::vector<std::pair<std::string, std::string>> commands = {
+      {"plan", "--count"},     {"simulate", "--truth"}, {"train", "--level"},   {"evaluate", "--json"},
+      {"report", "--batch"},   {"predict", "--joints"}, {"correct", "input"},   {"submit", "--batch"},
+      {"retrain", "--bias"},   {"status", "--timeout"}, {"watch", "--job"},     {"models", "--cell"},
+      {"activate", "--model"}, {"rollback", "--cell"},  {"export", "--output"}, {"import", "--model"}};
+  for (const auto& [command, option] : commands) {
+    const Finished help = must({command, "--help"});
+    EXPECT_NE(help.out.find(option), std::string::npos) << command;
+  }
+}
+
+TEST_F(CommandLine, WrongUsageEndsWith2AndNamesWhatIsWrong) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{}, "A command is required"},
+      {{"frobnicate"}, "frobnicate"},
+      {{"train", "--cell", cell_}, "--batch is required"},
+      {{"evaluate", "--model", "m", "--batch", "b", "--frob"}, "--frob"},
+      {{"plan", "--cell", cell_, "--count", "-3", "-o", file("out")}, "--count"},
+      {{"plan", "--cell", cell_, "--count", "many", "-o", file("out")}, "--count"},
+      {{"plan", "--cell", cell_, "--count", "5", "--criterion", "luck", "-o", file("out")}, "luck"},
+      {{"simulate", "--truth", kTruth, "--plan", "p.csv", "-o", file("out")}, "--robot"},
+      {{"train", "--cell", cell_, "--batch", "b", "--validation-share", "1.5", "-o", file("out")},
+       "--validation-share"},
+      {{"correct", "--model", "m", "program.xyz", "-o", file("out")}, "unknown kind of targets '.xyz'"},
+      {{"activate", "--model", "cell-7", "--timeout", "0.1"}, "expected cell@version"},
+  };
+  for (const auto& [arguments, part] : wrong) {
+    const Finished finished = trammel(arguments);
+    EXPECT_EQ(finished.exit_code, kWrongUsage) << part;
+    EXPECT_NE((finished.err + finished.out).find(part), std::string::npos) << finished.err;
+    EXPECT_EQ(finished.out, "") << "errors belong on standard error";
+  }
+}
+
+TEST_F(CommandLine, ALevelThatDoesNotExistIsWrongUsage) {
+  const std::string batch = measure("b", 20, 1);
+  const Finished finished = trammel({"train", "--cell", cell_, "--batch", batch, "--level", "M9", "-o", file("out")});
+  EXPECT_EQ(finished.exit_code, kWrongUsage);
+  EXPECT_NE(finished.err.find("M9"), std::string::npos) << finished.err;
+}
+
+TEST_F(CommandLine, FromPlanToEvaluationOnFilesAlone) {
+  const std::string model = train(measure("b", 60, 1), "M3");
+  const Finished evaluated = must({"evaluate", "--model", model, "--batch", measure("v", 50, 2), "--json", "-"});
+  const json result = json::parse(evaluated.out);
+  EXPECT_EQ(result.at("poses"), 50);
+  EXPECT_GT(result.at("levels").at("nominal").at("rms_mm"), 5.0);
+  EXPECT_LT(result.at("levels").at("calibrated").at("rms_mm"), 0.05);
+  EXPECT_EQ(result.at("rms_mm"), result.at("levels").at("compensated").at("rms_mm"));
+  for (const json& figures : {result, result.at("levels").at("nominal"), result.at("levels").at("compensated")}) {
+    for (const char* key : {"rms_mm", "mean_mm", "p997_mm", "max_mm"}) EXPECT_TRUE(figures.at(key).is_number()) << key;
+    for (const char* axis : {"x", "y", "z"}) {
+      EXPECT_TRUE(figures.at("axis").at(axis).at("mean_mm").is_number());
+      EXPECT_TRUE(figures.at("axis").at(axis).at("std_mm").is_number());
+    }
+  }
+  EXPECT_GE(result.at("coverage_95"), 0.0);
+  EXPECT_LE(result.at("in_domain"), 50);
+}
+
+TEST_F(CommandLine, TheSameSeedGivesTheSameBytes) {
+  const std::string first = test::read_file(measure("b", 20, 5));
+  EXPECT_EQ(test::read_file(measure("b", 20, 5)), first);
+  EXPECT_NE(test::read_file(measure("b", 20, 6)), first);
+}
+
+TEST_F(CommandLine, TrainingSaysHowGoodTheModelIsAndWhatItCouldNotTell) {
+  const Finished trained = must({"train", "--cell", cell_, "--batch", measure("b", 60, 1), "--level", "M2", "--bias",
+                                 "none", "--validation-share", "0.25", "-o", file("m")});
+  for (const char* part : {"nominal", "calibrated", "compensated", "not identifiable", "15 poses held out"}) {
+    EXPECT_NE(trained.out.find(part), std::string::npos) << part << " is not in:\n" << trained.out;
+  }
+  EXPECT_EQ(trained.err, "") << "no progress in a pipe";
+}
+
+TEST_F(CommandLine, AResultForProgramsOnStandardOutputStandsThereAlone) {
+  const std::string batch = measure("b", 30, 1);
+  const Finished trained = must(
+      {"train", "--cell", cell_, "--batch", batch, "--level", "M1", "--bias", "none", "-o", file("m"), "--json", "-"});
+  const json result = json::parse(trained.out);
+  EXPECT_EQ(result.at("level"), "base");
+  EXPECT_EQ(result.at("training_poses"), 30);
+  EXPECT_EQ(result.at("parameters").size(), 6u);
+}
+
+TEST_F(CommandLine, PredictionsCarryErrorUncertaintyDomainAndPose) {
+  const std::string batch = measure("b", 40, 1);
+  const std::string model = train(batch, "M1");
+  must({"predict", "--model", model, "--joints", file("b-plan.csv"), "-o", file("p.csv")});
+  const CsvTable table = CsvTable::parse(test::read_file(file("p.csv")), "p.csv").value();
+  ASSERT_EQ(table.size(), 40u);
+  for (const char* column : {"dx_mm", "dy_mm", "dz_mm", "sx_mm", "sy_mm", "sz_mm", "in_domain", "x_mm", "y_mm", "z_mm",
+                             "qw", "qx", "qy", "qz"}) {
+    EXPECT_TRUE(table.number(0, table.require(column).value())) << column;
+  }
+  EXPECT_EQ(table.number(0, table.require("in_domain").value()).value(), 1);
+  EXPECT_GT(table.number(0, table.require("sx_mm").value()).value(), 0);
+}
+
+TEST_F(CommandLine, AVirtualRobotSentToCorrectedTargetsLandsWhereItWasWanted) {
+  const std::string model = train(measure("b", 80, 1), "M3");
+  must({"plan", "--cell", cell_, "--count", "20", "--seed", "9", "-o", file("wanted.csv")});
+  const Finished nominal =
+      must({"predict", "--model", model, "--joints", file("wanted.csv"), "-o", file("p.csv"), "--json", "-"});
+  must({"correct", "--model", model, file("wanted.csv"), "-o", file("c.csv")});
+
+  const CsvTable corrected = CsvTable::parse(test::read_file(file("c.csv")), "c.csv").value();
+  const json wanted = json::parse(nominal.out).at("predictions");
+  ASSERT_EQ(corrected.size(), 20u);
+  std::string sent = "pose_id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
+  for (std::size_t row = 0; row < corrected.size(); ++row) {
+    if (corrected.field(row, 1) != "ok") continue;
+    EXPECT_LT(corrected.number(row, corrected.require("error_after_mm").value()).value(), 1e-3);
+    sent += std::to_string(row);
+    for (int j = 1; j <= 6; ++j) {
+      sent += "," + corrected.field(row, corrected.require(fmt::format("q{}_deg", j)).value());
+    }
+    sent += "\n";
+  }
+  must(
+      {"simulate", "--cell", cell_, "--truth", kTruth, "--plan", folder_.write("sent.csv", sent), "-o", file("m.csv")});
+  const CsvTable landed = CsvTable::parse(test::read_file(file("m.csv")), "m.csv").value();
+  ASSERT_GT(landed.size(), 12u) << test::read_file(file("c.csv"));
+  for (std::size_t row = 0; row < landed.size(); ++row) {
+    const auto target = static_cast<std::size_t>(std::stoi(landed.field(row, 0)));
+    double squared = 0;  // cell-7 stands at the origin of W
+    for (const char* column : {"x_mm", "y_mm", "z_mm"}) {
+      const double measured = landed.number(row, landed.require(column).value()).value();
+      squared += std::pow(measured - wanted.at(target).at("nominal").at(column).get<double>(), 2);
+    }
+    EXPECT_LT(std::sqrt(squared), 0.15) << "target " << target;  // noise of 0.013 mm an axis and what the fit leaves
+  }
+}
+
+TEST_F(CommandLine, TargetsWithoutACorrectionSayWhyAndCarryNoNumbers) {
+  const std::string model = train(measure("b", 40, 1), "M1");
+  const std::string targets = folder_.write("t.csv",
+                                            "x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n"
+                                            "9000,0,1000,1,0,0,0,0,0,0,0,30,0\n");
+  const Finished corrected = must({"correct", "--model", model, targets, "-o", file("c.csv")});
+  EXPECT_NE(corrected.err.find("1 targets: 1 unreachable"), std::string::npos) << corrected.err;
+  const CsvTable table = CsvTable::parse(test::read_file(file("c.csv")), "c.csv").value();
+  EXPECT_EQ(table.field(0, table.require("row").value()), "2");
+  EXPECT_EQ(table.field(0, table.require("status").value()), "unreachable");
+  for (const char* column : {"x_mm", "qw", "q1_deg", "error_after_mm", "sigma_mm"}) {
+    EXPECT_EQ(table.field(0, table.require(column).value()), "") << column;
+  }
+  EXPECT_NE(table.field(0, table.require("message").value()), "");
+}
+
+TEST_F(CommandLine, AJointTargetOutsideTheLimitsIsAStatusNotARefusal) {
+  const std::string model = train(measure("b", 40, 1), "M1");
+  const std::string targets = folder_.write("t.csv",
+                                            "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n"
+                                            "10,10,-20,30,40,50\n10,10,71,30,40,50\n");
+  must({"correct", "--model", model, targets, "-o", file("c.csv")});
+  const CsvTable table = CsvTable::parse(test::read_file(file("c.csv")), "c.csv").value();
+  ASSERT_EQ(table.size(), 2u);
+  EXPECT_EQ(table.field(0, table.require("status").value()), "ok");
+  EXPECT_EQ(table.field(1, table.require("status").value()), "joint_limit");
+}
+
+TEST_F(CommandLine, ABadNumberInOneTargetRefusesTheWholeFile) {
+  const std::string model = train(measure("b", 40, 1), "M1");
+  const std::string head = "x_mm,y_mm,z_mm,qw,qx,qy,qz,conf\n1500,0,1500,1,0,0,0,0\n";
+  const auto expect_row_refused = [&](const std::string& row, const std::vector<std::string>& parts) {
+    expect_refused({"correct", "--model", model, folder_.write("t.csv", head + row), "-o", file("out")}, parts);
+  };
+  expect_row_refused("1500,nan,1500,1,0,0,0,0\n", {"t.csv row 3", "y_mm is nan"});
+  expect_row_refused("1500,0,1500,1,0.1,0,0,0\n", {"t.csv row 3", "quaternion", "1.00499", "limit 0.001"});
+  expect_row_refused("1500,0,1500,1,0,0,0,8\n", {"t.csv row 3", "conf is 8", "0 to 7"});
+  expect_row_refused("1500,0,1500,1,0,0,0,\n", {"t.csv row 3", "neither conf nor joints"});
+}
+
+TEST_F(CommandLine, RefusesBatchesThatAreNoneAndSaysWhy) {
+  expect_training_refused(folder_.write("b.csv", ""), {"b.csv", "empty file"});
+  expect_training_refused(folder_.write("b.csv", "q1_deg,x_mm,y_mm\n1,2,3\n"), {"b.csv", "missing column z_mm"});
+  expect_training_refused(folder_.write("b.csv", std::string("\x7F"
+                                                             "ELF\0\1\2\n",
+                                                             8)),
+                          {"b.csv"});
+  expect_training_refused(file("nowhere.csv"), {"nowhere.csv", "no such file"});
+}
+
+TEST_F(CommandLine, RefusesBadValuesWithFileRowValueAndLimit) {
+  const std::string batch = measure("b", 20, 1);
+  const auto in_row_4 = [](const std::string& value) {
+    return [value](std::size_t row, const std::string& field) { return row == 2 ? value : field; };
+  };
+  expect_training_refused(changed(batch, "y_mm", in_row_4("nan")), {"changed.csv row 4", "y_mm", "nan"});
+  expect_training_refused(changed(batch, "q3_deg", in_row_4("71.5")),
+                          {"changed.csv row 4", "joint 3", "71.5 deg", "limit 70"});
+  expect_training_refused(changed(batch, "tool_id", in_row_4("saw")),
+                          {"changed.csv row 4", "unknown tool 'saw'", "spindle"});
+}
+
+TEST_F(CommandLine, RefusesFiveJointsForARobotOfSix) {
+  std::string five = test::read_file(measure("b", 20, 1));
+  five.replace(five.find("q6_deg"), 6, "j6_deg");
+  expect_training_refused(folder_.write("five.csv", five), {"five.csv", "5 joint columns", "has 6"});
+}
+
+TEST_F(CommandLine, RefusesJointsInRadiansAndNamesBothSpreads) {
+  std::string batch = measure("b", 40, 1);
+  for (int j = 1; j <= 6; ++j) {
+    batch = changed(batch, fmt::format("q{}_deg", j), [](std::size_t, const std::string& field) {
+      return fmt::format("{}", std::stod(field) / 57.29578);
+    });
+  }
+  expect_training_refused(batch, {"changed.csv", "radians", "spread over", "move the tool over"});
+}
+
+TEST_F(CommandLine, RefusesAFileThatIsNoModel) {
+  const std::string batch = measure("b", 20, 1);
+  expect_refused({"evaluate", "--model", folder_.write("garbage.model", "what is this"), "--batch", batch},
+                 {"garbage.model"});
+  expect_refused({"evaluate", "--model", file("nowhere.model"), "--batch", batch}, {"nowhere.model", "no such file"});
+  expect_refused({"predict", "--model", batch, "--joints", batch, "-o", file("out")}, {"b.csv"});
+}
+
+TEST_F(CommandLine, AModelThatWasTamperedWithIsRefused) {
+  std::string text = test::read_file(train(measure("b", 20, 1), "M1"));
+  const std::size_t digit = text.find_last_of("123456789");
+  text[digit] = text[digit] == '9' ? '8' : static_cast<char>(text[digit] + 1);
+  expect_refused({"report", "--model", folder_.write("t.model", text), "-o", file("out")}, {"t.model"});
+}
+
+TEST_F(CommandLine, AnOutputThatCannotBeWrittenIsRefusedAndLeavesNoPart) {
+  const std::string nowhere = file("no/such/folder/plan.csv");
+  expect_refused({"plan", "--cell", cell_, "--count", "5", "-o", nowhere}, {nowhere, "cannot be written"});
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
+TEST_F(CommandLine, AFailedTrainingLeavesTheOldModelAsItWas) {
+  const std::string model = train(measure("b", 20, 1), "M1");
+  const std::string before = test::read_file(model);
+  const Finished failed = trammel({"train", "--cell", cell_, "--batch", file("nowhere.csv"), "-o", model});
+  EXPECT_EQ(failed.exit_code, kRefusedData);
+  EXPECT_EQ(test::read_file(model), before);
+}
+
+TEST_F(CommandLine, TheReportIsOnePageWithItsChartsInside) {
+  const std::string batch = measure("b", 30, 1);
+  must({"report", "--model", train(batch, "M2"), "--batch", batch, "-o", file("r.html")});
+  const std::string page = test::read_file(file("r.html"));
+  EXPECT_NE(page.find("Chart.js v"), std::string::npos);
+  EXPECT_NE(page.find("gamma0"), std::string::npos);
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos);
+  EXPECT_EQ(page.find("{{"), std::string::npos);
+}
+
+TEST_F(CommandLine, AServiceThatIsNotThereEndsWith4) {
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"status"}, {"models", "--cell", "cell-7"}, {"rollback", "--cell", "cell-7"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--service", "--domain", "99", "--port", "19999", "--timeout", "0.3"});
+    EXPECT_EQ(trammel(arguments).exit_code, kNoService) << command.front();
+  }
+}
+
+/// The program against a daemon of its own.
+class CommandLineWithService : public CommandLine {
+ protected:
+  void SetUp() override { daemon_.start(); }
+  Finished ask(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--service", "--domain", std::to_string(daemon_.domain()), "--port",
+                                       std::to_string(daemon_.port()), "--timeout", "20"});
+    return trammel(arguments);
+  }
+  Finished must_answer(const std::vector<std::string>& arguments) {
+    Finished finished = ask(arguments);
+    EXPECT_EQ(finished.exit_code, 0) << arguments.front() << ": " << finished.err;
+    return finished;
+  }
+  /// The version that the model file became.
+  int imported(const std::string& model) {
+    return json::parse(must_answer({"import", "--cell", "cell-7", "--model", model, "--json", "-"}).out).at("version");
+  }
+  test::Daemon daemon_;
+};
+
+TEST_F(CommandLineWithService, ASubmittedBatchIsTrainedListedExportedAndAnswersAsTheFileDoes) {
+  const std::string batch = measure("first", 40, 1);
+  const Finished submitted = must_answer({"submit", "--cell", cell_, "--batch", batch, "--watch", "--json", "-"});
+  EXPECT_EQ(json::parse(submitted.out).at("stage"), "done");
+
+  const json status = json::parse(must_answer({"status", "--json", "-"}).out);
+  EXPECT_EQ(status.at("servers").size(), 1u);
+  EXPECT_EQ(status.at("models").at(0).at("cell"), "cell-7");
+  const json models = json::parse(must_answer({"models", "--cell", "cell-7", "--json", "-"}).out).at("models");
+  ASSERT_EQ(models.size(), 1u);
+  EXPECT_EQ(models.at(0).at("batch"), "first");
+  EXPECT_EQ(models.at(0).at("in_force"), true);
+
+  must_answer({"export", "--model", "cell-7", "-o", file("served.model")});
+  must({"predict", "--model", file("served.model"), "--joints", batch, "-o", file("here.csv")});
+  must_answer({"predict", "--model", "cell-7@1", "--joints", batch, "-o", file("there.csv")});
+  EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));
+  must({"correct", "--model", file("served.model"), file("first-plan.csv"), "-o", file("here.csv")});
+  must_answer({"correct", "--model", "cell-7", file("first-plan.csv"), "-o", file("there.csv")});
+  EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));
+}
+
+TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImported) {
+  must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 40, 1), "--id", "lt-01", "--watch"});
+  must_answer({"retrain", "--cell", "cell-7", "--batch", "lt-01", "--level", "M1", "--bias", "none", "--watch"});
+  EXPECT_NE(must_answer({"activate", "--model", "cell-7@2"}).out.find("version 2 in force"), std::string::npos);
+  EXPECT_NE(must_answer({"rollback", "--cell", "cell-7"}).out.find("version 1 in force"), std::string::npos);
+  must_answer({"export", "--model", "cell-7@2", "-o", file("second.model")});
+  EXPECT_EQ(imported(file("second.model")), 2) << "the service has it already";
+  EXPECT_EQ(imported(train(measure("other", 30, 3), "M1")), 3);
+}
+
+TEST_F(CommandLineWithService, WhatTheServiceRefusesEndsWith3AndItsReason) {
+  const Finished unknown = ask({"models", "--cell", "cell-99"});
+  EXPECT_EQ(unknown.exit_code, kRefusedData);
+  EXPECT_NE(unknown.err.find("cell-99"), std::string::npos) << unknown.err;
+  const Finished empty = ask({"submit", "--cell", "cell-7", "--batch", folder_.write("empty.csv", "")});
+  EXPECT_EQ(empty.exit_code, kRefusedData);
+  EXPECT_NE(empty.err.find("empty"), std::string::npos) << empty.err;
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,92 @@
+#include "server/report/model_page.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "server/trainer/train.h"
+#include "tests/support/small_cell.h"
+
+namespace trammel {
+namespace {
+
+class ModelPage : public testing::Test {
+ protected:
+  ModelPage() : cell_(test::small_cell("cell-3", "se")) {
+    test::SmallBatch shape;
+    shape.poses = 30;
+    batch_ = parse_batch_csv(test::small_batch_csv(*cell_, shape), "lt-<03>.csv").value();
+  }
+  CompensatedModel trained(const std::string& bias, double validation_share = 0) const {
+    TrainOptions options;
+    options.bias = bias;
+    options.validation_share = validation_share;
+    return train(cell_, batch_, options).value();
+  }
+  /// What the charts of the page are drawn from.
+  static nlohmann::json chart_data(const std::string& page) {
+    const std::string opening = "<script type=\"application/json\" id=\"data\">";
+    const std::size_t from = page.find(opening) + opening.size();
+    return nlohmann::json::parse(page.substr(from, page.find("</script>", from) - from));
+  }
+  static bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+
+  std::shared_ptr<const Cell> cell_;
+  MeasurementBatch batch_;
+};
+
+TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
+  const CompensatedModel model = trained("none");
+  const std::string page = model_page(model, std::nullopt);
+  for (const std::string& part : {model.provenance().hash, model.provenance().batch_hash, cell_->robot.name(),
+                                  std::string("gamma0"), std::string("U (k = 2)")}) {
+    EXPECT_TRUE(has(page, part)) << part;
+  }
+}
+
+TEST_F(ModelPage, OpensWithoutANetwork) {
+  const std::string page = model_page(trained("none"), std::nullopt);
+  EXPECT_TRUE(has(page, "Chart.js v"));
+  EXPECT_FALSE(has(page, "<link"));
+  EXPECT_FALSE(has(page, " src="));
+}
+
+TEST_F(ModelPage, CountsEveryPoseOfTheBatchInItsHistogram) {
+  const auto checked = check_against_cell(batch_, *cell_);
+  const auto histogram = chart_data(model_page(trained("none"), *checked)).at("histogram");
+  for (const char* level : {"calibrated", "compensated"}) {
+    const auto counts = histogram.at(level).get<std::vector<int>>();
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0), 30) << level;
+    EXPECT_EQ(counts.size(), histogram.at("labels_mm").size());
+  }
+}
+
+TEST_F(ModelPage, WithoutABatchShowsThePosesHeldOutAndTheTrainingLeftOutOneByOne) {
+  const std::string page = model_page(trained("se", 0.2), std::nullopt);
+  EXPECT_TRUE(has(page, "On 6 poses of batch"));
+  const auto counts = chart_data(page).at("histogram").at("compensated").get<std::vector<int>>();
+  EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0), 24);
+}
+
+TEST_F(ModelPage, DrawsNoHistogramWhereItKnowsNoPoses) {
+  EXPECT_FALSE(chart_data(model_page(trained("none"), std::nullopt)).contains("histogram"));
+}
+
+TEST_F(ModelPage, NamesFromFilesStayText) {
+  const std::string page = model_page(trained("none"), *check_against_cell(batch_, *cell_));
+  EXPECT_FALSE(has(page, "lt-<03>"));
+  EXPECT_TRUE(has(page, "lt-&lt;03&gt;"));
+}
+
+TEST_F(ModelPage, SaysInWordsWhatCouldNotBeTold) {
+  CompensatedModel::Parts parts = trained("none").parts();
+  parts.unidentifiable = {{0.1, {"q1", "gamma0"}, "q1 & gamma0 turn the same way"}};
+  EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt),
+                  "<li>q1 &amp; gamma0 turn the same way</li>"));
+  parts.unidentifiable.clear();
+  EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "Nothing: every combination"));
+}
+
+}  // namespace
+}  // namespace trammel
