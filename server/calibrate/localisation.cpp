@@ -97,23 +97,25 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
     const Result<Pose> X_WB = fit_transform(p_W, p_B);
     if (!X_WB) return tl::make_unexpected(X_WB.error());
     found.X_WB = *X_WB;
-    // The tool point, given the base's rotation, with the base's translation free. What the flange's turning leaves
-    // open (a shift along its only axis) stays at its smallest.
-    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-    Vector6 right = Vector6::Zero();
+    // The tool point, given the base's rotation and with its translation projected out. What the flange's turning
+    // leaves open (a shift along its only axis) stays at its smallest.
+    const Matrix3 R_WB = found.X_WB.linear();
+    Matrix3 normal = Matrix3::Zero();
+    Vector3 right = Vector3::Zero();
+    Vector3 shift = Vector3::Zero();
     for (std::size_t i = 0; i < X_BF.size(); ++i) {
-      Eigen::Matrix<double, 3, 6> row;
-      row << Matrix3::Identity(), found.X_WB.linear() * X_BF[i].linear();
-      normal += row.transpose() * row;
-      right += row.transpose() * (p_W.col(static_cast<int>(i)) - found.X_WB.linear() * X_BF[i].translation());
+      const Matrix3 turned = R_WB * (X_BF[i].linear() - mean_R);
+      normal += turned.transpose() * turned;
+      right += turned.transpose() * (p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation());
+      shift += p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation();
     }
-    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix<double, 6, 6>> decomposition;
+    Eigen::CompleteOrthogonalDecomposition<Matrix3> decomposition;
     decomposition.setThreshold(kLeastTurning);
     decomposition.compute(normal);
-    const Vector6 solution = decomposition.solve(right);
-    const double step = (solution.tail<3>() - found.X_FT.translation()).norm();
-    found.X_WB.translation() = solution.head<3>();
-    found.X_FT.translation() = solution.tail<3>();
+    const Vector3 point = decomposition.solve(right);
+    const double step = (point - found.X_FT.translation()).norm();
+    found.X_WB.translation() = shift / static_cast<double>(X_BF.size()) - R_WB * mean_R * point;
+    found.X_FT.translation() = point;
     if (!std::isfinite(step)) return refused("base and tool: the positions do not determine the tool point");
     if (step < 1e-9) break;
   }

@@ -40,9 +40,10 @@ ArmKinematics::ArmKinematics(const ArmState& state)
   X_WF_ = X;
   X_WT_ = X * state.X_FT;
   kinematic_tip_W_ = X_WT_.translation();
+  tip_rotation_W_ = state.tip_W.tail<3>();
   X_WT_.translation() += state.tip_W.head<3>();
-  if (!state.tip_W.tail<3>().isZero(0)) {
-    X_WT_.linear() = (rotation_exp(state.tip_W.tail<3>()) * X_WT_.linear()).eval();
+  if (!tip_rotation_W_.isZero(0)) {
+    X_WT_.linear() = (rotation_exp(tip_rotation_W_) * X_WT_.linear()).eval();
   }
   p_cog_W_ = X * state.payload.p_FoCog_F;
   force_W_ = state.payload.mass * kGravity * gravity_W_;
@@ -89,8 +90,10 @@ Eigen::MatrixXd ArmKinematics::pose_jacobian() const {
   J.block<3, 3>(0, rows.tool(0)) = R_WF;
   J.block<3, 3>(0, rows.tool(3)) = -skew(p - X_WF_.translation()) * R_WF;
   J.block<3, 3>(3, rows.tool(3)) = R_WF;
-  // The tip's rotation turns what the kinematics turned; it is small, so its own derivative is taken at zero.
-  J.block<6, 6>(0, rows.tip(0)).setIdentity();
+  // R_WT = exp(tip) R_kinematic.
+  if (!tip_rotation_W_.isZero(0)) J.bottomRows<3>() = (rotation_exp(tip_rotation_W_) * J.bottomRows<3>()).eval();
+  J.block<3, 3>(0, rows.tip(0)).setIdentity();
+  J.block<3, 3>(3, rows.tip(3)) = left_jacobian(tip_rotation_W_);
   return J;
 }
 

@@ -97,7 +97,7 @@ class ArmKinematics {
   std::vector<Vector3> z_, p_, x_, y_,
       q_;  // per link, in W: joint axis and a point on it; x and y axis at the link's end q
   Pose X_WB_, X_WF_, X_WT_;
-  Vector3 kinematic_tip_W_;  // before the tip's own motion
+  Vector3 kinematic_tip_W_, tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
   Vector3 p_cog_W_, force_W_, gravity_W_;
 };
 

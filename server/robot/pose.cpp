@@ -24,6 +24,15 @@ Vector3 rotation_log(const Matrix3& R) {
   return (2.0 * std::atan2(sine, q.w()) / sine) * q.vec();
 }
 
+Matrix3 left_jacobian(const Vector3& w) {
+  const double angle = w.norm();
+  const Matrix3 W = skew(w);
+  if (angle < 1e-4) return Matrix3::Identity() + 0.5 * W + W * W / 6;
+  const double square = angle * angle;
+  return Matrix3::Identity() + (1 - std::cos(angle)) / square * W +
+         (angle - std::sin(angle)) / (square * angle) * W * W;
+}
+
 Pose make_pose(const Matrix3& R, const Vector3& p) {
   Pose X = Pose::Identity();
   X.linear() = R;

@@ -18,6 +18,8 @@ using JointVector = Eigen::VectorXd;
 [[nodiscard]] Matrix3 rotation_exp(const Vector3& rotation_vector);
 /// Rotation vector of a rotation matrix, length in [0, pi].
 [[nodiscard]] Vector3 rotation_log(const Matrix3& R);
+/// Left Jacobian of SO(3): rotation_exp(w + dw) = rotation_exp(J dw) rotation_exp(w) to first order in dw.
+[[nodiscard]] Matrix3 left_jacobian(const Vector3& w);
 /// Tx Ty Tz Rz(gamma) Ry(beta) Rx(alpha), the base transformation of the source, eq. (3.5).
 [[nodiscard]] Pose pose_zyx(const Vector3& translation, double gamma, double beta, double alpha);
 [[nodiscard]] Pose make_pose(const Matrix3& R, const Vector3& p);

@@ -1,0 +1,160 @@
+#include "server/calibrate/calibrate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/base/units.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+using test::cell_7;
+using test::chapter_5_robot;
+using test::measured;
+
+const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
+
+double validation_rms_mm(const CalibrationResult& result, const MeasurementBatch& batch) {
+  double sum = 0;
+  for (const Measurement& m : batch.measurements) {
+    sum += (m.p_W - result.model.pose_W(m.context).translation()).squaredNorm();
+  }
+  return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
+}
+
+const IdentifiedParameter& parameter(const CalibrationResult& result, const std::string& name) {
+  const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
+                                  [&](const IdentifiedParameter& p) { return p.parameter.name == name; });
+  EXPECT_NE(found, result.parameters.end()) << name;
+  return *found;
+}
+
+TEST(Calibrate, ReachesTheFiguresOfEveryLevelOnPosesItNeverSaw) {
+  const auto cell = cell_7();
+  const VirtualRobot robot = chapter_5_robot(cell);
+  const MeasurementBatch batch = measured(robot, 120, 1);
+  const MeasurementBatch fresh = measured(robot, 1000, 2);
+  const auto level = [&](const std::vector<std::string>& specs) {
+    return validation_rms_mm(*calibrate(cell, specs, batch, {}), fresh);
+  };
+  EXPECT_NEAR(level({}), 9.7, 0.3);
+  EXPECT_NEAR(level({"base"}), 4.2, 0.3);
+  EXPECT_NEAR(level({"base", "geometry"}), 3.9, 0.3);
+  EXPECT_LE(level(kM3), 0.0245);
+}
+
+TEST(Calibrate, ThreePositionsAPoseAreEnough) {
+  const auto cell = cell_7();
+  const VirtualRobot robot = chapter_5_robot(cell);
+  const Result<CalibrationResult> result = calibrate(cell, kM3, measured(robot, 120, 3, false), {});
+  ASSERT_TRUE(result);
+  EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 4)), 0.0265);
+}
+
+TEST(Calibrate, FindsAnUnknownBaseAndTool) {
+  const auto cell = test::cell_7_unlocated();
+  VirtualRobot robot = chapter_5_robot(cell);
+  robot.truth.X_WB = make_pose(rotation_exp({0.1, -0.2, 2.2}), {4, -2, 0.3});
+  robot.truth.tools["spindle"] = make_pose(rotation_exp({0.5, 0.4, -0.3}), {0.12, -0.05, 0.2});
+  std::vector<std::string> specs = kM3;
+  specs.push_back("tool");
+  for (const bool orientation : {true, false}) {
+    const Result<CalibrationResult> result = calibrate(cell, specs, measured(robot, 200, 5, orientation), {});
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 6)), 0.026) << "orientation " << orientation;
+  }
+}
+
+TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
+  const Result<CalibrationResult> result = calibrate(cell_7(), kM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->rank, 33);
+  ASSERT_EQ(result->unidentifiable.size(), 3u);
+  const auto named = [&](std::vector<std::string> names) {
+    std::sort(names.begin(), names.end());
+    return std::any_of(result->unidentifiable.begin(), result->unidentifiable.end(), [&](auto combination) {
+      std::sort(combination.parameters.begin(), combination.parameters.end());
+      return combination.parameters == names;
+    });
+  };
+  EXPECT_TRUE(named({"gamma0", "q1"}));
+  EXPECT_TRUE(named({"d1", "z0"}));
+  EXPECT_TRUE(named({"C6"}));
+  EXPECT_FALSE(parameter(*result, "q1").identified);
+  EXPECT_FALSE(parameter(*result, "C6").identified);
+  EXPECT_TRUE(parameter(*result, "d4").identified);
+}
+
+TEST(Calibrate, StatesUncertaintiesThatFitItsErrors) {
+  // d4, a2, alpha3 and C3 have known truths in Table 5.5; over many batches their errors must be as large as stated.
+  const auto cell = cell_7();
+  const VirtualRobot robot = chapter_5_robot(cell);
+  const std::vector<std::pair<std::string, double>> truths = {
+      {"d4", from_mm(-0.3)}, {"a2", from_mm(-0.3)}, {"alpha3", -2.6e-4}, {"C3", from_rad_per_nmm(4e-9)}};
+  double sum = 0;
+  int count = 0;
+  for (std::uint64_t seed = 100; seed < 125; ++seed) {
+    const Result<CalibrationResult> result =
+        calibrate(cell, {"base", "geometry", "compliance_linear"}, measured(robot, 60, seed), {});
+    ASSERT_TRUE(result);
+    for (const auto& [name, truth] : truths) {
+      const IdentifiedParameter& p = parameter(*result, name);
+      sum += std::pow((p.value - truth) / p.stddev, 2);
+      ++count;
+    }
+  }
+  EXPECT_NEAR(sum / count, 1.0, 0.35);
+}
+
+TEST(Calibrate, NeverMakesAComplianceNegative) {
+  const auto cell = cell_7();
+  for (const std::uint64_t seed : {8, 9, 10}) {
+    const Result<CalibrationResult> result = calibrate(cell, kM3, measured(chapter_5_robot(cell), 60, seed), {});
+    ASSERT_TRUE(result);
+    for (const IdentifiedParameter& p : result->parameters) {
+      if (p.parameter.name.starts_with("C")) {
+        EXPECT_GE(p.value, 0) << p.parameter.name;
+      }
+    }
+  }
+}
+
+TEST(Calibrate, EstimatesWhatTheModelCannotExplain) {
+  // M2 on a robot whose joints give way: the surplus per axis is what it leaves over.
+  const auto cell = cell_7();
+  const Result<CalibrationResult> result =
+      calibrate(cell, {"base", "geometry"}, measured(chapter_5_robot(cell), 200, 11), {});
+  ASSERT_TRUE(result);
+  EXPECT_NEAR(result->discrepancy, result->rms / std::sqrt(3), 0.1 * result->discrepancy);
+  const Result<CalibrationResult> complete = calibrate(cell, kM3, measured(chapter_5_robot(cell), 200, 11), {});
+  EXPECT_LT(complete->discrepancy, 4e-6);
+}
+
+TEST(Calibrate, WeighsAPointByItsOwnSigma) {
+  const auto cell = cell_7();
+  const VirtualRobot robot = chapter_5_robot(cell);
+  MeasurementBatch batch = measured(robot, 120, 12);
+  for (std::size_t i = 0; i < batch.measurements.size(); i += 4) {  // a quarter is bad, and says so
+    Measurement& m = batch.measurements[i];
+    m.sigma = 1e-3;
+    m.p_W += 1e-3 * Vector3(std::sin(double(i)), std::cos(2.0 * double(i)), std::sin(3.0 * double(i)));
+  }
+  EXPECT_LE(validation_rms_mm(*calibrate(cell, kM3, batch, {}), measured(robot, 300, 13)), 0.0255);
+}
+
+TEST(Calibrate, RefusesWhatCannotBeFound) {
+  const auto cell = test::cell_7_unlocated();
+  MeasurementBatch few = measured(chapter_5_robot(cell), 120, 14, false);
+  few.measurements.resize(4);
+  const Result<CalibrationResult> result = calibrate(cell, {"base"}, few, {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kRefused);
+  EXPECT_NE(result.error().message.find("batch virtual"), std::string::npos);
+  few.measurements.clear();
+  EXPECT_FALSE(calibrate(cell, {"base"}, few, {}));
+}
+
+}  // namespace
+}  // namespace trammel

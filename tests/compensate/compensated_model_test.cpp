@@ -1,0 +1,177 @@
+#include "server/compensate/compensated_model.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "server/robot/inverse_kinematics.h"
+#include "server/trainer/train.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+/// M2 on a robot whose joints give way, in the 6 dim (s) range of Table 5.3, so that the bias has something to learn
+/// and the domain an outside.
+class Compensated : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    auto cell = std::make_shared<Cell>(*test::cell_7());
+    cell->joint_ranges = small_range();
+    robot_ = new VirtualRobot(test::chapter_5_robot(cell));
+    TrainOptions options;
+    options.level = "M2";
+    model_ = new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 200, 31), options)));
+  }
+  static void TearDownTestSuite() {
+    delete robot_;
+    delete model_;
+  }
+
+  static std::vector<std::pair<double, double>> small_range() {
+    const auto deg = [](double low, double high) { return std::pair{from_deg(low), from_deg(high)}; };
+    return {deg(-15, 15), deg(-15, 15), deg(-15, 30), deg(-30, 30), deg(30, 60), deg(-30, 30)};
+  }
+
+  /// Where the virtual robot's tool really goes.
+  static Pose true_pose_B(const JointVector& q) {
+    PoseContext context;
+    context.q = q;
+    context.tool = context.payload = "spindle";
+    return robot_->truth.pose_W(context);  // cell-7: B stands in W's origin
+  }
+
+  static Target target_at(const JointVector& q) {
+    PoseContext context;
+    context.q = q;
+    context.tool = context.payload = "spindle";
+    Target target;
+    target.X_BT = robot_->truth.nominal_pose_W(context);
+    target.seed = q;
+    return target;
+  }
+
+  static const CompensatedModel& model() { return *model_; }
+  static Correction correct(const Target& target) { return model_->correct(target, "spindle", "spindle"); }
+
+  static VirtualRobot* robot_;
+  static CompensatedModel* model_;
+};
+
+VirtualRobot* Compensated::robot_ = nullptr;
+CompensatedModel* Compensated::model_ = nullptr;
+
+JointVector inside() {
+  JointVector q(6);
+  q << 0.1, -0.1, 0.2, 0.2, 0.8, -0.1;
+  return q;
+}
+
+TEST_F(Compensated, PredictsTheErrorOfPosesItNeverSaw) {
+  const Evaluation evaluation = model().evaluate(test::measured(*robot_, 300, 32));
+  EXPECT_GT(to_mm(evaluation.nominal.rms), 3);
+  EXPECT_LT(evaluation.compensated.rms, 0.5 * evaluation.calibrated.rms);
+  EXPECT_LT(to_mm(evaluation.compensated.rms), 0.06);
+  EXPECT_GT(evaluation.coverage_95, 0.90);
+  EXPECT_GE(evaluation.in_domain, 280);
+}
+
+TEST_F(Compensated, CorrectedTargetsLandWhereTheyWereWanted) {
+  const MeasurementBatch poses = test::measured(*robot_, 50, 33);
+  for (const Measurement& m : poses.measurements) {
+    const Target target = target_at(m.context.q);
+    const Correction correction = correct(target);
+    if (correction.status == CorrectionStatus::kOutOfDomain) continue;
+    ASSERT_EQ(correction.status, CorrectionStatus::kOk) << correction.message;
+    EXPECT_LE(correction.iterations, 10);
+    EXPECT_LT(correction.error_after, 1e-7);
+    const double before = (true_pose_B(m.context.q).translation() - target.X_BT.translation()).norm();
+    const double after = (true_pose_B(correction.q).translation() - target.X_BT.translation()).norm();
+    EXPECT_GT(to_mm(before), 1);
+    EXPECT_LT(to_mm(after), 0.15);
+    EXPECT_NEAR(correction.error_before, before, 0.15e-3);
+    // The commanded pose is what the nominal controller turns into these joints.
+    EXPECT_LT(pose_difference(correction.X_BT_commanded, target_at(correction.q).X_BT).norm(), 1e-8);
+  }
+}
+
+TEST_F(Compensated, AJointTargetIsTheNominalPoseOfItsJoints) {
+  Target target;
+  target.joint_target = true;
+  target.seed = inside();
+  const Correction by_joints = correct(target);
+  const Correction by_pose = correct(target_at(inside()));
+  ASSERT_EQ(by_joints.status, CorrectionStatus::kOk);
+  EXPECT_LT((by_joints.q - by_pose.q).norm(), 1e-8);
+}
+
+TEST_F(Compensated, ABranchLeadsToTheSameCorrectionAsASeedInIt) {
+  Target target = target_at(inside());
+  const Correction by_seed = correct(target);
+  target.conf = *branch_of(model().cell().robot, inside());
+  target.seed.reset();
+  const Correction by_branch = correct(target);
+  ASSERT_EQ(by_branch.status, CorrectionStatus::kOk) << by_branch.message;
+  EXPECT_LT((by_branch.q - by_seed.q).norm(), 1e-8);
+}
+
+TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
+  JointVector far = inside();
+  far(0) = from_deg(100);
+  const ErrorPrediction prediction = model().predict(far, "spindle", "spindle");
+  EXPECT_FALSE(prediction.in_domain);
+  PoseContext context;
+  context.q = far;
+  context.tool = context.payload = "spindle";
+  EXPECT_LT(pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(), 1e-9);
+  EXPECT_GT(to_mm(prediction.error_B.norm()), 0.5);  // never a silent zero
+  EXPECT_GT(prediction.stddev_B.norm(), 3 * model().predict(inside(), "spindle", "spindle").stddev_B.norm());
+  const Correction correction = correct(target_at(far));
+  EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
+  EXPECT_LT(correction.error_after, 1e-7);  // corrected all the same, by physics alone
+  EXPECT_LT((true_pose_B(correction.q).translation() - correction.X_BT_wanted.translation()).norm(),
+            correction.error_before);
+}
+
+TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
+  Target far = target_at(inside());
+  far.X_BT.translation().x() += 3;
+  EXPECT_EQ(correct(far).status, CorrectionStatus::kUnreachable);
+  JointVector beyond = inside();
+  beyond(2) = from_deg(75);  // limit 70
+  EXPECT_EQ(correct(target_at(beyond)).status, CorrectionStatus::kJointLimit);
+  JointVector straight = inside();
+  straight(4) = 0;
+  EXPECT_EQ(correct(target_at(straight)).status, CorrectionStatus::kSingular);
+  Target nothing = target_at(inside());
+  nothing.seed.reset();
+  EXPECT_EQ(correct(nothing).status, CorrectionStatus::kRefused);
+  EXPECT_FALSE(correct(nothing).message.empty());
+}
+
+TEST_F(Compensated, AModelIsTheSameAfterItWasStored) {
+  const std::string text = serialize(model());
+  const Result<CompensatedModel> again = deserialize(text, "memory");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->provenance().hash, model().provenance().hash);
+  EXPECT_EQ(serialize(*again), text);
+  const ErrorPrediction before = model().predict(inside(), "spindle", "spindle");
+  const ErrorPrediction after = again->predict(inside(), "spindle", "spindle");
+  EXPECT_EQ(before.error_B, after.error_B);  // bit for bit
+  EXPECT_EQ(before.stddev_B, after.stddev_B);
+}
+
+TEST_F(Compensated, ADamagedModelIsRefused) {
+  std::string text = serialize(model());
+  const std::size_t place = text.find("\"values\":[") + 12;
+  text[place] = text[place] == '1' ? '2' : '1';
+  const Result<CompensatedModel> damaged = deserialize(text, "cell.model");
+  ASSERT_FALSE(damaged);
+  EXPECT_NE(damaged.error().message.find("cell.model: damaged"), std::string::npos) << damaged.error().message;
+  EXPECT_FALSE(deserialize("{}", "cell.model"));
+  EXPECT_FALSE(deserialize("", "cell.model"));
+  EXPECT_FALSE(deserialize(serialize(model()).substr(0, 1000), "cell.model"));
+}
+
+}  // namespace
+}  // namespace trammel

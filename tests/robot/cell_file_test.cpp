@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/robot/cell.h"
+
+namespace trammel {
+namespace {
+
+std::string shipped(const std::string& file) { return std::string(TRAMMEL_SOURCE_DIR) + "/" + file; }
+
+std::string with(std::string text, const std::string& old_part, const std::string& new_part) {
+  const std::size_t place = text.find(old_part);
+  EXPECT_NE(place, std::string::npos) << old_part;
+  return text.replace(place, old_part.size(), new_part);
+}
+
+TEST(CellFile, EveryShippedRobotAndCellLoads) {
+  int robots = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(shipped("models"))) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Result<Chain> robot = read_robot(entry.path().string());
+    EXPECT_TRUE(robot) << (robot ? "" : robot.error().message);
+    ++robots;
+  }
+  EXPECT_GE(robots, 2);
+  for (const char* file : {"config/cell-7.yaml", "config/ur10.yaml"}) {
+    const Result<Cell> cell = read_cell(shipped(file));
+    EXPECT_TRUE(cell) << (cell ? "" : cell.error().message);
+  }
+}
+
+TEST(CellFile, ConvertsToSiAtTheBoundary) {
+  const Cell cell = *read_cell(shipped("config/cell-7.yaml"));
+  EXPECT_DOUBLE_EQ(cell.robot.joint(0).link.d, 0.780);
+  EXPECT_DOUBLE_EQ(cell.robot.joint(0).link.alpha, -kPi / 2);
+  EXPECT_DOUBLE_EQ(cell.tracker.sigma, 13e-6);
+  EXPECT_DOUBLE_EQ(cell.payloads.at("spindle").p_FoCog_F.z(), 0.1);
+  // Eq. (5.1): the tool's x axis points to (1, 0, 1) / sqrt(2).
+  EXPECT_LT((cell.tools.at("spindle")->linear().col(0) - Vector3(1, 0, 1).normalized()).norm(), 1e-9);
+}
+
+TEST(CellFile, AnUnknownBaseAndToolAreUnknown) {
+  const Cell cell = *read_cell(shipped("config/ur10.yaml"));
+  EXPECT_FALSE(cell.X_WB);
+  EXPECT_FALSE(cell.tools.at("tmac"));
+}
+
+TEST(CellFile, RefusesWithFileKeyAndReason) {
+  const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
+  const auto message = [&](const std::string& cell_text, const std::string& robot_text) {
+    const Result<Cell> read = parse_cell(cell_text, robot_text, "cell.yaml");
+    EXPECT_FALSE(read);
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_NE(message(with(cell, "gravity:", "gravtiy:"), robot).find("cell.yaml: gravtiy: unknown key"),
+            std::string::npos);
+  EXPECT_NE(message(with(cell, "mass_kg: 100", "mass_kg: heavy"), robot).find("mass_kg: expected a number"),
+            std::string::npos);
+  EXPECT_NE(message(with(cell, "q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 1, 0, 0]"), robot).find("unit quaternion"),
+            std::string::npos);
+  EXPECT_NE(message(with(cell, "version: 1", "version: 2"), robot).find("version"), std::string::npos);
+  EXPECT_NE(message(cell, with(robot, "limits_deg: [-65, 85]", "limits_deg: [85, -65]")).find("joint 2"),
+            std::string::npos);
+  EXPECT_NE(message(cell + "cell: twice\n", robot).find("cell.yaml"), std::string::npos);
+  EXPECT_NE(message("", robot).find("expected keys and values"), std::string::npos);
+  EXPECT_FALSE(read_cell("/no/such/cell.yaml"));
+}
+
+TEST(CellFile, TheOnlyToolNeedsNoName) {
+  const Cell cell = *read_cell(shipped("config/cell-7.yaml"));
+  EXPECT_EQ(*resolve_tool(cell, ""), "spindle");
+  EXPECT_EQ(*resolve_payload(cell, "spindle"), "spindle");
+  EXPECT_FALSE(resolve_tool(cell, "gripper"));
+  Cell two = cell;
+  two.tools["gripper"] = Pose::Identity();
+  const Result<std::string> ambiguous = resolve_tool(two, "");
+  ASSERT_FALSE(ambiguous);
+  EXPECT_NE(ambiguous.error().message.find("gripper, spindle"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace trammel

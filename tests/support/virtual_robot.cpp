@@ -1,0 +1,40 @@
+#include "tests/support/virtual_robot.h"
+
+#include "server/base/text_file.h"
+#include "server/plan/plan.h"
+#include "tests/support/demand.h"
+
+namespace trammel::test {
+
+namespace {
+
+const std::string kSource = TRAMMEL_SOURCE_DIR;
+
+}  // namespace
+
+std::shared_ptr<const Cell> cell_7() {
+  return std::make_shared<const Cell>(demand(read_cell(kSource + "/config/cell-7.yaml")));
+}
+
+std::shared_ptr<const Cell> cell_7_unlocated() {
+  auto cell = std::make_shared<Cell>(*cell_7());
+  cell->X_WB.reset();
+  cell->tools["spindle"].reset();
+  return cell;
+}
+
+VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell) {
+  return demand(read_virtual_robot(kSource + "/models/truth/chapter-5.yaml", cell));
+}
+
+MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed, bool orientation) {
+  const Eigen::MatrixXd q = demand(plan_poses(*robot.truth.cell, {poses, seed}));
+  SimulateOptions options;
+  options.seed = seed + 1000;
+  options.orientation = orientation;
+  MeasurementBatch batch = demand(simulate(robot, q, options));
+  batch.id = "virtual";
+  return batch;
+}
+
+}  // namespace trammel::test

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "server/measurement/measurement.h"
+#include "server/robot/cell.h"
+#include "server/simulate/simulate.h"
+
+/// The shipped virtual robot, measured. Tests see its batches; its truth stays inside the simulator.
+namespace trammel::test {
+
+[[nodiscard]] std::shared_ptr<const Cell> cell_7();
+/// cell-7 with base and tool unknown, for data as they arrive from a shop floor.
+[[nodiscard]] std::shared_ptr<const Cell> cell_7_unlocated();
+[[nodiscard]] VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell);
+/// `poses` poses of the cell's ranges as its tracker measures them.
+[[nodiscard]] MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed,
+                                        bool orientation = true);
+
+}  // namespace trammel::test

@@ -1,0 +1,124 @@
+#include "server/trainer/train.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/base/units.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+TrainOptions quick(const std::string& level, const std::string& bias) {
+  TrainOptions options;
+  options.level = level;
+  options.bias = bias;
+  return options;
+}
+
+TEST(Train, SameDataSameSeedSameModel) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 80, 41);
+  TrainOptions options = quick("M1", "se");
+  const CompensatedModel one = test::demand(train(cell, batch, options));
+  options.trained_at = 12345;
+  const CompensatedModel other = test::demand(train(cell, batch, options));
+  EXPECT_EQ(one.provenance().hash, other.provenance().hash);
+  EXPECT_EQ(other.provenance().trained_at, 12345);
+  options.seed = 2;
+  EXPECT_NE(test::demand(train(cell, batch, options)).provenance().hash, one.provenance().hash);
+}
+
+TEST(Train, HoldsOutTheRowsThatTheBatchCallsValidation) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 200, 42);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    batch.measurements[i].set = i < 120 ? MeasurementSet::kTrain : MeasurementSet::kValidation;
+  }
+  const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "none")));
+  EXPECT_EQ(model.provenance().training_poses, 120);
+  ASSERT_TRUE(model.parts().validation);
+  EXPECT_EQ(model.parts().validation->poses, 80);
+  EXPECT_LT(to_mm(model.parts().validation->calibrated.rms), 0.026);
+  // Poses held out must not leak into the fit: spoiling them changes the figures, not the parameters.
+  for (std::size_t i = 120; i < 200; ++i) batch.measurements[i].p_W += Vector3(0.01, 0, 0);
+  const CompensatedModel spoiled = test::demand(train(cell, batch, quick("M3", "none")));
+  EXPECT_EQ(spoiled.parts().physics.values, model.parts().physics.values);
+  EXPECT_GT(spoiled.parts().validation->calibrated.rms, 5e-3);
+}
+
+TEST(Train, GivesUpWhenAsked) {
+  const auto cell = test::cell_7();
+  TrainOptions options = quick("M1", "se");
+  int calls = 0;
+  options.progress = [&](const std::string&, double) { return ++calls < 2; };
+  const Result<CompensatedModel> given_up = train(cell, test::measured(test::chapter_5_robot(cell), 60, 43), options);
+  ASSERT_FALSE(given_up);
+  EXPECT_EQ(calls, 2);
+}
+
+TEST(Train, ProgressRunsForwardToTheEnd) {
+  const auto cell = test::cell_7();
+  TrainOptions options = quick("M3", "se");
+  std::vector<double> shares;
+  options.progress = [&](const std::string& stage, double share) {
+    EXPECT_FALSE(stage.empty());
+    shares.push_back(share);
+    return true;
+  };
+  ASSERT_TRUE(train(cell, test::measured(test::chapter_5_robot(cell), 60, 44), options));
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_EQ(shares.front(), 0.0);
+  EXPECT_EQ(shares.back(), 1.0);
+}
+
+TEST(Train, RefusesUnknownSourcesKernelsAndTooFewPoses) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  EXPECT_FALSE(train(cell, test::measured(robot, 60, 45), quick("M2,gremlins", "none")));
+  EXPECT_FALSE(train(cell, test::measured(robot, 60, 45), quick("M2", "magic")));
+  EXPECT_FALSE(train(cell, test::measured(robot, 9, 45), quick("M1", "se")));
+}
+
+/// A real robot with base and tool unknown: ../shared/data, where it is at hand.
+class RealRobot : public testing::Test {
+ protected:
+  struct Figures {
+    double nominal_mm, geometry_mm, compensated_mm;
+  };
+  static Figures figures(const std::string& series) {
+    const std::string path = std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_" + series + ".csv";
+    MeasurementBatch batch = test::demand(read_batch_csv(path));
+    for (Measurement& m : batch.measurements) {
+      m.set = std::stoi(m.pose_id) % 10 >= 7 ? MeasurementSet::kValidation : MeasurementSet::kTrain;
+    }
+    const auto cell =
+        std::make_shared<const Cell>(test::demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
+    const Evaluation evaluation = *test::demand(train(cell, batch, {})).parts().validation;
+    return {to_mm(evaluation.nominal.rms), to_mm(evaluation.calibrated.rms), to_mm(evaluation.compensated.rms)};
+  }
+  void SetUp() override {
+    if (!std::filesystem::exists(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_c.csv")) {
+      GTEST_SKIP() << "the measured UR10 is not at hand (../shared/data)";
+    }
+  }
+};
+
+TEST_F(RealRobot, Ur10SeriesCIsExplainedAndCompensated) {
+  const Figures c = figures("c");
+  EXPECT_LE(c.nominal_mm, 1.05);
+  EXPECT_LE(c.geometry_mm, 0.50);
+  EXPECT_LE(c.compensated_mm, 0.30);
+}
+
+TEST_F(RealRobot, Ur10SeriesDIsExplainedAndCompensated) {
+  const Figures d = figures("d");
+  EXPECT_LE(d.nominal_mm, 0.80);
+  EXPECT_LE(d.geometry_mm, 0.42);
+  EXPECT_LE(d.compensated_mm, 0.30);
+}
+
+}  // namespace
+}  // namespace trammel
