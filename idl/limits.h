@@ -24,8 +24,9 @@ inline constexpr std::size_t kMaxComputeSample = 4u << 20;  ///< requests and re
 inline constexpr std::size_t kMaxTextSample = 32u << 20;    ///< batches and models
 inline constexpr std::size_t kMaxStateSample = 1u << 20;
 
-/// Requests that a server keeps waiting for each operation, and replies for each client.
-inline constexpr int kRequestDepth = 256;
+/// Requests that a server keeps waiting for each operation, and replies for each client and operation: a client has at
+/// most as many requests unanswered.
+inline constexpr int kRequestDepth = 512;
 inline constexpr int kReplyDepth = 64;
 
 /// What a session puts into one request of those it may: so that other clients have their turn in between.

@@ -71,12 +71,17 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     id.writer_guid(guid_);
     const auto waiting = std::make_shared<Waiting>();
     std::unique_lock lock(mutex_);
+    if (!room_.wait_until(lock, deadline, [this] { return waiting_.size() < wire::kReplyDepth; })) {
+      return failure(ErrorCode::kBusy, "{}: {} calls of this session are unanswered", Operation::kName,
+                     wire::kReplyDepth);
+    }
     id.sequence_number(++last_sequence_);
     waiting_.emplace(last_sequence_, waiting);
     lock.unlock();
     auto answer = attempt_twice(request, route, *waiting, deadline);
     lock.lock();
     waiting_.erase(id.sequence_number());
+    room_.notify_one();
     return answer;
   }
 
@@ -154,6 +159,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   wire::dds::DataReader* reader_ = nullptr;
   std::array<std::uint8_t, 16> guid_{};  // of writer_
   mutable std::mutex mutex_;
+  std::condition_variable room_;                              // waiting_ has become smaller
   std::set<std::string> matched_;                             // guarded by mutex_: participants with a request reader
   std::map<std::int64_t, std::shared_ptr<Waiting>> waiting_;  // guarded by mutex_; by sequence number
   std::int64_t last_sequence_ = 0;                            // guarded by mutex_
