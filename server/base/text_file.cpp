@@ -28,27 +28,35 @@ Result<std::string> read_text_file(const std::string& path, std::size_t limit_by
   return std::move(text).str();
 }
 
+namespace {
+
+/// Empty when all of it was written, else why not.
+std::string write_all(const fs::path& path, const std::string& text) {
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out << text;
+  out.flush();
+  return out ? "" : std::strerror(errno);
+}
+
+}  // namespace
+
 Status write_text_file(const std::string& path, const std::string& text) {
-  const std::string beside = fmt::format("{}.{}.part", path, ::getpid());
-  {
-    std::ofstream out(beside, std::ios::binary | std::ios::trunc);
-    out << text;
-    out.flush();
-    if (!out) {
-      const std::string why = std::strerror(errno);
-      std::error_code ignored;
-      fs::remove(beside, ignored);
-      return refused("{}: cannot be written: {}", path, why);
-    }
-  }
   std::error_code error;
-  fs::rename(beside, path, error);
-  if (error) {
-    std::error_code ignored;
-    fs::remove(beside, ignored);
-    return refused("{}: cannot be written: {}", path, error.message());
+  // Renaming onto a device, a pipe or a link would put a file in its place.
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    const std::string why = write_all(path, text);
+    return why.empty() ? Status() : refused("{}: cannot be written: {}", path, why);
   }
-  return {};
+  const fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : fs::path(path);
+  const fs::path beside = fmt::format("{}.{}.part", target.string(), ::getpid());
+  std::string why = write_all(beside, text);
+  if (why.empty()) {
+    fs::rename(beside, target, error);
+    if (!error) return {};
+    why = error.message();
+  }
+  fs::remove(beside, error);
+  return refused("{}: cannot be written: {}", path, why);
 }
 
 }  // namespace trammel

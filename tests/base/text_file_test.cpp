@@ -1,0 +1,74 @@
+#include "server/base/text_file.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::size_t files_in(const test::TemporaryFolder& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()));
+}
+
+TEST(TextFile, WhatIsWrittenReadsBackAndReplacesWhatWasThere) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.txt");
+  for (const std::string& text : {std::string("first, longer"), std::string("second"), std::string("\0x", 2)}) {
+    ASSERT_TRUE(write_text_file(path, text));
+    EXPECT_EQ(read_text_file(path).value(), text);
+  }
+  EXPECT_EQ(files_in(folder), 1u) << "something was left beside it";
+}
+
+TEST(TextFile, AFailedWriteLeavesNothing) {
+  const test::TemporaryFolder folder;
+  const Status written = write_text_file(folder.file("no/such/a.txt"), "text");
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().message.find("no/such/a.txt: cannot be written"), std::string::npos);
+  EXPECT_FALSE(write_text_file(folder.path().string(), "text")) << "a folder is no file";
+  EXPECT_EQ(files_in(folder), 0u);
+}
+
+TEST(TextFile, WritesIntoAPipeAndLeavesItAPipe) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("pipe");
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  const int reader = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  ASSERT_TRUE(write_text_file(path, "text"));
+  std::array<char, 16> text{};
+  EXPECT_EQ(::read(reader, text.data(), text.size()), 4);
+  ::close(reader);
+  EXPECT_TRUE(fs::is_fifo(path));
+}
+
+TEST(TextFile, WritesThroughALinkAndLeavesItALink) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.write("v3.model", "old");
+  fs::create_symlink("v3.model", folder.file("current.model"));
+  ASSERT_TRUE(write_text_file(folder.file("current.model"), "new"));
+  EXPECT_TRUE(fs::is_symlink(folder.file("current.model")));
+  EXPECT_EQ(read_text_file(path).value(), "new");
+}
+
+TEST(TextFile, RefusesToReadWhatIsMissingAFolderOrTooLarge) {
+  const test::TemporaryFolder folder;
+  EXPECT_FALSE(read_text_file(folder.file("missing")));
+  EXPECT_FALSE(read_text_file(folder.path().string()));
+  const auto large = read_text_file(folder.write("large", "12345"), 4);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().code, ErrorCode::kTooLarge);
+  EXPECT_NE(large.error().message.find("5 bytes, limit 4"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace trammel
