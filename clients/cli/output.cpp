@@ -24,7 +24,8 @@ Status write_json(const std::string& path, const nlohmann::ordered_json& value) 
 }
 
 void tell(const std::string& text, std::initializer_list<std::string> paths) {
-  if (std::find(paths.begin(), paths.end(), "-") != paths.end()) return;
+  const auto is_standard_output = [](const std::string& path) { return path == "-" || path == "/dev/stdout"; };
+  if (std::any_of(paths.begin(), paths.end(), is_standard_output)) return;
   std::fputs(text.c_str(), stdout);
 }
 

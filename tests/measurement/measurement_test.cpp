@@ -130,10 +130,10 @@ TEST(CheckAgainstCell, FindsRadiansInASmallRangeAndWithAnUnknownTool) {
   EXPECT_NE(refusal(in_radians(make_batch(cell, 50, 1, kTool)), unknown_tool).find("radians?"), std::string::npos);
 }
 
-TEST(CheckAgainstCell, FindsMetresForMillimetres) {
+TEST(CheckAgainstCell, FindsMetresAndCentimetresForMillimetres) {
   const Cell cell = make_cell();
   const MeasurementBatch batch = make_batch(cell, 50, 1, kTool);
-  for (const double factor : {1e-3, 1e3}) {
+  for (const double factor : {1e-3, .1, 10., 1e3}) {
     const std::string message = refusal(scaled(batch, factor), cell);
     EXPECT_NE(message.find("Are positions mm, joints degrees"), std::string::npos) << message;
     EXPECT_EQ(message.find("radians"), std::string::npos) << message;
@@ -161,6 +161,18 @@ TEST(CheckAgainstCell, AcceptsAnUnknownToolThatTurnsAboutAFixedPoint) {
   last.link = {0, .4, 0, 0, 0};
   cell.robot = Chain::make("wrist", {turn, turn, turn, turn, turn, last}).value();
   EXPECT_EQ(refusal(make_batch(cell, 50, 1, p_FT), cell), "accepted");
+}
+
+TEST(CheckAgainstCell, KnowsHowFarALongToolSwingsWhenOnlyTheWristMoves) {
+  const Vector3 p_FT(0, 3, 0);
+  const Cell cell = make_cell(make_pose(Matrix3::Identity(), p_FT));
+  MeasurementBatch batch = make_batch(cell, 50, 1, p_FT);
+  for (Measurement& m : batch.measurements) {
+    m.context.q.head<5>().setZero();
+    m.p_W = cell.robot.flange_pose(m.context.q) * p_FT;
+  }
+  EXPECT_EQ(refusal(batch, cell), "accepted");
+  EXPECT_NE(refusal(batch, make_cell(std::nullopt)), "accepted") << "half a metre is assumed where nothing is known";
 }
 
 TEST(CheckAgainstCell, AcceptsOneGrossOutlierAmongMany) {
