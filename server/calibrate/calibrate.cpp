@@ -241,20 +241,34 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
+/// The null directions (columns, typical units) as few parameters at a time as they allow: Gaussian elimination with
+/// complete pivoting, so that each new direction has a parameter of its own.
+Eigen::MatrixXd disentangled(Eigen::MatrixXd directions) {
+  for (Eigen::Index done = 0; done < directions.cols(); ++done) {
+    Eigen::Index row = 0;
+    Eigen::Index column = 0;
+    directions.rightCols(directions.cols() - done).cwiseAbs().maxCoeff(&row, &column);
+    directions.col(done).swap(directions.col(done + column));
+    directions.col(done) /= directions(row, done);
+    for (Eigen::Index other = 0; other < directions.cols(); ++other) {
+      if (other != done) directions.col(other) -= directions(row, other) * directions.col(done);
+    }
+  }
+  return directions;
+}
+
+/// `direction` in typical units.
 UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd& direction, const Scaled& s) {
+  constexpr double kMatters = 0.1;  // of the largest part
   std::vector<std::size_t> order(s.parameters.size());
   std::iota(order.begin(), order.end(), 0u);
-  // Compared in typical units: a wide prior does not make a parameter matter less.
-  const Eigen::VectorXd part = direction.cwiseProduct(s.scale).cwiseQuotient(s.typical).normalized();
-  const auto weight = [&](std::size_t i) { return std::abs(part(static_cast<Eigen::Index>(i))); };
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return weight(a) > weight(b); });
+  const auto weight = [&](std::size_t i) { return std::abs(direction(static_cast<Eigen::Index>(i))); };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return weight(a) > weight(b) + 1e-3; });
   UnidentifiableCombination combination;
   combination.singular_value = singular_value;
-  double covered = 0;
   for (const std::size_t i : order) {
-    if (covered > 0.98 || combination.parameters.size() >= 6) break;
-    combination.parameters.push_back(s.parameters[i].name);
-    covered += weight(i) * weight(i);
+    if (weight(i) >= kMatters * weight(order.front())) combination.parameters.push_back(s.parameters[i].name);
   }
   const std::string names = joined(combination.parameters);
   combination.sentence =
@@ -262,6 +276,21 @@ UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd&
           ? fmt::format("{}: these poses do not show it; it stays at its prior", names)
           : fmt::format("{} move the tool the same way at these poses: only a combination of them is known", names);
   return combination;
+}
+
+/// Every direction that the data do not show (singular value below 1), told apart and in words.
+std::vector<UnidentifiableCombination> unidentifiable_of(const Information& seen, const Scaled& s) {
+  const auto unseen = (seen.singular_values.array() < 1).count();  // ascending: the first ones
+  if (unseen == 0) return {};
+  const Eigen::VectorXd to_typical = s.scale.cwiseQuotient(s.typical);
+  const Eigen::MatrixXd directions = disentangled(to_typical.asDiagonal() * seen.directions.leftCols(unseen));
+  std::vector<UnidentifiableCombination> combinations;
+  for (Eigen::Index k = 0; k < unseen; ++k) {
+    const Eigen::VectorXd in_prior_units = directions.col(k).cwiseQuotient(to_typical).normalized();
+    const double value = (seen.singular_values.asDiagonal() * seen.directions.transpose() * in_prior_units).norm();
+    combinations.push_back(in_words(value, directions.col(k), s));
+  }
+  return combinations;
 }
 
 /// Where the cell says `unknown`: base and tools in closed form from the nominal chain.
@@ -376,13 +405,11 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index k = 0; k < P; ++k) {
     const double value = seen.singular_values(k);
-    if (value >= 1) {
-      ++result.rank;
-      least = std::min(least, value);
-    } else {
-      result.unidentifiable.push_back(in_words(value, seen.directions.col(k), s));
-    }
+    if (value < 1) continue;
+    ++result.rank;
+    least = std::min(least, value);
   }
+  result.unidentifiable = unidentifiable_of(seen, s);
   result.condition_number = result.rank > 0 ? seen.singular_values(P - 1) / least : 0;
   for (Eigen::Index i = 0; i < P; ++i) {
     const Parameter& parameter = s.parameters[static_cast<std::size_t>(i)];
