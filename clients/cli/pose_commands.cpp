@@ -42,6 +42,7 @@ struct SimulateArguments {
   std::string robot, cell, truth, plan, tool, payload, output, json;
   std::uint64_t seed = 1;
   bool positions_only = false;
+  bool noise_free = false;
 };
 
 /// The cell, or a bare robot: its base at the world's origin, its flange the tool.
@@ -94,6 +95,7 @@ Status simulate_batch(SimulateArguments arguments) {
   SimulateOptions options;
   options.seed = arguments.seed;
   options.orientation = !arguments.positions_only;
+  options.noise = !arguments.noise_free;
   options.tool = arguments.tool;
   options.payload = arguments.payload;
   Result<MeasurementBatch> batch = simulate(*robot, q, options);
@@ -135,6 +137,7 @@ void add_simulate(CLI::App& app, Action& chosen) {
   command->add_option("--seed", arguments->seed, "Seed of the measuring noise")->capture_default_str();
   command->add_flag("--positions-only", arguments->positions_only,
                     "Leave out orientations, as a single reflector does");
+  command->add_flag("--noise-free", arguments->noise_free, "Write where the tool really is, without measuring noise");
   add_tool_options(*command, arguments->tool, arguments->payload);
   command->add_option("-o,--output", arguments->output, "Batch to write (CSV: deg, mm)")->required();
   add_json_option(*command, arguments->json);

@@ -116,7 +116,12 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain dom
     if (domain == Domain::kDecide) prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
     if (prediction.in_domain) {
       prediction.X_BT_predicted.translation() += bias.mean_B;
-      variance = bias.measured_stddev_B.cwiseAbs2();
+      // Noise is never less than the tracker's: a fit to few poses takes some of it for signal. What the parameters
+      // leave uncertain is corrected by the bias as far as the bias knows anything, and counts in full where it does
+      // not.
+      const Vector3 known = bias.stddev_B.cwiseAbs2();
+      const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(sigma * sigma);
+      variance = known + noise + bias.prior_share * identified;
     } else {
       // Not used, so all of it may be missing.
       variance += bias.mean_B.cwiseAbs2() + bias.stddev_B.cwiseAbs2();
