@@ -49,6 +49,7 @@ client::SessionOptions Daemon::session_options() const {
   client::SessionOptions options;
   options.domain = domain_;
   options.server_ports = {port_};
+  options.timeout = kLimit;  // sanitizers and a busy machine are slow
   return options;
 }
 
