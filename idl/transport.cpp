@@ -103,7 +103,7 @@ void ParticipantDeleter::operator()(dds::DomainParticipant* participant) const {
   dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
 }
 
-Result<ParticipantPtr> make_participant(const ParticipantOptions& options) {
+Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
   set_up_process();
   if (const Status usable = check_address(options.address); !usable) return tl::make_unexpected(usable.error());
 
@@ -126,8 +126,8 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options) {
   for (const std::uint16_t port : options.peer_ports)
     builtin.initialPeersList.push_back(locator(options.address, port));
 
-  dds::DomainParticipant* participant =
-      dds::DomainParticipantFactory::get_instance()->create_participant(options.domain, qos);
+  dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
+      options.domain, qos, discovery, dds::StatusMask::none());
   if (participant == nullptr) {
     return failure(ErrorCode::kInternal, "cannot create a DDS participant on {} in domain {}", options.address,
                    options.domain);

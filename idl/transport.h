@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
@@ -40,7 +41,9 @@ using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDelete
 
 /// UDPv4 on one interface, unicast only, nothing taken from the environment. Refuses an address that this host does not
 /// have now: such a participant would stay deaf even when the interface comes up. One participant a process.
-[[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options);
+/// `discovery` outlives it and hears of nothing but who is found.
+[[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options,
+                                                      dds::DomainParticipantListener* discovery = nullptr);
 
 [[nodiscard]] dds::PublisherQos publisher_qos(const std::string& partition);
 [[nodiscard]] dds::SubscriberQos subscriber_qos(const std::string& partition);

@@ -44,8 +44,9 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
     const auto request_topic = wire::make_request_topic<Operation>(participant);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
-    caller->reader_ = subscriber.create_datareader(*reply_topic, wire::call_reader_qos(wire::kReplyDepth), caller.get(),
-                                                   wire::dds::StatusMask::data_available());
+    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched();
+    caller->reader_ =
+        subscriber.create_datareader(*reply_topic, wire::call_reader_qos(wire::kReplyDepth), caller.get(), heard);
     caller->writer_ = publisher.create_datawriter(*request_topic, wire::call_writer_qos(wire::kReplyDepth),
                                                   caller.get(), wire::dds::StatusMask::publication_matched());
     if (caller->reader_ == nullptr || caller->writer_ == nullptr) {
@@ -62,8 +63,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (reader_ != nullptr) subscriber_.delete_datareader(reader_);
   }
 
-  /// Sends the request to a server and, when that one leaves or is silent for half of the time, once more with the same
-  /// id. kUnreachable when nobody answers by `deadline`.
+  /// Sends the request to a server that is matched both ways and, when that one leaves or is silent for half of the
+  /// time, once more with the same id. kUnreachable when nobody answers by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route, Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
     request.header().reply_partition(partition_);
@@ -95,21 +96,23 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
   Result<Reply> attempt_twice(Request& request, const Route& route, Waiting& waiting, Clock::time_point deadline) {
+    const auto now = Clock::now();
     std::string asked;
     for (const bool again : {false, true}) {
+      const auto until = again ? deadline : now + (deadline - now) / 2;
+      // The second time also to a server whose way back is not known yet: it may have had too many clients.
       const auto server = watch_.wait_for_server(
-          route.cell, route.changes_something ? std::string() : asked, deadline, [&](const KnownServer& known) {
-            return reachable(known.participant) && (route.server.empty() || route.server == known.id());
+          route.cell, route.changes_something ? std::string() : asked, until, [&](const KnownServer& known) {
+            return (route.server.empty() || route.server == known.id()) && reachable(known.participant, !again);
           });
-      if (!server) break;
+      if (!server) continue;
       asked = server->id();
       request.header().server(asked);
-      if (!writer_->write(&request))
+      if (!writer_->write(&request)) {
         return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
-      const auto now = Clock::now();
-      const auto until = again ? deadline : now + (deadline - now) / 2;
+      }
       std::unique_lock lock(mutex_);
-      waiting.changed.wait_until(lock, until, [&] { return waiting.reply || !matched_.contains(server->participant); });
+      waiting.changed.wait_until(lock, until, [&] { return waiting.reply || !readers_.contains(server->participant); });
       if (waiting.reply) return std::move(*waiting.reply);
     }
     return asked.empty()
@@ -117,19 +120,27 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
                : failure(ErrorCode::kUnreachable, "{}: server {} did not answer in time", Operation::kName, asked);
   }
 
-  [[nodiscard]] bool reachable(const std::string& participant) const {
+  [[nodiscard]] bool reachable(const std::string& participant, bool and_back) const {
     const std::lock_guard lock(mutex_);
-    return matched_.contains(participant);
+    return readers_.contains(participant) && (!and_back || writers_.contains(participant));
   }
 
   void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
-    const auto guid = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+    matched(readers_, status.last_subscription_handle, status.current_count_change);
+  }
+
+  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
+    matched(writers_, status.last_publication_handle, status.current_count_change);
+  }
+
+  void matched(std::set<std::string>& peers, const wire::dds::InstanceHandle_t& peer, int change) {
+    const std::string participant = wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(peer));
     {
       const std::lock_guard lock(mutex_);
-      if (status.current_count_change > 0) {
-        matched_.insert(wire::participant_of(guid));
+      if (change > 0) {
+        peers.insert(participant);
       } else {
-        matched_.erase(wire::participant_of(guid));
+        peers.erase(participant);
         for (const auto& [sequence, waiting] : waiting_) waiting->changed.notify_all();
       }
     }
@@ -159,8 +170,9 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   wire::dds::DataReader* reader_ = nullptr;
   std::array<std::uint8_t, 16> guid_{};  // of writer_
   mutable std::mutex mutex_;
-  std::condition_variable room_;                              // waiting_ has become smaller
-  std::set<std::string> matched_;                             // guarded by mutex_: participants with a request reader
+  std::condition_variable room_;   // waiting_ has become smaller
+  std::set<std::string> readers_;  // guarded by mutex_: participants that read our requests
+  std::set<std::string> writers_;  // guarded by mutex_: participants that write replies to us
   std::map<std::int64_t, std::shared_ptr<Waiting>> waiting_;  // guarded by mutex_; by sequence number
   std::int64_t last_sequence_ = 0;                            // guarded by mutex_
 };

@@ -1,7 +1,7 @@
 #include "server/dds/dds_service.h"
 
 #include <chrono>
-#include <condition_variable>
+#include <mutex>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -13,6 +13,7 @@
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
+#include "server/dds/service_events.h"
 #include "server/dds/state_topics.h"
 
 namespace trammel {
@@ -45,15 +46,17 @@ class DdsService::Running {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
+    auto events = std::make_unique<ServiceEvents>();
     auto participant = wire::make_participant(
-        {"trammel server " + options.server_id, options.domain, options.address, options.port, options.peer_ports});
+        {"trammel server " + options.server_id, options.domain, options.address, options.port, options.peer_ports},
+        events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
     if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
     auto topics = StateTopics::open(**participant);
     if (!topics) return tl::make_unexpected(topics.error());
 
-    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port),
+    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics));
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
@@ -75,25 +78,27 @@ class DdsService::Running {
     sample.number(progress.job);
     sample.job(to_wire(progress));
     topics_.publish(std::move(sample));
-    if (progress.stage == JobStage::kTraining) return;
-    const std::lock_guard lock(mutex_);
-    wake_status();
+    if (progress.stage != JobStage::kTraining) events_->status_changed();
   }
 
   void publish_model(const std::string& cell) {
-    const std::lock_guard lock(mutex_);  // so that the last one published is the one in force
-    if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
-    wake_status();
+    {
+      const std::lock_guard lock(mutex_);  // so that the last one published is the one in force
+      if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
+    }
+    events_->status_changed();
   }
 
  private:
   Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry, PortLock port,
-          wire::ParticipantPtr participant, wire::dds::Subscriber& subscriber, const StateTopics& topics)
+          std::unique_ptr<ServiceEvents> events, wire::ParticipantPtr participant, wire::dds::Subscriber& subscriber,
+          const StateTopics& topics)
       : options_(options),
         trainer_(trainer),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
+        events_(std::move(events)),
         participant_(std::move(participant)),
         topics_(topics),
         channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
@@ -119,9 +124,9 @@ class DdsService::Running {
     while (!stop.stop_requested()) {
       publish_status(wire::SERVICE_SERVING);
       channels_.sweep();
-      std::unique_lock lock(mutex_);
-      status_due_.wait_for(lock, stop, wire::kStatusPeriod, [this] { return status_changed_; });
-      status_changed_ = false;
+      for (const ReplyReader& reader : events_->wait(stop, wire::kStatusPeriod)) {
+        channels_.expect(reader.partition, reader.topic);
+      }
     }
   }
 
@@ -140,25 +145,18 @@ class DdsService::Running {
     topics_.publish(std::move(status));
   }
 
-  /// With mutex_ held.
-  void wake_status() {
-    status_changed_ = true;
-    status_due_.notify_one();
-  }
-
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;
+  std::unique_ptr<ServiceEvents> events_;
   wire::ParticipantPtr participant_;
   StateTopics topics_;
   ReplyChannels channels_;
   ServiceCore core_;
-  std::mutex mutex_;
-  std::condition_variable_any status_due_;
-  bool status_changed_ = false;  // guarded by mutex_
+  std::mutex mutex_;  // one model published at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::jthread status_thread_;
 };

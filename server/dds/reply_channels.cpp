@@ -83,16 +83,33 @@ class ReplyChannels::Client {
   std::map<wire::dds::Topic*, std::unique_ptr<ReplyWriter>> writers_;  // guarded by mutex_
 };
 
+void ReplyChannels::add_topic(wire::dds::Topic* topic) {
+  const std::lock_guard lock(mutex_);
+  topics_[topic->get_name()] = topic;
+}
+
+void ReplyChannels::expect(const std::string& partition, const std::string& topic) {
+  wire::dds::Topic* known = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = topics_.find(topic);
+    if (found == topics_.end()) return;
+    known = found->second;
+  }
+  if (const auto to = client(partition, false)) static_cast<void>(to->writer(known));
+}
+
 bool ReplyChannels::send(const std::string& partition, wire::dds::Topic* topic, void* reply,
                          const std::stop_token& stop) {
-  const std::shared_ptr<Client> to = client(partition);
+  const std::shared_ptr<Client> to = client(partition, true);
   ReplyWriter* writer = to->writer(topic);
   return writer != nullptr && writer->send(reply, stop);
 }
 
-std::shared_ptr<ReplyChannels::Client> ReplyChannels::client(const std::string& partition) {
+std::shared_ptr<ReplyChannels::Client> ReplyChannels::client(const std::string& partition, bool crowd_out) {
   std::shared_ptr<Client> crowded_out;  // destroyed without the lock
   const std::lock_guard lock(mutex_);
+  if (!crowd_out && clients_.size() >= capacity_ && !clients_.contains(partition)) return nullptr;
   auto& entry = clients_[partition];
   if (!entry) entry = std::make_shared<Client>(participant_, partition);
   entry->last_used = Clock::now();

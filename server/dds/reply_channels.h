@@ -49,6 +49,10 @@ class ReplyChannels {
   ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity)
       : participant_(participant), capacity_(capacity) {}
 
+  /// A topic that replies go to; before anything else.
+  void add_topic(wire::dds::Topic* topic);
+  /// A client listens on the topic. Does nothing for an unknown topic, or when there are `capacity` clients already.
+  void expect(const std::string& partition, const std::string& topic);
   /// `reply` is a sample of the topic's type. False when the client did not listen.
   [[nodiscard]] bool send(const std::string& partition, wire::dds::Topic* topic, void* reply,
                           const std::stop_token& stop);
@@ -58,12 +62,13 @@ class ReplyChannels {
 
  private:
   class Client;
-  [[nodiscard]] std::shared_ptr<Client> client(const std::string& partition);
+  [[nodiscard]] std::shared_ptr<Client> client(const std::string& partition, bool crowd_out);
 
   wire::dds::DomainParticipant& participant_;
   const std::size_t capacity_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<Client>> clients_;  // guarded by mutex_
+  std::map<std::string, wire::dds::Topic*> topics_;         // guarded by mutex_; by name
+  std::map<std::string, std::shared_ptr<Client>> clients_;  // guarded by mutex_; by partition
 };
 
 }  // namespace trammel

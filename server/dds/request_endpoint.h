@@ -95,6 +95,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
     endpoint->reply_topic_ = *reply_topic;
+    core.channels.add_topic(*reply_topic);
     endpoint->reader_ = core.subscriber.create_datareader(*request_topic, wire::call_reader_qos(wire::kRequestDepth),
                                                           endpoint.get(), wire::dds::StatusMask::data_available());
     if (endpoint->reader_ == nullptr) {

@@ -71,8 +71,10 @@ TEST_F(ServiceTest, AnswersAClientThatCameLater) {
   server_.backend().serve(4);
   server_.start();
   const auto session = open_session(server_.options());
+  const auto begin = std::chrono::steady_clock::now();
   const auto answer = session->predict_error(kCell7, {kJoints, kJoints});
   ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4)) << "was asked twice";
   ASSERT_EQ(answer->items.size(), 2u);
   EXPECT_NEAR(answer->items[0].dx_mm, 0.4, 1e-9);
   EXPECT_EQ(answer->model.version, 4);
