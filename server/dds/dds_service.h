@@ -21,8 +21,8 @@ class DdsService {
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
-  /// Begins to answer and publishes the models in force. Refuses a port that is taken, an address that this host does
-  /// not have, a server or cell name that does not fit the wire.
+  /// Begins to answer and publishes the models in force; after Trainer::take_up(). Refuses a port that is taken, an
+  /// address that this host does not have, a server or cell name that does not fit the wire.
   [[nodiscard]] Status start();
   /// Lets running requests finish, says that it stops, and leaves. May be started again.
   void stop();

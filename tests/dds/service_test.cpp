@@ -45,6 +45,7 @@ class Server {
                                     [this](const ServedModel& model, bool in_force) {
                                       if (in_force) service_.publish_model(model.cell);
                                     });
+    if (const auto taken = backend_.trainer->take_up(); !taken) throw std::runtime_error(taken.error().message);
   }
   void start() {
     const Status started = service_.start();
