@@ -24,7 +24,12 @@ std::string make_partition() {
   return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
 }
 
+/// Whether it can be sent: strings on the wire end at a NUL, and what comes after one would be lost unseen.
 Status check_text(const std::string& what, const std::string& text) {
+  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
+    return refused("{} row {}: a NUL byte, not text", what, line);
+  }
   if (text.size() <= kMaxText) return {};
   return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, text.size(), kMaxText);
 }

@@ -125,6 +125,17 @@ TEST_F(ServiceTest, WhatTheServerRefusesArrivesWithItsCode) {
             ErrorCode::kTooLarge);
 }
 
+TEST_F(ServiceTest, ATextThatANulWouldCutShortIsNotSent) {
+  server_.start();
+  const auto session = open_session(server_.options());
+  const std::string torn = test::small_batch_csv(*server_.backend().cell, {}) + std::string(100, '\0');
+  const auto submitted = session->submit_measurements("cell-7", "lt-07", torn);
+  ASSERT_FALSE(submitted) << "the rows before the NUL were taken for the batch";
+  EXPECT_EQ(submitted.error().code, ErrorCode::kRefused);
+  EXPECT_NE(submitted.error().message.find("lt-07 row 42: a NUL"), std::string::npos) << submitted.error().message;
+  EXPECT_FALSE(session->import_model("cell-7", torn));
+}
+
 TEST_F(ServiceTest, LongCallsGoInParts) {
   server_.backend().serve(2);
   server_.start();
