@@ -73,6 +73,9 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   Predictions predictions{model->provenance().id, {}};
   ProgressLine progress;
   for (const CommandedPose& pose : list.poses) {
+    if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
+      return refused("{} row {}: {}", list.where, pose.row, known.error().message);
+    }
     progress.show("predicting", static_cast<double>(predictions.items.size()) / static_cast<double>(list.poses.size()));
     predictions.items.push_back(to_wire(model->predict(pose.context.q, pose.context.tool, pose.context.payload)));
   }
@@ -125,6 +128,7 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   if (!tool) return tl::make_unexpected(tool.error());
   const Result<std::string> payload = resolve_payload(model->cell(), arguments.payload);
   if (!payload) return tl::make_unexpected(payload.error());
+  if (const Status known = model->check_trained_with(*tool, *payload); !known) return tl::make_unexpected(known.error());
   Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}};
   ProgressLine progress;
   for (const TargetRow& row : file.rows) {

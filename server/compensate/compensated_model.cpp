@@ -89,6 +89,16 @@ bool CompensatedModel::in_range(const JointVector& q) const {
   return (q.array() >= parts().q_min.array() - margin).all() && (q.array() <= parts().q_max.array() + margin).all();
 }
 
+Status CompensatedModel::check_trained_with(const std::string& tool, const std::string& payload) const {
+  if (parts().trained_with.contains({tool, payload})) return {};
+  std::string known;
+  for (const auto& [one, load] : parts().trained_with) {
+    known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);
+  }
+  return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
+                 cell().name, tool, payload, known);
+}
+
 ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::string& tool,
                                           const std::string& payload) const {
   PoseContext context;
@@ -110,7 +120,9 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain dom
   const double sigma = cell().tracker.sigma;
 
   Vector3 variance = Vector3::Constant(sigma * sigma + parts().discrepancy * parts().discrepancy) + identified;
-  prediction.in_domain = domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q));
+  prediction.in_domain =
+      domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q) &&
+                                    parts().trained_with.contains({context.tool, context.payload}));
   if (inside_->bias) {
     const BiasPrediction bias = inside_->bias->predict(context.q);
     if (domain == Domain::kDecide) prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;

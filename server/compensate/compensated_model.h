@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/result.h"
@@ -92,6 +94,7 @@ class CompensatedModel {
     std::optional<BiasState> bias;
     JointVector q_min, q_max;              ///< range of the training poses, rad
     double prior_share_limit = 0;          ///< in domain: prior share not above this
+    std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
     ModelProvenance provenance;            ///< id and hash are filled in by make()
     Evaluation training;                   ///< on the poses it was trained on
     std::optional<Evaluation> validation;  ///< on poses held out from training
@@ -102,6 +105,9 @@ class CompensatedModel {
   [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
   [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
 
+  /// Refuses a tool with a payload that no training pose had: what was learned holds for no other, and a tool whose
+  /// pose the data had to tell is known by no other.
+  [[nodiscard]] Status check_trained_with(const std::string& tool, const std::string& payload) const;
   /// q is checked by the caller for size; tool and payload as resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
                                         const std::string& payload) const;

@@ -138,6 +138,7 @@ Json content_of(const CompensatedModel::Parts& parts) {
                   {"q_min", to_json(Eigen::MatrixXd(parts.q_min))},
                   {"q_max", to_json(Eigen::MatrixXd(parts.q_max))},
                   {"prior_share_limit", parts.prior_share_limit},
+                  {"trained_with", parts.trained_with},
                   {"training", to_json(parts.training)},
                   {"provenance",
                    {{"level", parts.provenance.level},
@@ -187,6 +188,7 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.q_min = matrix_from(content.at("q_min"));
   parts.q_max = matrix_from(content.at("q_max"));
   parts.prior_share_limit = content.at("prior_share_limit");
+  content.at("trained_with").get_to(parts.trained_with);
   parts.training = evaluation_from(content.at("training"));
   if (content.contains("bias")) parts.bias = bias_from(content.at("bias"));
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));

@@ -1,6 +1,7 @@
 #include "server/base/units.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/measurement/pose_check.h"
 
 namespace trammel {
 namespace {
@@ -36,6 +37,12 @@ Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const auto q = from_wire(joints[i], model.cell().robot, fmt::format("joint vector {}", i + 1));
     if (!q) return tl::make_unexpected(q.error());
+    PoseContext pose;
+    pose.q = *q;
+    pose.tool = subject->tool;
+    pose.payload = subject->payload;
+    const Status possible = check_pose(pose, model.cell(), fmt::format("joint vector {}", i + 1));
+    if (!possible) return tl::make_unexpected(possible.error());
     reply.predictions().push_back(to_wire(model.predict(*q, subject->tool, subject->payload)));
   }
   return reply;

@@ -62,6 +62,9 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
   if (!tool) return tl::make_unexpected(tool.error());
   const auto payload = resolve_payload(trained_for, context.payload());
   if (!payload) return tl::make_unexpected(payload.error());
+  if (const Status known = subject.served->model.check_trained_with(*tool, *payload); !known) {
+    return tl::make_unexpected(known.error());
+  }
   subject.tool = *tool;
   subject.payload = *payload;
   return subject;

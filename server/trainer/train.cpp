@@ -98,6 +98,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   for (const Measurement& m : split.train.measurements) {
     parts.q_min = parts.q_min.cwiseMin(m.context.q);
     parts.q_max = parts.q_max.cwiseMax(m.context.q);
+    parts.trained_with.emplace(m.context.tool, m.context.payload);
   }
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();

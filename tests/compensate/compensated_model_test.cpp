@@ -133,6 +133,24 @@ TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
             correction.error_before);
 }
 
+TEST_F(Compensated, WhatWasLearnedWithOneToolIsNotAppliedToAnother) {
+  EXPECT_TRUE(model().check_trained_with("spindle", "spindle"));
+  const Status other = model().check_trained_with("spindle", "probe");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::kRefused);
+  EXPECT_NE(other.error().message.find("only with 'spindle' and 'spindle'"), std::string::npos)
+      << other.error().message;
+  CompensatedModel::Parts parts = model().parts();
+  parts.trained_with = {{"probe", "spindle"}};
+  const CompensatedModel of_another_tool = CompensatedModel::make(std::move(parts)).value();
+  const ErrorPrediction prediction = of_another_tool.predict(inside(), "spindle", "spindle");
+  EXPECT_FALSE(prediction.in_domain);
+  PoseContext context;
+  context.q = inside();
+  context.tool = context.payload = "spindle";
+  EXPECT_LT(pose_difference(prediction.X_BT_predicted, model().parts().physics.pose_W(context)).norm(), 1e-9);
+}
+
 TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
   Target far = target_at(inside());
   far.X_BT.translation().x() += 3;

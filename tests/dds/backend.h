@@ -37,6 +37,7 @@ inline CompensatedModel shifted_model(const std::shared_ptr<const Cell>& cell, d
   parts.covariance = Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
   parts.q_min = JointVector::Constant(cell->robot.size(), from_deg(-60));
   parts.q_max = JointVector::Constant(cell->robot.size(), from_deg(60));
+  parts.trained_with = {{"spindle", cell->payloads.empty() ? "" : cell->payloads.begin()->first}};
   parts.provenance.level = "base";
   parts.provenance.batch_id = fmt::format("shift-{}", shift);
   parts.provenance.training_poses = 40;

@@ -104,6 +104,22 @@ TEST_F(HandlersTest, TheContextMustFit) {
   EXPECT_EQ(refusal(request, "does not compensate"), ErrorCode::kRefused);
 }
 
+TEST_F(HandlersTest, JointsOutsideTheLimitsHaveNoPrediction) {
+  backend_.serve(1);
+  auto request = predict_request(2);
+  request.joints_rad()[1][2] = 1.5;  // limit 70 deg
+  EXPECT_EQ(refusal(request, "joint vector 2: joint 3 is 85.9"), ErrorCode::kRefused);
+}
+
+TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
+  CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
+  parts.trained_with = {{"probe", ""}};
+  backend_.registry.publish(std::make_shared<const ServedModel>(
+      ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
+  EXPECT_EQ(refusal(predict_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(correct_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
+}
+
 TEST_F(HandlersTest, AModelIdMustBeTheOneInForce) {
   const auto served = backend_.serve(2);
   auto request = predict_request();

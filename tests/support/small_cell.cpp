@@ -54,6 +54,7 @@ CompensatedModel nominal_model(const std::shared_ptr<const Cell>& cell, int trai
   parts.physics = demand(make_physical_model(cell, {}));
   parts.q_min = JointVector::Constant(cell->robot.size(), from_deg(-60));
   parts.q_max = JointVector::Constant(cell->robot.size(), from_deg(60));
+  parts.trained_with = {{"spindle", cell->payloads.empty() ? "" : cell->payloads.begin()->first}};
   parts.provenance.level = "none";
   parts.provenance.batch_id = "by-hand";
   parts.provenance.training_poses = training_poses;
