@@ -5,7 +5,7 @@
 #include <cstdint>
 
 /// Ports, times and limits of the wire that server and clients share. The types are in the IDL files, the topics in
-/// operations.h.
+/// topics.h.
 namespace trammel::wire {
 
 /// UDP port of the first server on a host; replicas take every second one after it.

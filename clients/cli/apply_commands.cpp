@@ -128,7 +128,8 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   if (!tool) return tl::make_unexpected(tool.error());
   const Result<std::string> payload = resolve_payload(model->cell(), arguments.payload);
   if (!payload) return tl::make_unexpected(payload.error());
-  if (const Status known = model->check_trained_with(*tool, *payload); !known) return tl::make_unexpected(known.error());
+  if (const Status known = model->check_trained_with(*tool, *payload); !known)
+    return tl::make_unexpected(known.error());
   Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}};
   ProgressLine progress;
   for (const TargetRow& row : file.rows) {

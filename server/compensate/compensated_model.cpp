@@ -120,9 +120,8 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain dom
   const double sigma = cell().tracker.sigma;
 
   Vector3 variance = Vector3::Constant(sigma * sigma + parts().discrepancy * parts().discrepancy) + identified;
-  prediction.in_domain =
-      domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q) &&
-                                    parts().trained_with.contains({context.tool, context.payload}));
+  prediction.in_domain = domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q) &&
+                                                       parts().trained_with.contains({context.tool, context.payload}));
   if (inside_->bias) {
     const BiasPrediction bias = inside_->bias->predict(context.q);
     if (domain == Domain::kDecide) prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;

@@ -92,12 +92,12 @@ class CompensatedModel {
     double condition_number = 0;
     double discrepancy = 0;  ///< m per axis, see CalibrationResult
     std::optional<BiasState> bias;
-    JointVector q_min, q_max;              ///< range of the training poses, rad
-    double prior_share_limit = 0;          ///< in domain: prior share not above this
+    JointVector q_min, q_max;                                    ///< range of the training poses, rad
+    double prior_share_limit = 0;                                ///< in domain: prior share not above this
     std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
-    ModelProvenance provenance;            ///< id and hash are filled in by make()
-    Evaluation training;                   ///< on the poses it was trained on
-    std::optional<Evaluation> validation;  ///< on poses held out from training
+    ModelProvenance provenance;                                  ///< id and hash are filled in by make()
+    Evaluation training;                                         ///< on the poses it was trained on
+    std::optional<Evaluation> validation;                        ///< on poses held out from training
   };
   [[nodiscard]] static Result<CompensatedModel> make(Parts parts);
 

@@ -133,6 +133,30 @@ TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
             correction.error_before);
 }
 
+TEST_F(Compensated, AnArmThatStandsAskewInTheTrackersWorldIsPredictedInItsOwnBase) {
+  auto cell = std::make_shared<Cell>(*robot_->truth.cell);
+  const Matrix3 R_WB = Eigen::AngleAxisd(2.1, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+  cell->X_WB = make_pose(R_WB, Vector3(5, -3, 1.2));
+  cell->gravity_W = R_WB * cell->gravity_W;
+  const VirtualRobot askew = test::chapter_5_robot(cell);
+  TrainOptions options;
+  options.level = "M2";
+  const CompensatedModel model = test::demand(train(cell, test::measured(askew, 200, 31), options));
+  const Evaluation evaluation = model.evaluate(test::measured(askew, 300, 32));
+  EXPECT_LT(evaluation.compensated.rms, 0.5 * evaluation.calibrated.rms);
+  EXPECT_LT(to_mm(evaluation.compensated.rms), 0.1);
+  // What the arm does in its own base does not depend on where the tracker stands.
+  PoseContext context;
+  context.q = inside();
+  context.tool = context.payload = "spindle";
+  const Pose nominal = robot_->truth.nominal_pose_W(context);
+  const ErrorPrediction prediction = model.predict(inside(), "spindle", "spindle");
+  EXPECT_LT(pose_difference(prediction.X_BT_nominal, nominal).norm(), 1e-9);
+  const Vector3 error_B = true_pose_B(inside()).translation() - nominal.translation();
+  EXPECT_LT(to_mm((prediction.error_B - error_B).norm()), 0.15);
+  EXPECT_GT(to_mm(error_B.norm()), 1);
+}
+
 TEST_F(Compensated, WhatWasLearnedWithOneToolIsNotAppliedToAnother) {
   EXPECT_TRUE(model().check_trained_with("spindle", "spindle"));
   const Status other = model().check_trained_with("spindle", "probe");

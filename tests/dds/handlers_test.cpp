@@ -114,8 +114,8 @@ TEST_F(HandlersTest, JointsOutsideTheLimitsHaveNoPrediction) {
 TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
   CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
   parts.trained_with = {{"probe", ""}};
-  backend_.registry.publish(std::make_shared<const ServedModel>(
-      ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
+  backend_.registry.publish(
+      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
   EXPECT_EQ(refusal(predict_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
   EXPECT_EQ(refusal(correct_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
 }
