@@ -190,6 +190,40 @@ TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
   EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(), 1e-3);
 }
 
+TEST_F(HandlersTest, EveryNumberOfAPredictionIsTheModels) {
+  CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
+  parts.physics.values.head<3>() = Vector3(1e-4, 2e-4, 3e-4);
+  parts.covariance.diagonal().head<3>() = Vector3(1e-8, 4e-8, 9e-8);
+  const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
+  backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, model}));
+  const auto reply = handlers_.answer(predict_request());
+  ASSERT_TRUE(reply) << reply.error().message;
+  const wire::PredictedError& got = reply->predictions().front();
+  const ErrorPrediction expected =
+      model.predict(Eigen::Map<const JointVector>(kJoints.data(), 6), "spindle", predict_request().about().payload());
+  EXPECT_EQ(Vector3(got.dx_mm(), got.dy_mm(), got.dz_mm()), expected.error_B * to_mm(1));
+  EXPECT_EQ(Vector3(got.sx_mm(), got.sy_mm(), got.sz_mm()), expected.stddev_B * to_mm(1));
+  EXPECT_NE(got.dy_mm(), got.dz_mm());
+  EXPECT_NE(got.sx_mm(), got.sy_mm());
+  EXPECT_EQ(got.predicted().y_mm(), to_mm(expected.X_BT_predicted.translation().y()));
+  EXPECT_EQ(got.nominal().z_mm(), to_mm(expected.X_BT_nominal.translation().z()));
+  EXPECT_EQ(got.in_domain(), expected.in_domain);
+}
+
+TEST_F(HandlersTest, ACorrectionByAnEarlierVersionNamesThatVersion) {
+  const CompensatedModel stored = test::shifted_model(backend_.cell, 8e-4);
+  ASSERT_EQ(backend_.store->add_model("cell-7", stored, 0, false, "").value_or(0), 1);
+  backend_.serve(2);
+  auto request = correct_request();
+  request.about().model("@1");
+  const auto reply = handlers_.answer(request);
+  ASSERT_TRUE(reply) << reply.error().message;
+  EXPECT_EQ(reply->model().version(), 1);
+  EXPECT_EQ(reply->model().hash(), stored.provenance().hash);
+  EXPECT_FALSE(reply->model().in_force());
+  EXPECT_NEAR(reply->corrections().front().error_before_mm(), 0.8, 1e-6);
+}
+
 TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
   const auto first = handlers_.answer(submit_request("lt-07"));
   ASSERT_TRUE(first) << first.error().message;
