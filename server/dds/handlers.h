@@ -22,8 +22,7 @@ struct Subject {
 /// Finds what a request's context means. Keeps the few stored versions last asked for in memory. Thread-safe.
 class SubjectFinder {
  public:
-  SubjectFinder(const Trainer& trainer, const Store& store, const ModelRegistry& registry)
-      : trainer_(trainer), store_(store), registry_(registry) {}
+  SubjectFinder(const Trainer& trainer, const ModelRegistry& registry) : trainer_(trainer), registry_(registry) {}
 
   /// The cell's description. Refuses an unknown cell, tool or payload, and a controller that compensates: models are
   /// trained with one that does not.
@@ -35,7 +34,6 @@ class SubjectFinder {
   [[nodiscard]] Result<std::shared_ptr<const ServedModel>> version(const std::string& cell, int version);
 
   const Trainer& trainer_;
-  const Store& store_;
   const ModelRegistry& registry_;
   std::mutex mutex_;
   std::deque<std::shared_ptr<const ServedModel>> loaded_;  // guarded by mutex_; newest first
@@ -46,7 +44,7 @@ class SubjectFinder {
 class Handlers {
  public:
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
-      : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, store, registry) {}
+      : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
   [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
   [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);

@@ -75,7 +75,7 @@ Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::str
   const auto found = std::find_if(loaded_.begin(), loaded_.end(),
                                   [&](const auto& m) { return m->cell == cell && m->version == version; });
   if (found != loaded_.end()) return *found;
-  auto model = store_.model(cell, version);
+  auto model = trainer_.load_for_service(cell, version);
   if (!model) return tl::make_unexpected(model.error());
   loaded_.push_front(std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)}));
   if (loaded_.size() > kVersionsInMemory) loaded_.pop_back();

@@ -46,6 +46,37 @@ bool same_robot(const Chain& a, const Chain& b) {
   return true;
 }
 
+/// Whether the tools and payloads that the model was trained with are still what the cell says they are.
+bool same_tools(const CompensatedModel& model, const Cell& cell) {
+  const auto same_pose = [](const std::optional<Pose>& a, const std::optional<Pose>& b) {
+    return a.has_value() == b.has_value() && (!a || a->matrix() == b->matrix());
+  };
+  const auto same_payload = [](const auto& known, const auto& present, const std::string& name) {
+    if (name.empty()) return true;
+    const auto now = present.find(name);
+    return now != present.end() && now->second.mass == known.at(name).mass &&
+           now->second.p_FoCog_F == known.at(name).p_FoCog_F;
+  };
+  const auto& trained_with = model.parts().trained_with;
+  return std::all_of(trained_with.begin(), trained_with.end(), [&](const auto& pair) {
+    const auto& [tool, payload] = pair;
+    const auto now = cell.tools.find(tool);
+    return now != cell.tools.end() && same_pose(now->second, model.cell().tools.at(tool)) &&
+           same_payload(model.cell().payloads, cell.payloads, payload);
+  });
+}
+
+/// Whether the cell can be served with the model; `which` names it.
+Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
+  if (!same_robot(model.cell().robot, cell.robot)) {
+    return refused("{} was trained for another robot than cell {} has", which, cell.name);
+  }
+  if (!same_tools(model, cell)) {
+    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name);
+  }
+  return {};
+}
+
 /// Makes the drawing of the rows held out a property of the batch: see the class.
 void mark_held_out(MeasurementBatch& batch, double share, std::uint64_t seed) {
   std::set<int> held_out;
@@ -307,10 +338,8 @@ Result<int> Trainer::import_model(const std::string& cell_name, const std::strin
   if (model->cell().name != cell_name) {
     return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell_name);
   }
-  if (!same_robot(model->cell().robot, (*cell_found)->robot)) {
-    return refused("imported model {} was trained for another robot than cell {} has", model->provenance().id,
-                   cell_name);
-  }
+  const Status fits = check_fits_cell(*model, **cell_found, "imported model " + model->provenance().id);
+  if (!fits) return tl::make_unexpected(fits.error());
   const std::lock_guard lock(activation_mutex_);
   const auto present = store_.models(cell_name);
   if (!present) return tl::make_unexpected(present.error());
@@ -367,9 +396,10 @@ Status Trainer::publish_from_store(const std::string& cell_name) {
 
 Result<CompensatedModel> Trainer::load_for_service(const std::string& cell_name, int version) const {
   auto model = store_.model(cell_name, version);
-  if (model && !same_robot(model->cell().robot, cells_.at(cell_name)->robot)) {
-    return refused("version {} of cell {} was trained for another robot than the cell has now", version, cell_name);
-  }
+  if (!model) return model;
+  const Status fits =
+      check_fits_cell(*model, *cells_.at(cell_name), fmt::format("version {} of cell {}", version, cell_name));
+  if (!fits) return tl::make_unexpected(fits.error());
   return model;
 }
 

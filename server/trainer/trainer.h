@@ -60,8 +60,8 @@ class Trainer {
   /// Set before start().
   void set_listeners(ProgressListener progress, ModelListener model);
   /// Publishes the models in force from the store and queues unfinished jobs. Returns what could not be taken up, for
-  /// the log: a model that does not load or was trained for another robot, a job of a cell not served here, a job that
-  /// was interrupted too often and is now failed. Requests may come as soon as it returns.
+  /// the log: a model that does not load or was trained for another robot or tool, a job of a cell not served here, a
+  /// job that was interrupted too often and is now failed. Requests may come as soon as it returns.
   [[nodiscard]] Result<std::vector<std::string>> take_up();
   /// Reports the jobs taken up and starts the worker. Does take_up() itself where that has not been done.
   [[nodiscard]] Result<std::vector<std::string>> start();
@@ -82,8 +82,10 @@ class Trainer {
   [[nodiscard]] Status activate(const std::string& cell, int version);
   /// Back to the version in force before; returns it.
   [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// A stored version of a cell that is served here; refused when its robot or its tools are not the cell's any more.
+  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
   /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
-  /// same model is there already. Refuses one of another cell or robot.
+  /// same model is there already. Refuses one of another cell, robot or tool.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
 
   /// Of an unfinished job as it goes on, of a finished one from the store.
@@ -99,7 +101,6 @@ class Trainer {
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
 
   [[nodiscard]] Status publish_from_store(const std::string& cell);
-  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
   void put_in_force(std::shared_ptr<const ServedModel> model);
 
   void work(const std::stop_token& stop);

@@ -400,6 +400,27 @@ TEST_F(TrainerTest, DoesNotServeAModelOfAnotherRobot) {
   EXPECT_EQ(trainer_->activate("cell-7", 1).error().code, ErrorCode::kRefused);
 }
 
+TEST_F(TrainerTest, DoesNotServeAModelOfAToolThatHasChanged) {
+  start();
+  train("lt-07");
+  Cell changed = *cells_.at("cell-7");
+  changed.tools["probe"] = Pose::Identity();  // one more tool is no reason
+  cells_["cell-7"] = std::make_shared<const Cell>(changed);
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  EXPECT_EQ(in_force(), 1);
+
+  changed.tools.at("spindle")->translation().z() += 0.05;
+  cells_["cell-7"] = std::make_shared<const Cell>(std::move(changed));
+  restart();
+  const auto notices = trainer_->start();
+  ASSERT_TRUE(notices);
+  ASSERT_EQ(notices->size(), 1u);
+  EXPECT_NE(notices->front().find("other tools"), std::string::npos) << notices->front();
+  EXPECT_EQ(in_force(), 0);
+  EXPECT_EQ(trainer_->activate("cell-7", 1).error().code, ErrorCode::kRefused);
+}
+
 TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   start();
   train("a");
