@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/hash.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -103,7 +102,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
     parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();
   }
   parts.provenance.batch_id = batch.id;
-  parts.provenance.batch_hash = sha256_hex(batch.source_text.empty() ? to_csv(batch) : batch.source_text);
+  parts.provenance.batch_hash = batch_hash(batch);
   parts.provenance.training_poses = static_cast<int>(split.train.measurements.size());
   parts.provenance.seed = options.seed;
   parts.provenance.trained_at = options.trained_at;
