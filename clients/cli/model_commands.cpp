@@ -5,6 +5,7 @@
 #include "clients/cli/evaluation_text.h"
 #include "clients/cli/options.h"
 #include "clients/cli/output.h"
+#include "server/measurement/batch_file.h"
 #include "server/report/model_page.h"
 #include "server/trainer/train.h"
 
@@ -26,7 +27,7 @@ struct TrainArguments {
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  const Result<MeasurementBatch> batch = read_batch_csv(arguments.batch);
+  const Result<MeasurementBatch> batch = read_batch(arguments.batch);
   if (!batch) return tl::make_unexpected(batch.error());
   TrainOptions options;
   options.level = arguments.level;
@@ -60,7 +61,7 @@ struct EvaluateArguments {
 
 /// The batch, ready for the model's cell.
 Result<MeasurementBatch> read_checked_batch(const std::string& path, const CompensatedModel& model) {
-  return read_batch_csv(path).and_then(
+  return read_batch(path).and_then(
       [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), model.cell()); });
 }
 
