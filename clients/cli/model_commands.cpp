@@ -18,6 +18,8 @@ std::int64_t unix_time() {
 }
 
 struct TrainArguments {
+  std::string from;
+  std::string refit = "base,tool";
   std::string cell, batch, output, json;
   std::optional<std::string> level, bias;
   std::uint64_t seed = 1;
@@ -35,6 +37,14 @@ Status train_model(const TrainArguments& arguments) {
   options.seed = arguments.seed;
   options.validation_share = arguments.validation_share;
   options.trained_at = unix_time();
+  if (!arguments.from.empty()) {
+    Result<CompensatedModel> from = load_model(arguments.from);
+    if (!from) return tl::make_unexpected(from.error());
+    options.from = std::move(*from);
+    Result<std::vector<std::string>> refit = parse_level(arguments.refit);
+    if (!refit) return tl::make_unexpected(refit.error());
+    options.refit = std::move(*refit);
+  }
   const Result<CompensatedModel> model = [&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
@@ -106,6 +116,11 @@ void add_train(CLI::App& app, Action& chosen) {
                       "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
   command->add_option("--bias", arguments->bias,
                       "Kernel of the learned bias instead of the cell's: se, matern52, none");
+  command->add_option("--from", arguments->from,
+                      "Model file of the same robot to start from: all but the sources of --refit stay as they are");
+  command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
+      ->needs("--from")
+      ->capture_default_str();
   command->add_option("--seed", arguments->seed, "Seed of the search and of the rows held out")->capture_default_str();
   command
       ->add_option("--validation-share", arguments->validation_share,

@@ -21,6 +21,7 @@ constexpr double kHuberPosition = 4.03;   // norm that 1 in 1000 exceeds, 3 norm
 constexpr double kHuberPose = 4.74;       // the same, 6 axes
 constexpr double kSuspect = 5.5;          // norm of 3 axes that 1 in 10^6 exceeds
 constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation, at most, is left of what was not known
+constexpr double kHeld = 1e-9;            // of the priors of sources that are not to change
 constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 /// Standard deviations with which residuals are weighed: the measurement's and, on top, the model's own.
@@ -113,9 +114,13 @@ struct Scaled {
   Eigen::VectorXd prior;    // in units of scale
 };
 
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 /// The priors stand around the model's values. Those of a frame that the cell calls unknown are wide: it was found with
 /// a chain that was still wrong.
-Scaled scaled(const PhysicalModel& model) {
+Scaled scaled(const PhysicalModel& model, const CalibrateOptions& options) {
   const Eigen::Index P = model.parameter_count();
   Scaled s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P)};
   Eigen::Index k = 0;
@@ -127,6 +132,7 @@ Scaled scaled(const PhysicalModel& model) {
       s.typical(k) = parameter.prior_scale;
       parameter.prior = model.values(k);
       parameter.prior_scale *= unknown ? kUnknownWidening : 1;
+      if (!options.only.empty() && !contains(options.only, source->name())) parameter.prior_scale *= kHeld;
       s.scale(k) = parameter.prior_scale;
       s.prior(k) = parameter.prior / parameter.prior_scale;
     }
@@ -264,7 +270,7 @@ Information information(const PhysicalModel& model, const MeasurementBatch& batc
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const PhysicalModel& model = problem.model;
-  const Scaled s = scaled(model);
+  const Scaled s = scaled(model, options);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = model;
@@ -492,6 +498,26 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   return identify(complete, options);
 }
 
+Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
+                                const std::vector<std::string>& only, CalibrateOptions options) {
+  if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
+  for (const std::string& name : only) {
+    if (std::none_of(model.sources.begin(), model.sources.end(), [&](const auto& s) { return s->name() == name; })) {
+      return failure(ErrorCode::kUsage, "error source '{}' to be refitted is not in the model", name);
+    }
+  }
+  CalibrationProblem problem{model, batch};
+  options.only = only;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const auto count = static_cast<Eigen::Index>(model.sources[k]->parameters().size());
+    if (contains(only, model.sources[k]->name())) problem.model.values.segment(first[k], count).setZero();
+  }
+  if (Status located = locate_unknown_frames(problem.model, batch); !located)
+    return tl::make_unexpected(located.error());
+  return identify(problem, options);
+}
+
 Eigen::MatrixXd CalibrationResult::correlation() const {
   const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
   return inverse.asDiagonal() * covariance * inverse.asDiagonal();
@@ -503,7 +529,7 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, con
   for (const std::string& spec : specs) {
     std::vector<std::vector<std::string>> longer;
     for (const auto& candidate : candidates) {
-      for (const std::string& form : alternatives(spec)) {
+      for (const std::string& form : alternatives(spec, *cell)) {
         longer.push_back(candidate);
         longer.back().push_back(form);
       }

@@ -19,6 +19,7 @@ struct CalibrationProblem {
 
 struct CalibrateOptions {
   int max_iterations = 100;
+  std::vector<std::string> only;  ///< names of the sources that may change; empty: all
   bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
 };
 
@@ -71,5 +72,10 @@ struct CalibrationResult {
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);
+
+/// Identifies the sources in `only` anew on `batch` (the tracker was set up again, the tool was changed), and leaves
+/// all others at what `model` says. Unknown frames are found anew; the sources in `only` start at zero.
+[[nodiscard]] Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
+                                              const std::vector<std::string>& only, CalibrateOptions options = {});
 
 }  // namespace trammel

@@ -106,13 +106,14 @@ int acting_order(const std::string& source_name) {
   return known == nullptr ? 0 : static_cast<int>(known - std::begin(kKnown));
 }
 
-std::vector<std::string> alternatives(const std::string& spec) {
+std::vector<std::string> alternatives(const std::string& spec, const Cell& cell) {
   if (spec != "compliance") return {spec};
+  if (cell.payloads.empty()) return {"compliance_first_order"};
   return {"compliance_first_order", "compliance_equilibrium", "compliance_linear"};
 }
 
 Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell) {
-  if (const auto forms = alternatives(spec); forms.front() != spec) return make_error_source(forms.front(), cell);
+  if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
   const Known* known = find_known(cause_of(spec));
   if (known == nullptr) {
     std::string names = "compliance";

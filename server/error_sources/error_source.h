@@ -63,9 +63,9 @@ class ErrorSource {
 
 using ErrorSourcePtr = std::shared_ptr<const ErrorSource>;
 
-/// The forms of a cause between which the data decide, the first being the usual one: `compliance` has three. All other
-/// specs stand for themselves.
-[[nodiscard]] std::vector<std::string> alternatives(const std::string& spec);
+/// The forms of a cause between which the data decide, the first being the usual one: `compliance` has three where
+/// `cell` carries anything. All other specs stand for themselves.
+[[nodiscard]] std::vector<std::string> alternatives(const std::string& spec, const Cell& cell);
 
 /// The source that `spec` names for this cell, in its usual form: a cause, `:joint` (1-based) where it concerns one,
 /// and

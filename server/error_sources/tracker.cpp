@@ -42,7 +42,8 @@ class TrackerDrift final : public ErrorSource {
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    if (!context.served && context.time) move_base_in_world(values, *context.time / kSecondsPerHour, state, jacobian, first_column);
+    if (!context.served && context.time)
+      move_base_in_world(values, *context.time / kSecondsPerHour, state, jacobian, first_column);
   }
 
  private:

@@ -27,6 +27,29 @@ Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions
   return names;
 }
 
+/// The physics: anew, or that of another model with the named sources refitted.
+Result<CalibrationResult> identify(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                   const TrainOptions& options) {
+  if (options.from) {
+    PhysicalModel model = options.from->parts().physics;
+    if (model.cell->robot_yaml != cell->robot_yaml) {
+      return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell->name);
+    }
+    model.cell = cell;
+    model.X_WB = cell->X_WB.value_or(model.X_WB);
+    for (auto& [name, X_FT] : model.tools) {
+      const auto known = cell->tools.find(name);
+      if (known == cell->tools.end())
+        return refused("cell {}: the model to start from knows tool '{}'", cell->name, name);
+      X_FT = known->second.value_or(X_FT);
+    }
+    return refit(model, batch, options.refit);
+  }
+  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
+  if (!sources) return tl::make_unexpected(sources.error());
+  return calibrate(cell, *sources, batch, {});
+}
+
 /// What the calibrated model leaves over, in B.
 BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
@@ -61,10 +84,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   const BatchSplit split = split_batch(*checked, options.validation_share, options.seed);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 
-  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
-  if (!sources) return tl::make_unexpected(sources.error());
   if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
-  Result<CalibrationResult> calibration = calibrate(cell, *sources, split.train, {});
+  Result<CalibrationResult> calibration = identify(cell, split.train, options);
   if (!calibration) return tl::make_unexpected(calibration.error());
 
   CompensatedModel::Parts parts;
