@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "server/base/check.h"
@@ -537,11 +538,22 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, con
     candidates = std::move(longer);
   }
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
-  for (const auto& candidate : candidates) {
+  std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
+  for (std::vector<std::string>& candidate : candidates) {
+    for (std::string& spec : candidate) {
+      if (const auto order = found.find(spec); order != found.end()) spec = order->second;
+    }
     Result<PhysicalModel> model = make_physical_model(cell, candidate);
     if (!model) return tl::make_unexpected(model.error());
     Result<CalibrationResult> result = calibrate({std::move(*model), batch}, options);
     if (!result) return result;
+    const std::vector<Eigen::Index> first = first_values(result->model);
+    for (std::size_t k = 0; k < result->model.sources.size(); ++k) {
+      const ErrorSource& source = *result->model.sources[k];
+      if (source.search()) {
+        found[source.name()] = fmt::format("{}@{:.4f}", source.name(), result->model.values(first[k]));
+      }
+    }
     if (!best || result->log_likelihood > best->log_likelihood) best = std::move(result);
   }
   return best;
