@@ -40,6 +40,8 @@ int run_command_line(int argc, const char* const* argv) {
       "A file named '-' is standard output.");
   Action chosen;
   add_pose_commands(app, chosen);
+  add_measurement_commands(app, chosen);
+  add_structure_commands(app, chosen);
   add_model_commands(app, chosen);
   add_apply_commands(app, chosen);
   add_service_commands(app, chosen);

@@ -14,9 +14,11 @@ namespace trammel::cli {
 
 using Action = std::function<Status()>;
 
-void add_pose_commands(CLI::App& app, Action& chosen);     // plan, simulate
-void add_model_commands(CLI::App& app, Action& chosen);    // train, evaluate, report
-void add_apply_commands(CLI::App& app, Action& chosen);    // predict, correct
-void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
+void add_pose_commands(CLI::App& app, Action& chosen);         // plan, simulate
+void add_measurement_commands(CLI::App& app, Action& chosen);  // convert, references
+void add_structure_commands(CLI::App& app, Action& chosen);    // cpa, deflection
+void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluate, report
+void add_apply_commands(CLI::App& app, Action& chosen);        // predict, correct
+void add_service_commands(CLI::App& app, Action& chosen);      // submit, retrain, status, watch, models, ...
 
 }  // namespace trammel::cli

@@ -5,6 +5,7 @@
 #include "clients/cli/evaluation_text.h"
 #include "clients/cli/options.h"
 #include "clients/cli/output.h"
+#include "server/measurement/batch_file.h"
 #include "server/report/model_page.h"
 #include "server/trainer/train.h"
 
@@ -17,6 +18,8 @@ std::int64_t unix_time() {
 }
 
 struct TrainArguments {
+  std::string from;
+  std::string refit = "base,tool";
   std::string cell, batch, output, json;
   std::optional<std::string> level, bias;
   std::uint64_t seed = 1;
@@ -26,7 +29,7 @@ struct TrainArguments {
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  const Result<MeasurementBatch> batch = read_batch_csv(arguments.batch);
+  const Result<MeasurementBatch> batch = read_batch(arguments.batch);
   if (!batch) return tl::make_unexpected(batch.error());
   TrainOptions options;
   options.level = arguments.level;
@@ -34,6 +37,14 @@ Status train_model(const TrainArguments& arguments) {
   options.seed = arguments.seed;
   options.validation_share = arguments.validation_share;
   options.trained_at = unix_time();
+  if (!arguments.from.empty()) {
+    Result<CompensatedModel> from = load_model(arguments.from);
+    if (!from) return tl::make_unexpected(from.error());
+    options.from = std::move(*from);
+    Result<std::vector<std::string>> refit = parse_level(arguments.refit);
+    if (!refit) return tl::make_unexpected(refit.error());
+    options.refit = std::move(*refit);
+  }
   const Result<CompensatedModel> model = [&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
@@ -60,7 +71,7 @@ struct EvaluateArguments {
 
 /// The batch, ready for the model's cell.
 Result<MeasurementBatch> read_checked_batch(const std::string& path, const CompensatedModel& model) {
-  return read_batch_csv(path).and_then(
+  return read_batch(path).and_then(
       [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), model.cell()); });
 }
 
@@ -105,6 +116,11 @@ void add_train(CLI::App& app, Action& chosen) {
                       "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
   command->add_option("--bias", arguments->bias,
                       "Kernel of the learned bias instead of the cell's: se, matern52, none");
+  command->add_option("--from", arguments->from,
+                      "Model file of the same robot to start from: all but the sources of --refit stay as they are");
+  command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
+      ->needs("--from")
+      ->capture_default_str();
   command->add_option("--seed", arguments->seed, "Seed of the search and of the rows held out")->capture_default_str();
   command
       ->add_option("--validation-share", arguments->validation_share,

@@ -4,31 +4,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "server/base/check.h"
 #include "server/base/units.h"
-#include "server/calibrate/localisation.h"
+#include "server/calibrate/frames.h"
+#include "server/calibrate/order_search.h"
+#include "server/robot/rigid_fit.h"
 
 namespace trammel {
 
 namespace {
 
 constexpr int kMaxReweightings = 12;
+constexpr double kHuberPosition = 4.03;   // norm that 1 in 1000 exceeds, 3 normal axes
+constexpr double kHuberPose = 4.74;       // the same, 6 axes
+constexpr double kSuspect = 5.5;          // norm of 3 axes that 1 in 10^6 exceeds
 constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation, at most, is left of what was not known
+constexpr double kHeld = 1e-9;            // of the priors of sources that are not to change
 constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 /// Standard deviations with which residuals are weighed: the measurement's and, on top, the model's own.
 struct Weights {
   double discrepancy = 0;           // m per axis
   double discrepancy_rotation = 0;  // rad per axis
+  bool estimated = false;           // false: still at the measurement's sigma alone
 };
 
 double position_sigma(const Measurement& m, const Cell& cell) { return m.sigma.value_or(cell.tracker.sigma); }
-
-bool has_unknown_tool(const Cell& cell) {
-  return std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
-}
 
 /// One measurement's residual in units of sigma; the parameters come in units of their prior scale.
 class PoseCost final : public ceres::CostFunction {
@@ -111,9 +115,13 @@ struct Scaled {
   Eigen::VectorXd prior;    // in units of scale
 };
 
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 /// The priors stand around the model's values. Those of a frame that the cell calls unknown are wide: it was found with
 /// a chain that was still wrong.
-Scaled scaled(const PhysicalModel& model) {
+Scaled scaled(const PhysicalModel& model, const CalibrateOptions& options) {
   const Eigen::Index P = model.parameter_count();
   Scaled s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P)};
   Eigen::Index k = 0;
@@ -125,6 +133,7 @@ Scaled scaled(const PhysicalModel& model) {
       s.typical(k) = parameter.prior_scale;
       parameter.prior = model.values(k);
       parameter.prior_scale *= unknown ? kUnknownWidening : 1;
+      if (!options.only.empty() && !contains(options.only, source->name())) parameter.prior_scale *= kHeld;
       s.scale(k) = parameter.prior_scale;
       s.prior(k) = parameter.prior / parameter.prior_scale;
     }
@@ -133,10 +142,14 @@ Scaled scaled(const PhysicalModel& model) {
 }
 
 ceres::Solver::Summary minimise(const CalibrationProblem& problem, const PhysicalModel& model, const Scaled& s,
-                                const Weights& weights, int max_iterations, Eigen::VectorXd& x) {
+                                const Weights& weights, const CalibrateOptions& calibrate_options, Eigen::VectorXd& x) {
   ceres::Problem ceres_problem;
   for (const Measurement& m : problem.batch.measurements) {
-    ceres_problem.AddResidualBlock(new PoseCost(model, s.scale, m, weights), nullptr, x.data());
+    // Before the discrepancy is known nothing can be called an outlier.
+    const bool robust = calibrate_options.robust && weights.estimated;
+    ceres_problem.AddResidualBlock(new PoseCost(model, s.scale, m, weights),
+                                   robust ? new ceres::HuberLoss(m.R_WT ? kHuberPose : kHuberPosition) : nullptr,
+                                   x.data());
   }
   ceres_problem.AddResidualBlock(new PriorCost(s.prior), nullptr, x.data());
   for (std::size_t i = 0; i < s.parameters.size(); ++i) {
@@ -147,7 +160,7 @@ ceres::Solver::Summary minimise(const CalibrationProblem& problem, const Physica
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = max_iterations;
+  options.max_num_iterations = calibrate_options.max_iterations;
   options.function_tolerance = 1e-12;
   options.parameter_tolerance = 1e-12;
   options.gradient_tolerance = 1e-8;
@@ -197,6 +210,35 @@ double surplus(const Eigen::Matrix3Xd& r, const Eigen::VectorXd& sigma, double f
   return 0.5 * (low + high);
 }
 
+double sigmas_of(const Residuals& r, Eigen::Index i, const Weights& weights) {
+  return r.position.col(i).norm() / std::hypot(r.sigma(i), weights.discrepancy);
+}
+
+/// The positions that are no suspects; rotations stay.
+Residuals without_suspects(const Residuals& r, const Weights& weights) {
+  Residuals kept{r.position, r.rotation, r.sigma};
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
+    if (sigmas_of(r, i, weights) > kSuspect) continue;
+    kept.position.col(count) = r.position.col(i);
+    kept.sigma(count++) = r.sigma(i);
+  }
+  kept.position.conservativeResize(3, count);
+  kept.sigma.conservativeResize(count);
+  return kept;
+}
+
+std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+  std::vector<SuspectPose> suspects;
+  for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
+    const double sigmas = sigmas_of(r, i, weights);
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    if (sigmas > kSuspect) suspects.push_back({m.pose_id, m.row, r.position.col(i).norm(), sigmas});
+  }
+  std::sort(suspects.begin(), suspects.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  return suspects;
+}
+
 double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation) {
   double sum = 0;
   const auto add = [&](const auto& residual, double sigma, double discrepancy) {
@@ -209,12 +251,6 @@ double log_likelihood(const Residuals& r, const Weights& weights, double sigma_r
   }
   return sum;
 }
-
-/// What the data say, in prior units: eigenvectors and singular values of the whitened Jacobian.
-struct Information {
-  Eigen::VectorXd singular_values;  // ascending
-  Eigen::MatrixXd directions;       // columns
-};
 
 Information information(const PhysicalModel& model, const MeasurementBatch& batch, const Scaled& s,
                         const Weights& weights, const Eigen::VectorXd& x) {
@@ -233,128 +269,9 @@ Information information(const PhysicalModel& model, const MeasurementBatch& batc
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
-  }
-  return text;
-}
-
-/// The null directions (columns, typical units) as few parameters at a time as they allow: Gaussian elimination with
-/// complete pivoting, so that each new direction has a parameter of its own.
-Eigen::MatrixXd disentangled(Eigen::MatrixXd directions) {
-  for (Eigen::Index done = 0; done < directions.cols(); ++done) {
-    Eigen::Index row = 0;
-    Eigen::Index column = 0;
-    directions.rightCols(directions.cols() - done).cwiseAbs().maxCoeff(&row, &column);
-    directions.col(done).swap(directions.col(done + column));
-    directions.col(done) /= directions(row, done);
-    for (Eigen::Index other = 0; other < directions.cols(); ++other) {
-      if (other != done) directions.col(other) -= directions(row, other) * directions.col(done);
-    }
-  }
-  return directions;
-}
-
-/// `direction` in typical units.
-UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd& direction, const Scaled& s) {
-  constexpr double kMatters = 0.1;  // of the largest part
-  std::vector<std::size_t> order(s.parameters.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto weight = [&](std::size_t i) { return std::abs(direction(static_cast<Eigen::Index>(i))); };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return weight(a) > weight(b) + 1e-3; });
-  UnidentifiableCombination combination;
-  combination.singular_value = singular_value;
-  for (const std::size_t i : order) {
-    if (weight(i) >= kMatters * weight(order.front())) combination.parameters.push_back(s.parameters[i].name);
-  }
-  const std::string names = joined(combination.parameters);
-  combination.sentence =
-      combination.parameters.size() == 1
-          ? fmt::format("{}: these poses do not show it; it stays at its prior", names)
-          : fmt::format("{} move the tool the same way at these poses: only a combination of them is known", names);
-  return combination;
-}
-
-/// Every direction that the data do not show (singular value below 1), told apart and in words.
-std::vector<UnidentifiableCombination> unidentifiable_of(const Information& seen, const Scaled& s) {
-  const auto unseen = (seen.singular_values.array() < 1).count();  // ascending: the first ones
-  if (unseen == 0) return {};
-  const Eigen::VectorXd to_typical = s.scale.cwiseQuotient(s.typical);
-  const Eigen::MatrixXd directions = disentangled(to_typical.asDiagonal() * seen.directions.leftCols(unseen));
-  std::vector<UnidentifiableCombination> combinations;
-  for (Eigen::Index k = 0; k < unseen; ++k) {
-    const Eigen::VectorXd in_prior_units = directions.col(k).cwiseQuotient(to_typical).normalized();
-    const double value = (seen.singular_values.asDiagonal() * seen.directions.transpose() * in_prior_units).norm();
-    combinations.push_back(in_words(value, directions.col(k), s));
-  }
-  return combinations;
-}
-
-/// Where the cell says `unknown`: base and tools in closed form from the nominal chain.
-Status locate_unknown(PhysicalModel& model, const MeasurementBatch& batch) {
-  const Cell& cell = *model.cell;
-  bool base_known = cell.X_WB.has_value();
-  for (const auto& [tool, known] : cell.tools) {
-    std::vector<Pose> X_WT;
-    std::vector<Pose> X_BF;
-    std::vector<Pose> X_BF_full;
-    std::vector<Vector3> points;
-    for (const Measurement& m : batch.measurements) {
-      if (m.context.tool != tool) continue;
-      X_BF.push_back(cell.robot.flange_pose(m.context.q));
-      points.push_back(m.p_W);
-      if (m.R_WT) {
-        X_BF_full.push_back(X_BF.back());
-        X_WT.push_back(make_pose(*m.R_WT, m.p_W));
-      }
-    }
-    if (points.empty() || (known && base_known)) continue;
-    const Eigen::Matrix3Xd p_W =
-        Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3, static_cast<Eigen::Index>(points.size()));
-    const bool full = X_WT.size() >= 3 && 2 * X_WT.size() >= points.size();
-    if (known) {  // base from this tool
-      Eigen::Matrix3Xd p_B(3, p_W.cols());
-      for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * known->translation();
-      const Result<Pose> X_WB = fit_transform(p_W, p_B);
-      if (!X_WB) return tl::make_unexpected(X_WB.error());
-      model.X_WB = *X_WB;
-    } else if (base_known) {  // tool from this base
-      std::vector<Pose> X_WF;
-      for (const Pose& X : full ? X_BF_full : X_BF) X_WF.push_back(model.X_WB * X);
-      if (full) {
-        const Result<Pose> X_FT = locate_tool(X_WT, X_WF);
-        if (!X_FT) return tl::make_unexpected(X_FT.error());
-        model.tools[tool] = *X_FT;
-      } else {
-        const Result<Vector3> point = locate_tool_point(p_W, X_WF);
-        if (!point) return tl::make_unexpected(point.error());
-        model.tools[tool] = make_pose(Matrix3::Identity(), *point);
-      }
-    } else {
-      Result<BaseAndTool> found = full ? locate_base_and_tool(X_WT, X_BF_full) : locate_base_and_tool_point(p_W, X_BF);
-      if (full && !found) {  // too few axes of rotation for the orientations alone; the positions still tell the base
-        found = locate_base_and_tool_point(p_W, X_BF);
-        if (found) {
-          std::vector<Pose> X_WF;
-          for (const Pose& X : X_BF_full) X_WF.push_back(found->X_WB * X);
-          found->X_FT.linear() = locate_tool(X_WT, X_WF)->linear();
-        }
-      }
-      if (!found) return tl::make_unexpected(found.error());
-      model.X_WB = found->X_WB;
-      model.tools[tool] = found->X_FT;
-    }
-    base_known = true;
-  }
-  return {};
-}
-
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const PhysicalModel& model = problem.model;
-  const Scaled s = scaled(model);
+  const Scaled s = scaled(model, options);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = model;
@@ -362,23 +279,27 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   Weights weights;
   ceres::Solver::Summary summary;
   Residuals r;
-  double rank = static_cast<double>(P);
+  double freedom = static_cast<double>(P);  // parameters that the data, not the priors, decide
   for (int round = 0; round < kMaxReweightings; ++round) {
     if (P > 0) {
-      summary = minimise(problem, model, s, weights, options.max_iterations, x);
+      summary = minimise(problem, model, s, weights, options, x);
       result.iterations += static_cast<int>(summary.iterations.size());
+      for (const ceres::IterationSummary& step : summary.iterations) result.cost_record.push_back(step.cost);
       if (!summary.IsSolutionUsable()) {
         return refused("calibration of batch {}: the solver failed: {}", problem.batch.id, summary.message);
       }
       const Information seen = information(model, problem.batch, s, weights, x);
-      rank = static_cast<double>((seen.singular_values.array() >= 1).count());
+      const Eigen::ArrayXd square = seen.singular_values.array().square();
+      freedom = (square / (square + 1)).sum();
     }
     r = residuals_of(model, problem.batch, x.cwiseProduct(s.scale));
     const double positions = 3.0 * static_cast<double>(r.position.cols());
     const double rotations = 3.0 * static_cast<double>(r.rotation.cols());
-    const double share = std::max(0.0, 1 - rank / (positions + rotations));
+    const double share = std::max(0.0, 1 - freedom / (positions + rotations));
     const Weights before = weights;
-    weights.discrepancy = surplus(r.position, r.sigma, positions * share);
+    if (options.robust && weights.estimated) r = without_suspects(r, weights);
+    weights.estimated = true;
+    weights.discrepancy = surplus(r.position, r.sigma, 3.0 * static_cast<double>(r.position.cols()) * share);
     weights.discrepancy_rotation =
         surplus(r.rotation, Eigen::VectorXd::Constant(r.rotation.cols(), model.cell->tracker.sigma_rotation),
                 rotations * share);
@@ -388,10 +309,12 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
       break;
     }
   }
+  r = residuals_of(model, problem.batch, x.cwiseProduct(s.scale));
   result.model.values = x.cwiseProduct(s.scale);
   result.discrepancy = weights.discrepancy;
   result.discrepancy_rotation = weights.discrepancy_rotation;
   result.log_likelihood = log_likelihood(r, weights, model.cell->tracker.sigma_rotation);
+  result.suspects = suspects_of(problem.batch, r, weights);
   result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
   result.converged = P == 0 || summary.termination_type == ceres::CONVERGENCE;
   result.message = P == 0 ? "nothing to identify" : summary.message;
@@ -403,13 +326,19 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   const Eigen::MatrixXd scaled_covariance = seen.directions * variance.asDiagonal() * seen.directions.transpose();
   result.covariance = s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
   double least = std::numeric_limits<double>::infinity();
+  double log_sum = 0;
   for (Eigen::Index k = 0; k < P; ++k) {
     const double value = seen.singular_values(k);
     if (value < 1) continue;
     ++result.rank;
     least = std::min(least, value);
+    log_sum += std::log(value);
   }
-  result.unidentifiable = unidentifiable_of(seen, s);
+  if (result.rank > 0) {
+    result.observability_index =
+        std::exp(log_sum / result.rank) / std::sqrt(static_cast<double>(problem.batch.measurements.size()));
+  }
+  result.unidentifiable = unidentifiable_combinations(seen, s.parameters, s.scale.cwiseQuotient(s.typical));
   result.condition_number = result.rank > 0 ? seen.singular_values(P - 1) / least : 0;
   for (Eigen::Index i = 0; i < P; ++i) {
     const Parameter& parameter = s.parameters[static_cast<std::size_t>(i)];
@@ -421,12 +350,10 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
-  if (Status located = locate_unknown(model, batch); !located) return located;
+  if (Status located = locate_unknown_frames(model, batch); !located) return located;
   std::vector<std::string> free;
   if (!model.cell->X_WB) free.emplace_back("base");
-  if (has_unknown_tool(*model.cell) && model.cell->tools.size() == 1) {
-    free.emplace_back("tool");
-  }
+  if (has_unknown_tool(*model.cell)) free.emplace_back("tool");
   if (free.empty()) return {};
   Result<PhysicalModel> frames = make_physical_model(model.cell, free);
   if (!frames) return tl::make_unexpected(frames.error());
@@ -445,32 +372,113 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   return {};
 }
 
-/// A known base to be corrected starts, and has its prior, where SVD localisation of the nominal chain puts it, eqs.
-/// (3.8)-(3.10).
-void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
-  Eigen::Index first = 0;
+/// Every source must find what it needs in at least one pose.
+Status check_context(const CalibrationProblem& problem) {
+  const auto any = [&](auto has) {
+    return std::any_of(problem.batch.measurements.begin(), problem.batch.measurements.end(),
+                       [&](const Measurement& m) { return has(m.context); });
+  };
+  for (const ErrorSourcePtr& source : problem.model.sources) {
+    const ContextNeeds needs = source->needs();
+    const auto lacks = [&](const char* what) {
+      return refused("batch {}: error source {} needs {}, which no pose has", problem.batch.id, source->name(), what);
+    };
+    if (needs.time && !any([](const PoseContext& c) { return c.time.has_value(); })) return lacks("a time (time_s)");
+    if (needs.temperature && !any([](const PoseContext& c) { return c.temperature.has_value(); })) {
+      return lacks("a temperature (temperature_c)");
+    }
+    const auto directed = [&](const PoseContext& c) {
+      return !c.direction.empty() && c.direction[static_cast<std::size_t>(source->joint())] != 0;
+    };
+    if (needs.direction && !any(directed))
+      return lacks(fmt::format("an approach direction (dir{})", source->joint() + 1).c_str());
+    if (needs.velocity && !any([](const PoseContext& c) { return c.velocity.has_value(); })) {
+      return lacks("a continuous path with times (time_s)");
+    }
+    const auto loaded = [&](const PoseContext& c) {
+      const auto payload = problem.model.cell->payloads.find(c.payload);
+      return payload != problem.model.cell->payloads.end() && payload->second.mass > 0;
+    };
+    if (needs.payload && !any(loaded)) return lacks("a payload with a mass");
+  }
+  return {};
+}
+
+/// First value index of each source.
+std::vector<Eigen::Index> first_values(const PhysicalModel& model) {
+  std::vector<Eigen::Index> first;
+  Eigen::Index next = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    if (source->name() == "base") break;
-    first += static_cast<Eigen::Index>(source->parameters().size());
+    first.push_back(next);
+    next += static_cast<Eigen::Index>(source->parameters().size());
   }
-  if (first == model.values.size()) return;
-  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Eigen::Matrix3Xd measured(3, n);
-  Eigen::Matrix3Xd nominal(3, n);
+  return first;
+}
+
+/// `model` without the sources in `left_out` (indices).
+PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>& left_out) {
+  PhysicalModel less = model;
+  less.sources.clear();
+  std::vector<double> values;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (std::find(left_out.begin(), left_out.end(), k) != left_out.end()) continue;
+    less.sources.push_back(model.sources[k]);
+    for (std::size_t i = 0; i < model.sources[k]->parameters().size(); ++i) {
+      values.push_back(model.values(first[k] + static_cast<Eigen::Index>(i)));
+    }
+  }
+  less.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return less;
+}
+
+/// The order of `source` that explains most of the residuals through its joint's Jacobian column.
+FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, const MeasurementBatch& batch,
+                      const Residuals& r, const Weights& weights) {
+  const auto n = r.position.cols();
+  Eigen::VectorXd q(n);
+  Eigen::VectorXd along(n);   // weighted residual along the column
+  Eigen::VectorXd square(n);  // weighted square of the column
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
-    measured.col(i) = model.X_WB.inverse() * m.p_W;
-    nominal.col(i) = model.X_WB.inverse() * model.nominal_pose_W(m.context).translation();
+    const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
+    const Pose X_FT = model.tools.at(context.tool);
+    const Vector3 column =
+        model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(source.joint()).head<3>();
+    const double weight = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
+    q(i) = context.q(source.joint());
+    along(i) = weight * column.dot(r.position.col(i));
+    square(i) = weight * column.squaredNorm();
   }
-  const Result<Pose> X_BB = fit_transform(measured, nominal);
-  if (!X_BB) return;  // too few points to localise: the nominal base is the start
-  const Vector3 zyx = X_BB->linear().eulerAngles(2, 1, 0);
-  const bool flipped = std::abs(zyx(1)) > kPi / 2;  // the other triple of the same rotation
-  model.values.segment<3>(first) = X_BB->translation();
-  model.values.segment<3>(first + 3) =
-      flipped ? Vector3(zyx(0) - std::copysign(kPi, zyx(0)), std::copysign(kPi, zyx(1)) - zyx(1),
-                        zyx(2) - std::copysign(kPi, zyx(2)))
-              : zyx;
+  return search_order(q, along, square, *source.search());
+}
+
+/// Sources to be searched are found one after the other, the strongest first, each on what the model found so far
+/// leaves over; their values in the model become the start and the centre of the priors (amplitudes stay free).
+Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options) {
+  PhysicalModel& model = problem.model;
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (model.sources[k]->search()) open.push_back(k);
+  }
+  const std::vector<Eigen::Index> first = first_values(model);
+  while (!open.empty()) {
+    const Result<CalibrationResult> found = identify({without(model, open), problem.batch}, options);
+    if (!found) return tl::make_unexpected(found.error());
+    const Residuals r = residuals_of(found->model, problem.batch, found->model.values);
+    const Weights weights{found->discrepancy, found->discrepancy_rotation, true};
+    FoundOrder best;
+    std::size_t strongest = open.front();
+    for (const std::size_t k : open) {
+      const FoundOrder candidate = best_order(*model.sources[k], found->model, problem.batch, r, weights);
+      if (candidate.gain > best.gain) {
+        best = candidate;
+        strongest = k;
+      }
+    }
+    model.values(first[strongest]) = best.order;
+    open.erase(std::find(open.begin(), open.end(), strongest));
+  }
+  return {};
 }
 
 }  // namespace
@@ -485,8 +493,35 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
           Error{found.error().code, fmt::format("batch {}: {}", problem.batch.id, found.error().message)});
     }
   }
+  if (Status fit = check_context(complete); !fit) return tl::make_unexpected(fit.error());
   localise_base(complete.model, complete.batch);
+  if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
   return identify(complete, options);
+}
+
+Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
+                                const std::vector<std::string>& only, CalibrateOptions options) {
+  if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
+  for (const std::string& name : only) {
+    if (std::none_of(model.sources.begin(), model.sources.end(), [&](const auto& s) { return s->name() == name; })) {
+      return failure(ErrorCode::kUsage, "error source '{}' to be refitted is not in the model", name);
+    }
+  }
+  CalibrationProblem problem{model, batch};
+  options.only = only;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const auto count = static_cast<Eigen::Index>(model.sources[k]->parameters().size());
+    if (contains(only, model.sources[k]->name())) problem.model.values.segment(first[k], count).setZero();
+  }
+  if (Status located = locate_unknown_frames(problem.model, batch); !located)
+    return tl::make_unexpected(located.error());
+  return identify(problem, options);
+}
+
+Eigen::MatrixXd CalibrationResult::correlation() const {
+  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
 }
 
 Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
@@ -495,7 +530,7 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, con
   for (const std::string& spec : specs) {
     std::vector<std::vector<std::string>> longer;
     for (const auto& candidate : candidates) {
-      for (const std::string& form : alternatives(spec)) {
+      for (const std::string& form : alternatives(spec, *cell)) {
         longer.push_back(candidate);
         longer.back().push_back(form);
       }
@@ -503,11 +538,22 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, con
     candidates = std::move(longer);
   }
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
-  for (const auto& candidate : candidates) {
+  std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
+  for (std::vector<std::string>& candidate : candidates) {
+    for (std::string& spec : candidate) {
+      if (const auto order = found.find(spec); order != found.end()) spec = order->second;
+    }
     Result<PhysicalModel> model = make_physical_model(cell, candidate);
     if (!model) return tl::make_unexpected(model.error());
     Result<CalibrationResult> result = calibrate({std::move(*model), batch}, options);
     if (!result) return result;
+    const std::vector<Eigen::Index> first = first_values(result->model);
+    for (std::size_t k = 0; k < result->model.sources.size(); ++k) {
+      const ErrorSource& source = *result->model.sources[k];
+      if (source.search()) {
+        found[source.name()] = fmt::format("{}@{:.4f}", source.name(), result->model.values(first[k]));
+      }
+    }
     if (!best || result->log_likelihood > best->log_likelihood) best = std::move(result);
   }
   return best;

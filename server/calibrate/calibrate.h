@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/calibrate/identifiability.h"
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
@@ -18,6 +19,16 @@ struct CalibrationProblem {
 
 struct CalibrateOptions {
   int max_iterations = 100;
+  std::vector<std::string> only;  ///< names of the sources that may change; empty: all
+  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
+};
+
+/// A pose that the identified model misses by far more than its sigma.
+struct SuspectPose {
+  std::string pose_id;
+  int row = 0;          ///< in its file
+  double distance = 0;  ///< m, of the position
+  double sigmas = 0;    ///< the same over the expected deviation of one axis
 };
 
 struct IdentifiedParameter {
@@ -27,24 +38,23 @@ struct IdentifiedParameter {
   bool identified = false;  ///< false: more than half of the prior's standard deviation is left
 };
 
-/// A direction in parameter space that the data do not show (singular value below 1 in prior units).
-struct UnidentifiableCombination {
-  double singular_value = 0;
-  std::vector<std::string> parameters;  ///< those that matter in it, largest first
-  std::string sentence;                 ///< for people
-};
-
 struct CalibrationResult {
   PhysicalModel model;  ///< with identified values
   std::vector<IdentifiedParameter> parameters;
   Eigen::MatrixXd covariance;  ///< P x P, SI
-  int rank = 0;                ///< directions with singular value >= 1
+  /// P x P, in [-1, 1].
+  [[nodiscard]] Eigen::MatrixXd correlation() const;
+  int rank = 0;  ///< directions with singular value >= 1
   std::vector<UnidentifiableCombination> unidentifiable;
   double condition_number = 0;      ///< of the identified directions, prior units
   double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
   double rms = 0;                   ///< m, Euclidean residual of the training positions
   double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
+  double observability_index =
+      0;  ///< geometric mean of the identified singular values over sqrt(poses) (Borm and Menq)
+  std::vector<SuspectPose> suspects;  ///< farthest first
+  std::vector<double> cost_record;  ///< half the weighted sum of squares, iteration by iteration, over all reweightings
   bool converged = false;
   int iterations = 0;
   std::string message;  ///< of the solver
@@ -62,5 +72,10 @@ struct CalibrationResult {
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);
+
+/// Identifies the sources in `only` anew on `batch` (the tracker was set up again, the tool was changed), and leaves
+/// all others at what `model` says. Unknown frames are found anew; the sources in `only` start at zero.
+[[nodiscard]] Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
+                                              const std::vector<std::string>& only, CalibrateOptions options = {});
 
 }  // namespace trammel

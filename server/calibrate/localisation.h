@@ -9,10 +9,6 @@
 /// Closed forms that find where things stand, before anything is refined.
 namespace trammel {
 
-/// The rigid transformation X_AB that takes `points_B` onto `points_A` (3 x N each, N >= 3) with least squares, by SVD,
-/// eqs. (3.8)-(3.10) written for the direct map. Refuses fewer than 3 points and points on a line.
-[[nodiscard]] Result<Pose> fit_transform(const Eigen::Matrix3Xd& points_A, const Eigen::Matrix3Xd& points_B);
-
 /// X_WB and X_FT from full poses, X_WT = X_WB X_BF X_FT (robot-world/hand-eye): the two rotations from the dominant
 /// singular pair of the sum of R_BF x R_WT (Kronecker), then both translations linearly. Refuses fewer than 3 poses and
 /// poses whose rotations do not determine both.

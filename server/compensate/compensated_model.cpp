@@ -105,6 +105,7 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
   context.q = q;
   context.tool = tool;
   context.payload = payload;
+  context.served = true;
   return predict(context, Domain::kDecide);
 }
 
@@ -149,6 +150,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   PoseContext context;
   context.tool = tool;
   context.payload = payload;
+  context.served = true;
   Correction result;
   const auto end = [&](CorrectionStatus status, std::string message) {
     result.status = status;
@@ -231,6 +233,10 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   return end(CorrectionStatus::kOk, "");
 }
 
+bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
+  return batch_hash(batch) == parts().provenance.batch_hash;
+}
+
 Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
@@ -240,13 +246,16 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   Eigen::Matrix3Xd compensated(3, n);
   Evaluation evaluation;
   evaluation.poses = static_cast<int>(n);
+  const bool own = is_own(batch);
   Eigen::Index covered = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    PoseContext context = m.context;
+    context.served = !own;
     const Vector3 p_B = X_BW * m.p_W;
-    const ErrorPrediction prediction = predict(m.context, Domain::kDecide);
+    const ErrorPrediction prediction = predict(context, Domain::kDecide);
     nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
-    calibrated.col(i) = p_B - X_BW * physics.pose_W(m.context).translation();
+    calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();
     compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
     covered += (compensated.col(i).array().abs() <= kInterval95 * prediction.stddev_B.array()).count();
     evaluation.in_domain += prediction.in_domain ? 1 : 0;

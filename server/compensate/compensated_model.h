@@ -114,7 +114,8 @@ class CompensatedModel {
   /// Target correction, source section 3.4.1.
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
-  /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty.
+  /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty. Poses of another
+  /// batch than the model's own are met as served: what began at a pose has happened, what the tracker did does not count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
@@ -125,6 +126,7 @@ class CompensatedModel {
   enum class Domain { kDecide, kInside, kOutside };
   [[nodiscard]] ErrorPrediction predict(const PoseContext& context, Domain domain) const;
   [[nodiscard]] bool in_range(const JointVector& q) const;
+  [[nodiscard]] bool is_own(const MeasurementBatch& batch) const;
   explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
   std::shared_ptr<const Inside> inside_;
 };

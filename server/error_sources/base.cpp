@@ -37,6 +37,6 @@ class Base final : public ErrorSource {
 
 }  // namespace
 
-Result<ErrorSourcePtr> make_base(const Cell&, int) { return std::make_shared<Base>(); }
+Result<ErrorSourcePtr> make_base(const SourceSpec&, const Cell&) { return std::make_shared<Base>(); }
 
 }  // namespace trammel

@@ -124,13 +124,13 @@ class ComplianceLinear final : public Compliance {
 
 }  // namespace
 
-Result<ErrorSourcePtr> make_compliance_first_order(const Cell& cell, int) {
+Result<ErrorSourcePtr> make_compliance_first_order(const SourceSpec&, const Cell& cell) {
   return std::make_shared<ComplianceFirstOrder>(cell.robot);
 }
-Result<ErrorSourcePtr> make_compliance_equilibrium(const Cell& cell, int) {
+Result<ErrorSourcePtr> make_compliance_equilibrium(const SourceSpec&, const Cell& cell) {
   return std::make_shared<ComplianceEquilibrium>(cell.robot);
 }
-Result<ErrorSourcePtr> make_compliance_linear(const Cell& cell, int) {
+Result<ErrorSourcePtr> make_compliance_linear(const SourceSpec&, const Cell& cell) {
   return std::make_shared<ComplianceLinear>(cell.robot);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <set>
 #include <sstream>
 
@@ -11,56 +12,115 @@ namespace trammel {
 
 namespace {
 
-/// One line an error source. `per_joint`: its spec names a joint.
+enum class Joint { kNone, kOne };
+enum class At { kNone, kPose, kNumbers };
+
+/// One line an error source, in the order in which they act on the arm.
 struct Known {
   const char* name;
-  bool per_joint;
-  Result<ErrorSourcePtr> (*make)(const Cell& cell, int joint);
+  Joint joint;  // whether a spec names a joint
+  At at;        // what may follow the @
+  SourceMaker make;
 };
 
 constexpr Known kKnown[] = {
-    {"base", false, make_base},
-    {"tool", false, make_tool},
-    {"geometry", false, make_geometry},
-    {"compliance_first_order", false, make_compliance_first_order},
-    {"compliance_equilibrium", false, make_compliance_equilibrium},
-    {"compliance_linear", false, make_compliance_linear},
+    {"base", Joint::kNone, At::kNone, make_base},
+    {"tracker_drift", Joint::kNone, At::kNone, make_tracker_drift},
+    {"tracker_moved", Joint::kNone, At::kPose, make_tracker_moved},
+    {"geometry", Joint::kNone, At::kNone, make_geometry},
+    {"thermal_growth", Joint::kNone, At::kNone, make_thermal_growth},
+    {"tool", Joint::kNone, At::kNone, make_tool},
+    {"tool_changed", Joint::kNone, At::kPose, make_tool_changed},
+    {"gear_transmission", Joint::kOne, At::kNumbers, make_gear_transmission},
+    {"encoder_eccentricity", Joint::kOne, At::kNone, make_encoder_eccentricity},
+    {"joint_map", Joint::kOne, At::kNumbers, make_joint_map},
+    {"wrist_coupling", Joint::kNone, At::kNone, make_wrist_coupling},
+    {"joint_slip", Joint::kOne, At::kPose, make_joint_slip},
+    {"time_lag", Joint::kNone, At::kNone, make_time_lag},
+    {"payload", Joint::kNone, At::kNone, make_payload},
+    {"payload_changed", Joint::kNone, At::kPose, make_payload_changed},
+    {"backlash", Joint::kOne, At::kNone, make_backlash},
+    {"link_bending", Joint::kOne, At::kNone, make_link_bending},
+    {"compliance_first_order", Joint::kNone, At::kNone, make_compliance_first_order},
+    {"compliance_equilibrium", Joint::kNone, At::kNone, make_compliance_equilibrium},
+    {"compliance_linear", Joint::kNone, At::kNone, make_compliance_linear},
 };
 
-std::string known_names() {
-  std::string names;
-  for (const Known& known : kKnown) names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
-  return names;
+std::string cause_of(const std::string& spec) { return spec.substr(0, spec.find_first_of(":@")); }
+
+const Known* find_known(const std::string& cause) {
+  const auto* known =
+      std::find_if(std::begin(kKnown), std::end(kKnown), [&](const Known& k) { return cause == k.name; });
+  return known == std::end(kKnown) ? nullptr : known;
+}
+
+template <typename Number>
+bool parse_number(const std::string& text, Number& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+}
+
+Result<SourceSpec> parse_spec(const std::string& text, const Known& known, const Cell& cell) {
+  SourceSpec spec{text, known.name, -1, {}};
+  const std::size_t at = text.find('@');
+  const std::size_t colon = text.substr(0, at).find(':');
+  if (known.joint == Joint::kNone) {
+    if (colon != std::string::npos) return failure(ErrorCode::kUsage, "error source '{}' takes no joint", text);
+  } else {
+    int joint = 0;
+    const std::string number = colon == std::string::npos ? "" : text.substr(colon + 1, at - colon - 1);
+    if (!parse_number(number, joint) || joint < 1 || joint > cell.robot.size()) {
+      return failure(ErrorCode::kUsage, "error source '{}': expected {}:joint with a joint of 1 to {}", text,
+                     known.name, cell.robot.size());
+    }
+    spec.joint = joint - 1;
+  }
+  if (at != std::string::npos) {
+    if (known.at == At::kNone) return failure(ErrorCode::kUsage, "error source '{}' takes nothing after '@'", text);
+    std::istringstream numbers(text.substr(at + 1) + "+");
+    for (std::string word; std::getline(numbers, word, '+');) {
+      double value = 0;
+      if (!parse_number(word, value) || !(value > 0) || !std::isfinite(value)) {
+        return failure(ErrorCode::kUsage, "error source '{}': '{}' after '@' is not a number above 0", text, word);
+      }
+      spec.at.push_back(value);
+    }
+  }
+  if (known.at == At::kPose && (spec.at.size() != 1 || spec.at[0] != std::floor(spec.at[0]))) {
+    return failure(ErrorCode::kUsage, "error source '{}': expected {}@pose, the row of the batch at which it begins",
+                   text, text.substr(0, at));
+  }
+  return spec;
 }
 
 }  // namespace
 
-std::vector<std::string> alternatives(const std::string& spec) {
+std::vector<std::string> known_causes() {
+  std::vector<std::string> names;
+  for (const Known& known : kKnown) names.emplace_back(known.name);
+  return names;
+}
+
+int acting_order(const std::string& source_name) {
+  const Known* known = find_known(cause_of(source_name));
+  return known == nullptr ? 0 : static_cast<int>(known - std::begin(kKnown));
+}
+
+std::vector<std::string> alternatives(const std::string& spec, const Cell& cell) {
   if (spec != "compliance") return {spec};
+  if (cell.payloads.empty()) return {"compliance_first_order"};
   return {"compliance_first_order", "compliance_equilibrium", "compliance_linear"};
 }
 
 Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell) {
-  if (const auto forms = alternatives(spec); forms.front() != spec) return make_error_source(forms.front(), cell);
-  const std::size_t colon = spec.find(':');
-  const std::string name = spec.substr(0, colon);
-  const auto* known =
-      std::find_if(std::begin(kKnown), std::end(kKnown), [&](const Known& k) { return name == k.name; });
-  if (known == std::end(kKnown)) {
-    return failure(ErrorCode::kUsage, "unknown error source '{}'; known: {}", spec, known_names());
+  if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
+  const Known* known = find_known(cause_of(spec));
+  if (known == nullptr) {
+    std::string names = "compliance";
+    for (const std::string& name : known_causes()) names += ", " + name;
+    return failure(ErrorCode::kUsage, "unknown error source '{}'; known: {}", spec, names);
   }
-  if (!known->per_joint) {
-    if (colon != std::string::npos) return failure(ErrorCode::kUsage, "error source '{}' takes no joint", spec);
-    return known->make(cell, -1);
-  }
-  int joint = 0;
-  const std::string number = colon == std::string::npos ? "" : spec.substr(colon + 1);
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), joint);
-  if (error != std::errc() || end != number.data() + number.size() || joint < 1 || joint > cell.robot.size()) {
-    return failure(ErrorCode::kUsage, "error source '{}': expected {}:joint with a joint of 1 to {}", spec, name,
-                   cell.robot.size());
-  }
-  return known->make(cell, joint - 1);
+  return parse_spec(spec, *known, cell).and_then([&](const SourceSpec& parsed) { return known->make(parsed, cell); });
 }
 
 Result<std::vector<std::string>> parse_level(const std::string& level) {

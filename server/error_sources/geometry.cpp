@@ -51,6 +51,8 @@ class Geometry final : public ErrorSource {
 
 }  // namespace
 
-Result<ErrorSourcePtr> make_geometry(const Cell& cell, int) { return std::make_shared<Geometry>(cell.robot); }
+Result<ErrorSourcePtr> make_geometry(const SourceSpec&, const Cell& cell) {
+  return std::make_shared<Geometry>(cell.robot);
+}
 
 }  // namespace trammel

@@ -6,13 +6,6 @@
 
 namespace trammel {
 
-namespace {
-
-/// The order in which causes act on the arm: frames and geometry first, what depends on the loaded posture last.
-int stage(const std::string& source_name) { return source_name.starts_with("compliance") ? 1 : 0; }
-
-}  // namespace
-
 int PhysicalModel::parameter_count() const {
   int count = 0;
   for (const ErrorSourcePtr& source : sources) count += static_cast<int>(source->parameters().size());
@@ -97,7 +90,7 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     model.sources.push_back(std::move(*source));
   }
   std::stable_sort(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) {
-    return stage(a->name()) < stage(b->name());
+    return acting_order(a->name()) < acting_order(b->name());
   });
   model.X_WB = cell->X_WB.value_or(Pose::Identity());
   for (const auto& [name, X_FT] : cell->tools) model.tools[name] = X_FT.value_or(Pose::Identity());

@@ -52,15 +52,10 @@ class Scanner {
     if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
   }
 
-  struct Record {
-    int line = 0;
-    std::vector<std::string> fields;
-  };
-
   /// The next record that is neither empty nor a comment; no fields at the end of the text.
-  Result<Record> next() {
+  Result<CsvTable::Row> next() {
     skip_comments();
-    Record record;
+    CsvTable::Row record;
     record.line = line_;
     while (!text_.empty()) {
       Result<std::string> field = trimmed_start() == '"' ? quoted() : plain();
@@ -136,33 +131,54 @@ std::string shown(const std::string& field) { return field.size() <= 40 ? field 
 
 }  // namespace
 
+Status CsvTable::set_columns(Row header) {
+  std::set<std::string> seen;
+  for (const std::string& name : header.fields) {
+    if (name.empty()) return refused("{} row {}: column {} has no name", where_, header.line, seen.size() + 1);
+    if (!seen.insert(name).second) {
+      return refused("{} row {}: column {} appears twice", where_, header.line, shown(name));
+    }
+  }
+  columns_ = std::move(header.fields);
+  return {};
+}
+
+Status CsvTable::add_row(Row row) {
+  if (row.fields.size() != columns_.size()) {
+    return refused("{} row {}: {} values, the header has {} columns", where_, row.line, row.fields.size(),
+                   columns_.size());
+  }
+  rows_.push_back(std::move(row));
+  return {};
+}
+
 Result<CsvTable> CsvTable::parse(std::string_view text, std::string where) {
   CsvTable table;
   table.where_ = std::move(where);
   Scanner scanner(text, table.where_);
-  Result<Scanner::Record> header = scanner.next();
+  Result<Row> header = scanner.next();
   if (!header) return tl::make_unexpected(header.error());
   if (header->fields.empty()) return refused("{}: empty file, expected a header line with column names", table.where_);
-  std::set<std::string> seen;
-  for (const std::string& name : header->fields) {
-    if (name.empty()) {
-      return refused("{} row {}: column {} has no name", table.where_, header->line, seen.size() + 1);
-    }
-    if (!seen.insert(name).second) {
-      return refused("{} row {}: column {} appears twice", table.where_, header->line, shown(name));
-    }
-  }
-  table.columns_ = std::move(header->fields);
+  if (const Status set = table.set_columns(std::move(*header)); !set) return tl::make_unexpected(set.error());
   while (true) {
-    Result<Scanner::Record> record = scanner.next();
+    Result<Row> record = scanner.next();
     if (!record) return tl::make_unexpected(record.error());
     if (record->fields.empty()) return table;
-    if (record->fields.size() != table.columns_.size()) {
-      return refused("{} row {}: {} values, the header has {} columns", table.where_, record->line,
-                     record->fields.size(), table.columns_.size());
-    }
-    table.rows_.push_back({record->line, std::move(record->fields)});
+    if (const Status added = table.add_row(std::move(*record)); !added) return tl::make_unexpected(added.error());
   }
+}
+
+Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const std::vector<Row>& rows) {
+  CsvTable table;
+  table.where_ = std::move(where);
+  if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
+  for (const Row& row : rows) {
+    if (!std::all_of(row.fields.begin(), row.fields.end(), is_utf8)) {
+      return refused("{} row {}: not UTF-8 text", table.where_, row.line);
+    }
+    if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
+  }
+  return table;
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view column) const {

@@ -18,6 +18,12 @@ class CsvTable {
   /// Refuses a text without header, a column without a name or named twice, a row of another length than the header, an
   /// open quote, bytes that are not UTF-8.
   [[nodiscard]] static Result<CsvTable> parse(std::string_view text, std::string where);
+  /// What another reader took apart, for the same checks and the same messages. Refuses as parse() does.
+  struct Row {
+    int line = 0;
+    std::vector<std::string> fields;
+  };
+  [[nodiscard]] static Result<CsvTable> from_rows(std::string where, const Row& header, const std::vector<Row>& rows);
 
   [[nodiscard]] const std::string& where() const { return where_; }
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
@@ -45,10 +51,9 @@ class CsvTable {
   }
 
  private:
-  struct Row {
-    int line = 0;
-    std::vector<std::string> fields;
-  };
+  [[nodiscard]] Status set_columns(Row header);
+  [[nodiscard]] Status add_row(Row row);
+
   std::string where_;
   std::vector<std::string> columns_;
   std::vector<Row> rows_;

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <random>
 
+#include "server/base/hash.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/spread_check.h"
@@ -70,6 +71,10 @@ BatchSplit split_batch(const MeasurementBatch& batch, double validation_share, s
     (validation[i] ? split.validation : split.train).measurements.push_back(batch.measurements[i]);
   }
   return split;
+}
+
+std::string batch_hash(const MeasurementBatch& batch) {
+  return sha256_hex(batch.source_text.empty() ? to_csv(batch) : batch.source_text);
 }
 
 }  // namespace trammel

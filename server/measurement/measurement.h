@@ -43,6 +43,8 @@ struct MeasurementBatch {
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);
 /// The batch as parse_batch_csv() reads it; optional columns only where a row has them.
 [[nodiscard]] std::string to_csv(const MeasurementBatch& batch);
+/// SHA-256 of the batch as it came, or of its CSV where it came from elsewhere.
+[[nodiscard]] std::string batch_hash(const MeasurementBatch& batch);
 
 /// The batch made ready for `cell`: tool and payload ids resolved. Refused when the number or kind of joints, a joint
 /// limit, an unknown tool or payload, or several candidates of either stand against it; when the joints look like

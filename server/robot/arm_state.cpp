@@ -178,4 +178,35 @@ Eigen::MatrixXd ArmKinematics::gravity_torque_jacobian() const {
   return T;
 }
 
+ArmKinematics::LoadedLink ArmKinematics::loaded_link(int joint) const {
+  const auto k = static_cast<std::size_t>(joint);
+  return {p_[k], q_[k], p_cog_W_, kinematic_tip_W_, force_W_};
+}
+
+Eigen::MatrixXd ArmKinematics::loaded_link_jacobian(int joint) const {
+  const StateRows rows(chain_->size());
+  const LoadedLink link = loaded_link(joint);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(15, rows.size());
+  for (int row = 0; row < rows.base(0); ++row) {
+    const Motion motion = link_motion(row);
+    const auto moved = [&](const Vector3& p) -> Vector3 { return motion.v + motion.w.cross(p - motion.origin); };
+    // alpha and beta of a link turn about its far end, which stays.
+    if (row / 5 < joint) J.block<3, 1>(0, row) = moved(link.start);
+    if (row / 5 <= joint) J.block<3, 1>(3, row) = moved(link.end);
+    J.block<3, 1>(6, row) = moved(link.cog);
+    J.block<3, 1>(9, row) = moved(link.tip);
+  }
+  const Vector3 points[] = {link.start, link.end, link.cog, link.tip};
+  for (int p = 0; p < 4; ++p) {
+    J.block<3, 3>(3 * p, rows.base(0)).setIdentity();
+    J.block<3, 3>(3 * p, rows.base(3)) = -skew(points[p] - X_WB_.translation());
+  }
+  const Matrix3 R_WF = X_WF_.linear();
+  J.block<3, 3>(6, rows.cog(0)) = R_WF;
+  J.block<3, 3>(9, rows.tool(0)) = R_WF;
+  J.block<3, 3>(9, rows.tool(3)) = -skew(link.tip - X_WF_.translation()) * R_WF;
+  J.block<3, 1>(12, rows.mass()) = kGravity * gravity_W_;
+  return J;
+}
+
 }  // namespace trammel

@@ -84,6 +84,14 @@ class ArmKinematics {
   [[nodiscard]] Eigen::MatrixXd deflection_jacobian() const;
   /// 6 x StateRows::size(): derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
   [[nodiscard]] Eigen::MatrixXd deflection_jacobian_derivative(const Eigen::VectorXd& deflection) const;
+  /// Points in W that bending depends on: axis of `joint`, far end of its link, centre of gravity, tool point; and the
+  /// weight, N.
+  struct LoadedLink {
+    Vector3 start, end, cog, tip, weight;
+  };
+  [[nodiscard]] LoadedLink loaded_link(int joint) const;
+  /// 15 x StateRows::size(): derivative of the five vectors of loaded_link(joint), one under the other.
+  [[nodiscard]] Eigen::MatrixXd loaded_link_jacobian(int joint) const;
 
  private:
   struct Motion {  // what is downstream moves by [v + w x (p - origin); w]

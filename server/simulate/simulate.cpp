@@ -1,21 +1,45 @@
 #include "server/simulate/simulate.h"
 
+#include <cmath>
 #include <random>
 
 #include "server/base/units.h"
 
 namespace trammel {
 
-Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q, const SimulateOptions& options) {
-  const Cell& cell = *robot.truth.cell;
-  if (q.cols() != cell.robot.size()) {
-    return refused("simulate: {} joint columns, robot {} has {}", q.cols(), cell.robot.name(), cell.robot.size());
-  }
-  const Result<std::string> tool = resolve_tool(cell, options.tool);
-  if (!tool) return tl::make_unexpected(tool.error());
-  const Result<std::string> payload = resolve_payload(cell, options.payload);
-  if (!payload) return tl::make_unexpected(payload.error());
+namespace {
 
+/// `pose` with what it left open: tool, payload, time and temperature.
+Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot, const SimulateOptions& options) {
+  const Cell& cell = *robot.truth.cell;
+  if (pose.q.size() != cell.robot.size()) {
+    return refused("simulate: {} joints, robot {} has {}", pose.q.size(), cell.robot.name(), cell.robot.size());
+  }
+  if (const auto joint = cell.robot.joint_outside_limits(pose.q)) {
+    return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1, *joint + 1,
+                   to_deg(pose.q(*joint)), to_deg(cell.robot.joint(*joint).lower),
+                   to_deg(cell.robot.joint(*joint).upper));
+  }
+  const Result<std::string> tool = resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool);
+  if (!tool) return tl::make_unexpected(tool.error());
+  const Result<std::string> payload = resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload);
+  if (!payload) return tl::make_unexpected(payload.error());
+  pose.tool = *tool;
+  pose.payload = *payload;
+  pose.index = index;
+  const MeasuringCourse& course = robot.course;
+  if (!pose.time && course.seconds_per_pose > 0) pose.time = index * course.seconds_per_pose;
+  if (!pose.temperature && course.temperature_start) {
+    const double warmed = 1 - std::exp(-pose.time.value_or(0) / course.temperature_time_constant);
+    pose.temperature = *course.temperature_start + warmed * (course.temperature_end - *course.temperature_start);
+  }
+  return pose;
+}
+
+}  // namespace
+
+Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<PoseContext>& poses,
+                                  const SimulateOptions& options) {
   std::mt19937_64 random(options.seed);
   std::normal_distribution<double> normal(0, 1);
   const auto noise = [&](double sigma) {
@@ -23,19 +47,13 @@ Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::Matrix
     return Vector3(options.noise ? (sigma * v).eval() : Vector3::Zero().eval());
   };
   MeasurementBatch batch;
-  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    Result<PoseContext> context = completed(poses[i], static_cast<int>(i), robot, options);
+    if (!context) return tl::make_unexpected(context.error());
     Measurement m;
     m.pose_id = std::to_string(i + 1);
     m.row = static_cast<int>(i) + 2;
-    m.context.q = q.row(i).transpose();
-    m.context.tool = *tool;
-    m.context.payload = *payload;
-    m.context.index = static_cast<int>(i);
-    if (const auto joint = cell.robot.joint_outside_limits(m.context.q)) {
-      return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", i + 1, *joint + 1,
-                     to_deg(m.context.q(*joint)), to_deg(cell.robot.joint(*joint).lower),
-                     to_deg(cell.robot.joint(*joint).upper));
-    }
+    m.context = std::move(*context);
     const Pose X_WT = robot.truth.pose_W(m.context);
     m.p_W = X_WT.translation() + noise(robot.sigma);
     const Matrix3 R_WT = rotation_exp(noise(robot.sigma_rotation)) * X_WT.linear();
@@ -43,6 +61,12 @@ Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::Matrix
     batch.measurements.push_back(std::move(m));
   }
   return batch;
+}
+
+Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q, const SimulateOptions& options) {
+  std::vector<PoseContext> poses(static_cast<std::size_t>(q.rows()));
+  for (Eigen::Index i = 0; i < q.rows(); ++i) poses[static_cast<std::size_t>(i)].q = q.row(i).transpose();
+  return simulate(robot, poses, options);
 }
 
 }  // namespace trammel

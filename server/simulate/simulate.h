@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
@@ -10,11 +12,20 @@
 /// A virtual robot and tracker: truth in, batches out.
 namespace trammel {
 
+/// How a measuring session runs: poses that say no time or temperature get them from here.
+struct MeasuringCourse {
+  double seconds_per_pose = 0;              ///< s; 0: no time is recorded
+  std::optional<double> temperature_start;  ///< degrees Celsius; empty: none is recorded
+  double temperature_end = 0;               ///< degrees Celsius, approached exponentially
+  double temperature_time_constant = 3600;  ///< s
+};
+
 /// A robot whose true numbers are known to its owner only.
 struct VirtualRobot {
   PhysicalModel truth;
   double sigma = 0;           ///< m, of one measured coordinate
   double sigma_rotation = 0;  ///< rad, of one axis of the measured orientation
+  MeasuringCourse course;
 };
 
 /// Reads a truth file for the robot of `cell`:
@@ -24,6 +35,7 @@ struct VirtualRobot {
 /// noise: {sigma_mm: 0.013, sigma_deg: 0.0035}          # optional; the cell's tracker otherwise
 /// base: {xyz_mm: [...], q_wxyz: [...]}                 # where the cell says unknown
 /// tools: {probe: {xyz_mm: [...], q_wxyz: [...]}}       # likewise
+/// course: {seconds_per_pose: 20, temperature_c: [20, 26], time_constant_s: 3600}   # optional
 /// ```
 /// Refuses an unknown source, parameter or key.
 [[nodiscard]] Result<VirtualRobot> read_virtual_robot(const std::string& path, std::shared_ptr<const Cell> cell);
@@ -38,6 +50,10 @@ struct SimulateOptions {
 /// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints, joints outside limits,
 /// an unknown tool or payload.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
+                                                const SimulateOptions& options);
+/// The same for poses that bring their own direction, time, temperature, tool and payload (or leave them to the course
+/// and the options).
+[[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<PoseContext>& poses,
                                                 const SimulateOptions& options);
 
 }  // namespace trammel

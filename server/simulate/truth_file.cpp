@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -11,7 +12,11 @@ namespace trammel {
 namespace {
 
 std::string key_of(const Parameter& parameter) {
-  std::string unit = parameter.unit == "rad/Nmm" ? "rad_per_nmm" : parameter.unit;
+  std::string unit;  // as a key: `rad/Nmm` is `rad_per_nmm`
+  for (const char c : parameter.unit) {
+    if (c == '/') unit += "_per_";
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) unit += static_cast<char>(std::tolower(c));
+  }
   return unit.empty() ? parameter.name : parameter.name + "_" + unit;
 }
 
@@ -30,12 +35,12 @@ void set_values(const YamlMap& map, const ErrorSource& source, Eigen::Ref<Eigen:
 }
 
 VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& cell) {
-  map.only({"version", "source", "error_sources", "noise", "base", "tools"});
+  map.only({"version", "source", "error_sources", "noise", "base", "tools", "course"});
   if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
   const YamlMap sources = map.map("error_sources");
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
   if (!model) map.refuse("error_sources", model.error().message);
-  VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation};
+  VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : robot.truth.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
@@ -49,6 +54,19 @@ VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& c
     noise.only({"sigma_mm", "sigma_deg"});
     robot.sigma = from_mm(noise.number("sigma_mm", to_mm(robot.sigma)));
     robot.sigma_rotation = from_deg(noise.number("sigma_deg", to_deg(robot.sigma_rotation)));
+  }
+  if (map.has("course")) {
+    const YamlMap course = map.map("course");
+    course.only({"seconds_per_pose", "temperature_c", "time_constant_s"});
+    robot.course.seconds_per_pose = course.number("seconds_per_pose");
+    if (robot.course.seconds_per_pose <= 0) course.refuse("seconds_per_pose", "must be above 0");
+    if (course.has("temperature_c")) {
+      const std::vector<double> ends = course.numbers("temperature_c", 2);
+      robot.course.temperature_start = ends[0];
+      robot.course.temperature_end = ends[1];
+    }
+    robot.course.temperature_time_constant = course.number("time_constant_s", robot.course.temperature_time_constant);
+    if (robot.course.temperature_time_constant <= 0) course.refuse("time_constant_s", "must be above 0");
   }
   if (map.has("base")) robot.truth.X_WB = read_pose(map.map("base"));
   if (map.has("tools")) {

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/hash.h"
 #include "server/base/units.h"
+#include "server/measurement/repeats.h"
+#include "server/measurement/velocity.h"
 
 namespace trammel {
 
@@ -15,6 +16,15 @@ constexpr double kDomainQuantile = 0.995;  // of the training poses, each left o
 constexpr int kLeastBiasPoses = 10;
 
 Error given_up() { return {ErrorCode::kBusy, "training given up on request"}; }
+
+/// Split, with velocities where the poses are a path and repeats merged where they are none. Held-out rows are not
+/// touched.
+BatchSplit prepared(MeasurementBatch batch, double sigma, const TrainOptions& options) {
+  fill_velocity(batch);
+  BatchSplit split = split_batch(batch, options.validation_share, options.seed);
+  split.train = merge_repeats(split.train, sigma).batch;
+  return split;
+}
 
 /// The sources to identify: as asked, and the tool besides the geometry where nobody knows the tool.
 Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
@@ -28,7 +38,92 @@ Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions
   return names;
 }
 
-/// What the calibrated model leaves over, in B.
+/// The physics: anew, or that of another model with the named sources refitted.
+Result<CalibrationResult> identify(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                   const TrainOptions& options) {
+  if (options.from) {
+    PhysicalModel model = options.from->parts().physics;
+    if (model.cell->robot_yaml != cell->robot_yaml) {
+      return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell->name);
+    }
+    model.cell = cell;
+    model.X_WB = cell->X_WB.value_or(model.X_WB);
+    for (auto& [name, X_FT] : model.tools) {
+      const auto known = cell->tools.find(name);
+      if (known == cell->tools.end())
+        return refused("cell {}: the model to start from knows tool '{}'", cell->name, name);
+      X_FT = known->second.value_or(X_FT);
+    }
+    return refit(model, batch, options.refit);
+  }
+  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
+  if (!sources) return tl::make_unexpected(sources.error());
+  return calibrate(cell, *sources, batch, {});
+}
+
+/// A pose counts as known when its posterior-to-prior share is what training poses have when each is left out.
+double domain_limit(const BiasModel& bias) {
+  Eigen::VectorXd share = bias.leave_one_out_prior_share();
+  std::sort(share.begin(), share.end());
+  const auto place = static_cast<Eigen::Index>(kDomainQuantile * static_cast<double>(share.size() - 1));
+  return share(place);
+}
+
+/// The bias of `kernel`, learned from what the physics of `parts` leaves over of `batch`.
+Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const std::string& kernel,
+                std::uint64_t seed, const std::function<bool(double)>& progress) {
+  parts.bias.reset();
+  parts.prior_share_limit = 0;
+  if (kernel == "none") return {};
+  if (batch.measurements.size() < kLeastBiasPoses) {
+    return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
+                   batch.measurements.size(), kLeastBiasPoses);
+  }
+  if (!progress(0)) return tl::make_unexpected(given_up());
+  BiasOptions options;
+  options.kernel = kernel;
+  options.seed = seed;
+  options.progress = progress;
+  const Result<BiasModel> bias = BiasModel::fit(leftover(parts.physics, batch), options);
+  if (!bias) return tl::make_unexpected(bias.error());
+  parts.bias = bias->state();
+  parts.prior_share_limit = domain_limit(*bias);
+  return {};
+}
+
+/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
+void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const MeasurementBatch& trained,
+                     const TrainOptions& options) {
+  parts.q_min = parts.q_max = trained.measurements.front().context.q;
+  for (const Measurement& m : trained.measurements) {
+    parts.q_min = parts.q_min.cwiseMin(m.context.q);
+    parts.q_max = parts.q_max.cwiseMax(m.context.q);
+    parts.trained_with.emplace(m.context.tool, m.context.payload);
+  }
+  parts.provenance.level.clear();
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();
+  }
+  parts.provenance.batch_id = batch.id;
+  parts.provenance.batch_hash = batch_hash(batch);
+  parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
+  parts.provenance.seed = options.seed;
+  parts.provenance.trained_at = options.trained_at;
+  parts.provenance.program_version = kProgramVersion;
+}
+
+/// The model with its figures on the poses it was trained on and on those held out.
+Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split) {
+  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
+  if (!bare) return bare;
+  parts.training = bare->evaluate(split.train);
+  parts.validation.reset();
+  if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
+  return CompensatedModel::make(std::move(parts));
+}
+
+}  // namespace
+
 BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
   BiasProblem problem{Eigen::MatrixXd(n, physics.cell->robot.size()), Eigen::MatrixXd(n, 3), Eigen::VectorXd(n)};
@@ -42,16 +137,6 @@ BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch
   return problem;
 }
 
-/// A pose counts as known when its posterior-to-prior share is what training poses have when each is left out.
-double domain_limit(const BiasModel& bias) {
-  Eigen::VectorXd share = bias.leave_one_out_prior_share();
-  std::sort(share.begin(), share.end());
-  const auto place = static_cast<Eigen::Index>(kDomainQuantile * static_cast<double>(share.size() - 1));
-  return share(place);
-}
-
-}  // namespace
-
 Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const MeasurementBatch& batch,
                                const TrainOptions& options) {
   const auto report = [&](const std::string& stage, double share) {
@@ -59,34 +144,13 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   };
   const Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
   if (!checked) return tl::make_unexpected(checked.error());
-  const BatchSplit split = split_batch(*checked, options.validation_share, options.seed);
+  const BatchSplit split = prepared(*checked, cell->tracker.sigma, options);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 
-  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
-  if (!sources) return tl::make_unexpected(sources.error());
   if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
-  Result<CalibrationResult> calibration = calibrate(cell, *sources, split.train, {});
+  Result<CalibrationResult> calibration = identify(cell, split.train, options);
   if (!calibration) return tl::make_unexpected(calibration.error());
-
   CompensatedModel::Parts parts;
-  const std::string kernel = options.bias.value_or(cell->model.bias);
-  if (kernel != "none" && split.train.measurements.size() < kLeastBiasPoses) {
-    return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
-                   split.train.measurements.size(), kLeastBiasPoses);
-  }
-  if (kernel != "none") {
-    if (!report("learning the bias", 0.3)) return tl::make_unexpected(given_up());
-    BiasOptions bias_options;
-    bias_options.kernel = kernel;
-    bias_options.seed = options.seed;
-    bias_options.progress = [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); };
-    const Result<BiasModel> bias = BiasModel::fit(leftover(calibration->model, split.train), bias_options);
-    if (!bias) return tl::make_unexpected(bias.error());
-    parts.bias = bias->state();
-    parts.prior_share_limit = domain_limit(*bias);
-  }
-
-  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
   parts.physics = std::move(calibration->model);
   parts.parameters = std::move(calibration->parameters);
   parts.unidentifiable = std::move(calibration->unidentifiable);
@@ -94,28 +158,31 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   parts.rank = calibration->rank;
   parts.condition_number = calibration->condition_number;
   parts.discrepancy = calibration->discrepancy;
-  parts.q_min = parts.q_max = split.train.measurements.front().context.q;
-  for (const Measurement& m : split.train.measurements) {
-    parts.q_min = parts.q_min.cwiseMin(m.context.q);
-    parts.q_max = parts.q_max.cwiseMax(m.context.q);
-    parts.trained_with.emplace(m.context.tool, m.context.payload);
-  }
-  for (const ErrorSourcePtr& source : parts.physics.sources) {
-    parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();
-  }
-  parts.provenance.batch_id = batch.id;
-  parts.provenance.batch_hash = sha256_hex(batch.source_text.empty() ? to_csv(batch) : batch.source_text);
-  parts.provenance.training_poses = static_cast<int>(split.train.measurements.size());
-  parts.provenance.seed = options.seed;
-  parts.provenance.trained_at = options.trained_at;
-  parts.provenance.program_version = kProgramVersion;
 
-  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
-  if (!bare) return bare;
-  parts.training = bare->evaluate(split.train);
-  if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
-  if (!report("done", 1.0)) return tl::make_unexpected(given_up());
-  return CompensatedModel::make(std::move(parts));
+  const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), options.seed,
+                                  [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
+  if (!learned) return tl::make_unexpected(learned.error());
+
+  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  record_training(parts, batch, split.train, options);
+  Result<CompensatedModel> model = validated(std::move(parts), split);
+  if (model && !report("done", 1.0)) return tl::make_unexpected(given_up());
+  return model;
+}
+
+Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const MeasurementBatch& batch,
+                                    const TrainOptions& options) {
+  const Cell& cell = calibrated.cell();
+  const Result<MeasurementBatch> checked = check_against_cell(batch, cell);
+  if (!checked) return tl::make_unexpected(checked.error());
+  if (checked->measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
+  CompensatedModel::Parts parts = calibrated.parts();
+  const Status learned =
+      add_bias(parts, *checked, options.bias.value_or(cell.model.bias), options.seed,
+               [&](double share) { return !options.progress || options.progress("learning the bias", share); });
+  if (!learned) return tl::make_unexpected(learned.error());
+  record_training(parts, batch, *checked, options);
+  return validated(std::move(parts), {*checked, {}});
 }
 
 }  // namespace trammel

@@ -13,6 +13,7 @@
 #include "server/base/units.h"
 #include "server/bias/kernel.h"
 #include "server/error_sources/error_source.h"
+#include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
 
 namespace trammel {
@@ -242,7 +243,7 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   const auto cell_found = cell(cell_name);
   if (!cell_found) return tl::make_unexpected(cell_found.error());
   if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
-  auto parsed = parse_batch_csv(csv, "batch " + batch_id);
+  auto parsed = parse_batch(csv, "batch " + batch_id);
   if (!parsed) return tl::make_unexpected(parsed.error());
   parsed->id = batch_id;
   const auto checked = check_against_cell(std::move(*parsed), **cell_found);
@@ -478,7 +479,7 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
   for (const std::string& id : job.batch_ids) {
     const auto stored = store_.batch(job.cell, id);
     if (!stored) return tl::make_unexpected(stored.error());
-    auto parsed = parse_batch_csv(stored->csv, "batch " + id);
+    auto parsed = parse_batch(stored->csv, "batch " + id);
     if (!parsed) return parsed;
     parsed->id = id;
     auto checked = check_against_cell(std::move(*parsed), cell);

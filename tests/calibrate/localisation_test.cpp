@@ -59,15 +59,6 @@ TEST(Localisation, RefusesOrientationsThatTurnAboutOneAxisOnly) {
   EXPECT_NEAR(found->X_FT.translation().z(), 0, 1e-3);
 }
 
-TEST(Localisation, TransformsAreDirectAndNeedAPlane) {
-  Eigen::Matrix3Xd p_B = Eigen::Matrix3Xd::Random(3, 5);
-  const Eigen::Matrix3Xd p_A = (kBase.linear() * p_B).colwise() + kBase.translation();
-  EXPECT_LT(pose_difference(*fit_transform(p_A, p_B), kBase).norm(), 1e-10);
-  EXPECT_FALSE(fit_transform(p_A.leftCols(2), p_B.leftCols(2)));
-  for (int i = 0; i < 5; ++i) p_B.col(i) = i * Vector3(1, 2, 3);
-  EXPECT_FALSE(fit_transform(p_B, p_B));
-}
-
 TEST(Localisation, FindsTheToolWhenTheBaseIsKnown) {
   const std::vector<Pose> X_WF = random_flange_poses(4, 4);
   std::vector<Pose> X_WT;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <random>
 
@@ -23,7 +24,37 @@ PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
   for (int i = 0; i < cell.robot.size(); ++i) context.q(i) = angle(random);
   context.tool = "spindle";
   context.payload = "spindle";
+  context.time = 5000;
+  context.temperature = 26.5;
+  context.velocity = JointVector::LinSpaced(cell.robot.size(), -0.5, 0.7);
+  context.direction = {1, -1, 1, -1, 1, -1};
+  context.index = 3;
   return context;
+}
+
+/// One of every cause.
+std::vector<std::string> every_spec() {
+  return {"base",
+          "geometry",
+          "tool",
+          "payload",
+          "thermal_growth",
+          "tracker_moved@2",
+          "tracker_drift",
+          "tool_changed@2",
+          "payload_changed@2",
+          "joint_slip:4@2",
+          "gear_transmission:3@40.5+81",
+          "encoder_eccentricity:2",
+          "joint_map:6@5",
+          "wrist_coupling",
+          "time_lag",
+          "backlash:3",
+          "link_bending:2",
+          "link_bending:4",
+          "compliance_first_order",
+          "compliance_equilibrium",
+          "compliance_linear"};
 }
 
 /// Values as large as real ones, so that second-order terms would show.
@@ -40,15 +71,15 @@ Eigen::VectorXd plausible_values(const PhysicalModel& model, std::uint64_t seed)
 
 TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
   const auto cell = cell_7();
-  const std::vector<std::vector<std::string>> lists = {{"base"},
-                                                       {"tool"},
-                                                       {"geometry"},
-                                                       {"compliance_first_order"},
-                                                       {"compliance_equilibrium"},
-                                                       {"compliance_linear"},
-                                                       {"base", "geometry", "tool", "compliance_first_order"},
-                                                       {"base", "geometry", "tool", "compliance_equilibrium"},
-                                                       {"base", "geometry", "tool", "compliance_linear"}};
+  std::vector<std::vector<std::string>> lists;
+  for (const std::string& spec : every_spec()) lists.push_back({spec});
+  for (const char* compliance : {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
+    std::vector<std::string> all = {compliance};
+    for (const std::string& spec : every_spec()) {
+      if (!spec.starts_with("compliance")) all.push_back(spec);
+    }
+    lists.push_back(all);
+  }
   for (const auto& specs : lists) {
     const PhysicalModel model = *make_physical_model(cell, specs);
     const Eigen::VectorXd values = plausible_values(model, 5);
@@ -102,6 +133,74 @@ TEST(ErrorSources, GeometryHasTheParametersOfTheSource) {
             "q1 d1 a1 alpha1 q2 a2 alpha2 beta2 q3 d3 a3 alpha3 q4 d4 a4 alpha4 q5 d5 a5 alpha5 q6 d6 a6 alpha6 ");
 }
 
+TEST(ErrorSources, EveryKnownCauseIsTestedHere) {
+  for (const std::string& cause : known_causes()) {
+    const std::vector<std::string> tested = every_spec();
+    EXPECT_TRUE(std::any_of(tested.begin(), tested.end(), [&](const std::string& spec) {
+      return spec.starts_with(cause);
+    })) << cause;
+  }
+}
+
+TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
+  const auto cell = cell_7();
+  for (const std::string& spec : every_spec()) {
+    const std::vector<std::string> list =
+        spec.starts_with("compliance") ? std::vector<std::string>{spec} : std::vector<std::string>{"compliance", spec};
+    PhysicalModel loaded = *make_physical_model(cell, list);
+    loaded.values = plausible_values(loaded, 9);
+    PhysicalModel without = loaded;
+    Eigen::Index first = 0;
+    for (const ErrorSourcePtr& source : loaded.sources) {
+      const auto count = static_cast<Eigen::Index>(source->parameters().size());
+      if (source->name() == spec) {
+        EXPECT_FALSE(source->explanation().empty()) << spec;
+        for (Eigen::Index k = 0; k < count; ++k)
+          without.values(first + k) = source->parameters()[static_cast<std::size_t>(k)].prior;
+      }
+      first += count;
+    }
+    const PoseContext context = some_pose(*cell, 10);
+    EXPECT_GT((loaded.pose_W(context).translation() - without.pose_W(context).translation()).norm(), 1e-6) << spec;
+  }
+}
+
+TEST(ErrorSources, AStepBeginsAtItsPose) {
+  const auto cell = cell_7();
+  for (const char* spec : {"tracker_moved@4", "tool_changed@4", "joint_slip:2@4"}) {
+    PhysicalModel model = *make_physical_model(cell, {spec});
+    model.values = plausible_values(model, 11);
+    PoseContext context = some_pose(*cell, 12);
+    context.index = 2;  // the third pose
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+    context.index = 3;
+    EXPECT_GT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-5) << spec;
+  }
+}
+
+TEST(ErrorSources, BendingIsTheCantileverOfTheTextbook) {
+  // Link 2 level, load at its end: F l^3 / 3EI down, slope F l^2 / 2EI, plus the moment of the load's lever beyond the
+  // end.
+  auto cell = std::make_shared<Cell>(*cell_7());
+  PhysicalModel model = *make_physical_model(cell, {"link_bending:2"});
+  model.values(0) = 1e-6;
+  PoseContext context = some_pose(*cell, 13);
+  context.q = JointVector::Zero(6);
+  context.q(1) = kPi / 2;   // link 2 forward
+  context.q(2) = -kPi / 2;  // forearm up: what hangs beyond stands above the elbow's end
+  const double length = 1.280;
+  const double force = 100 * kGravity;
+  const Pose X_WF = cell->robot.flange_pose(context.q);
+  const Vector3 cog = X_WF * cell->payloads.at("spindle").p_FoCog_F;
+  const Vector3 end = (Vector3() << 0.320 + length, 0, 0.780).finished();
+  const double moment = force * (cog.x() - end.x());
+  const double deflection = force * std::pow(length, 3) / 3 * 1e-6 + moment * length * length / 2 * 1e-6;
+  const double slope = force * length * length / 2 * 1e-6 + moment * length * 1e-6;
+  const Vector3 tip = model.nominal_pose_W(context).translation();
+  const Vector3 expected = Vector3(0, 0, -deflection) + Vector3(0, slope, 0).cross(tip - end);
+  EXPECT_LT((model.pose_W(context).translation() - tip - expected).norm(), 1e-9);
+}
+
 TEST(ErrorSources, LevelsAreListsOfSources) {
   using List = std::vector<std::string>;
   EXPECT_EQ(*parse_level("M0"), List{});
@@ -118,7 +217,10 @@ TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
   EXPECT_NE(unknown.error().message.find("geometry"), std::string::npos);
-  EXPECT_FALSE(make_error_source("geometry:3", *cell));
+  for (const char* spec : {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
+                           "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5"}) {
+    EXPECT_FALSE(make_error_source(spec, *cell)) << spec;
+  }
 }
 
 }  // namespace

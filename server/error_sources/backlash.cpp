@@ -1,0 +1,57 @@
+#include <cmath>
+
+#include "server/error_sources/parameter.h"
+#include "server/error_sources/sources.h"
+
+namespace trammel {
+
+namespace {
+
+/// Play in a gear: the joint stops short on the side it came from, by half the play, and by more the harder the load
+/// presses: delta q = dir (b + k |tau|). Approached from one side only it is a joint zero.
+class Backlash final : public ErrorSource {
+ public:
+  explicit Backlash(const SourceSpec& spec)
+      : name_(spec.text),
+        joint_(spec.joint),
+        parameters_({angle_parameter(fmt::format("b{}", spec.joint + 1), 2e-4),
+                     {fmt::format("bt{}", spec.joint + 1), "rad/Nmm", to_rad_per_nmm(1), 0, from_rad_per_nmm(1e-10)}}) {
+  }
+  std::string name() const override { return name_; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  int joint() const override { return joint_; }
+  ContextNeeds needs() const override { return {.direction = true}; }
+  std::string explanation() const override {
+    return fmt::format("the gear of joint {} has play: the joint depends on the side it is approached from",
+                       joint_ + 1);
+  }
+
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    if (context.direction.empty()) return;
+    const double direction = context.direction[static_cast<std::size_t>(joint_)];
+    const ArmKinematics kinematics(state);
+    const double torque = kinematics.gravity_torque()(joint_);
+    if (jacobian != nullptr) {
+      const Eigen::RowVectorXd torque_change =
+          kinematics.gravity_torque_jacobian().row(joint_) * jacobian->matrix.leftCols(first_column);
+      jacobian->add_to_joint(joint_, first_column, direction);
+      jacobian->add_to_joint(joint_, first_column + 1, direction * std::abs(torque));
+      for (int k = 0; k < first_column; ++k) {
+        jacobian->add_to_joint(joint_, k, direction * values(1) * std::copysign(1.0, torque) * torque_change(k));
+      }
+    }
+    state.add_to_joint(joint_, direction * (values(0) + values(1) * std::abs(torque)));
+  }
+
+ private:
+  std::string name_;
+  int joint_;
+  std::vector<Parameter> parameters_;
+};
+
+}  // namespace
+
+Result<ErrorSourcePtr> make_backlash(const SourceSpec& spec, const Cell&) { return std::make_shared<Backlash>(spec); }
+
+}  // namespace trammel

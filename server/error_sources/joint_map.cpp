@@ -1,0 +1,64 @@
+#include <cmath>
+
+#include "server/error_sources/joint_error.h"
+#include "server/error_sources/parameter.h"
+#include "server/error_sources/sources.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr int kDefaultHarmonics = 48;
+constexpr int kMaxHarmonics = 500;
+constexpr double kAmplitude = 3e-4;  // rad, prior of the first harmonic
+constexpr double kKnee = 6;          // harmonic at which the prior begins to fall
+
+/// An error of one joint's angle that depends on that angle alone: a Fourier series with period one turn. The prior
+/// falls with the square of the harmonic beyond the knee, as a twice-smooth random function's does; the constant is the
+/// joint's zero.
+class JointMap final : public JointError {
+ public:
+  JointMap(const SourceSpec& spec, int harmonics) : JointError(spec.text, spec.joint, series(spec.joint, harmonics)) {}
+  std::string explanation() const override {
+    return fmt::format("joint {} is off by a function of its own angle", joint() + 1);
+  }
+
+ private:
+  static std::vector<Parameter> series(int joint, int harmonics) {
+    std::vector<Parameter> all;
+    for (int h = 1; h <= harmonics; ++h) {
+      const double prior = kAmplitude / (1 + std::pow(h / kKnee, 2));
+      all.push_back(angle_parameter(fmt::format("map{}_sin{}", joint + 1, h), prior));
+      all.push_back(angle_parameter(fmt::format("map{}_cos{}", joint + 1, h), prior));
+    }
+    return all;
+  }
+
+  std::vector<Term> terms(const PoseContext& context) const override {
+    const double q = context.q(joint());
+    const int harmonics = static_cast<int>(parameters().size()) / 2;
+    std::vector<Term> all;
+    all.reserve(parameters().size());
+    for (int h = 1; h <= harmonics; ++h) {
+      all.push_back({joint(), 2 * h - 2, std::sin(h * q)});
+      all.push_back({joint(), 2 * h - 1, std::cos(h * q)});
+    }
+    return all;
+  }
+};
+
+}  // namespace
+
+Result<ErrorSourcePtr> make_joint_map(const SourceSpec& spec, const Cell& cell) {
+  if (cell.robot.joint(spec.joint).type != JointType::kRevolute) {
+    return refused("error source '{}': joint {} does not turn", spec.text, spec.joint + 1);
+  }
+  const double harmonics = spec.at.empty() ? kDefaultHarmonics : spec.at[0];
+  if (spec.at.size() > 1 || harmonics != std::floor(harmonics) || harmonics > kMaxHarmonics) {
+    return failure(ErrorCode::kUsage, "error source '{}': expected @harmonics, a whole number up to {}", spec.text,
+                   kMaxHarmonics);
+  }
+  return std::make_shared<JointMap>(spec, static_cast<int>(harmonics));
+}
+
+}  // namespace trammel

@@ -1,0 +1,88 @@
+#include <utility>
+
+#include "server/error_sources/parameter.h"
+#include "server/error_sources/sources.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kMassPrior = 5;  // kg
+
+void add_four(std::vector<Parameter>& parameters, const std::string& suffix) {
+  parameters.push_back({"mass" + suffix, "kg", 1, 0, kMassPrior});
+  for (const char* name : {"cx", "cy", "cz"}) parameters.push_back(length_parameter(name + suffix, 20));
+}
+
+void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, StateJacobian* jacobian, int first_column) {
+  state.payload.mass += values(0);
+  state.payload.p_FoCog_F += values.segment<3>(1);
+  if (jacobian == nullptr) return;
+  jacobian->matrix(jacobian->rows.mass(), first_column) += 1;
+  for (int k = 0; k < 3; ++k) jacobian->matrix(jacobian->rows.cog(k), first_column + 1 + k) += 1;
+}
+
+/// A payload weighs, or carries its weight, other than the cell file says; four parameters for each payload of the
+/// cell. It shows through compliance and bending only; with one payload its mass scales every compliance alike.
+class PayloadError final : public ErrorSource {
+ public:
+  explicit PayloadError(const Cell& cell) {
+    for (const auto& [id, payload] : cell.payloads) {
+      ids_.push_back(id);
+      add_four(parameters_, cell.payloads.size() > 1 ? "[" + id + "]" : "");
+    }
+  }
+  std::string name() const override { return "payload"; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  ContextNeeds needs() const override { return {.payload = true}; }
+  std::string explanation() const override {
+    return "the payload's mass or centre of gravity is not as the cell file says";
+  }
+
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+      const int first = 4 * static_cast<int>(k);
+      if (ids_[k] == context.payload) load(values.segment<4>(first), state, jacobian, first_column + first);
+    }
+  }
+
+ private:
+  std::vector<std::string> ids_;
+  std::vector<Parameter> parameters_;
+};
+
+/// From a pose on, something else hangs on the flange.
+class PayloadChanged final : public ErrorSource {
+ public:
+  explicit PayloadChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
+    add_four(parameters_, "_changed");
+  }
+  std::string name() const override { return name_; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  ContextNeeds needs() const override { return {.payload = true}; }
+  std::string explanation() const override { return fmt::format("the payload changed before pose {}", first_ + 1); }
+
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    if (context.from(first_)) load(values, state, jacobian, first_column);
+  }
+
+ private:
+  std::string name_;
+  int first_;
+  std::vector<Parameter> parameters_;
+};
+
+}  // namespace
+
+Result<ErrorSourcePtr> make_payload(const SourceSpec& spec, const Cell& cell) {
+  if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
+  return std::make_shared<PayloadError>(cell);
+}
+Result<ErrorSourcePtr> make_payload_changed(const SourceSpec& spec, const Cell& cell) {
+  if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
+  return std::make_shared<PayloadChanged>(spec);
+}
+
+}  // namespace trammel

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+
+#include "server/measurement/measurement.h"
+
+/// Batches as other programs write them, and any of them.
+namespace trammel {
+
+/// Reads the measurements of a RoboDK calibration or validation project, exported as CSV. Fields are separated by `;`,
+/// tab or `,`, by the first of these that is in the first line; with `;` or tab a number may have a decimal comma. `#`
+/// and `//` start comments. Two layouts:
+///
+/// Named, where the first line names `J1` ... `Jn` (or `Joint 1` ..., `A1` ..., `q1` ...; n to 12), in any order,
+/// without regard to case, blanks and underscores, units in brackets or behind an underscore:
+///
+///     joints (deg; rad or mm where it says so), X Y Z (mm; m or in where it says so), at most one of
+///     A B C       Rz(A) Ry(B) Rx(C), deg or rad
+///     W P R       Rz(R) Ry(P) Rx(W), deg or rad
+///     Rx Ry Rz    Rx(rx) Ry(ry) Rz(rz), deg or rad
+///     qw qx qy qz Hamilton, unit
+///     and pose_id (id, name, point, target). Other columns are kept as they are.
+///
+/// By position, with or without a first line of other names, as the exports have them that RoboDK's validation macros
+/// read (joints, what was measured, the tool centre point in F):
+///
+///     q1..q6 deg, x y z mm                                                     9 columns
+///     q1..q6 deg, x y z mm, TCP x y z mm                                      12 columns
+///     q1..q6 deg, x y z mm, rx ry rz rad, TCP x y z mm, TCP rx ry rz rad      18 columns, Rx(rx) Ry(ry) Rz(rz)
+///
+/// The TCP is kept in columns `tcp_...`. Where it is not the same in every row, each one is a tool of its own: `tcp-1`,
+/// `tcp-2`, ... in the order of their first rows, to be named so in the cell file.
+///
+/// Refuses, naming `where`, row, column, value and limit, what parse_batch_csv() refuses, and angles in radians beyond
+/// a whole turn: they are degrees.
+[[nodiscard]] Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where);
+[[nodiscard]] Result<MeasurementBatch> read_robodk_csv(const std::string& path);
+
+enum class BatchKind { kTrammel, kRoboDk, kPoints };
+
+/// What the text is, where that is beyond doubt, else kTrammel, whose reader says what it misses. RoboDK: a first line
+/// that names J1 or Joint 1 and on, without a column of ours (`q1_deg`, `x_mm`); or other names above rows of 12 or 18
+/// numbers. Points: what parse_points() reads without being told anything.
+[[nodiscard]] BatchKind recognise_batch(const std::string& text);
+
+/// A batch of whatever kind: parse_batch_csv() or parse_robodk_csv(). Refuses points, naming how they become a batch.
+[[nodiscard]] Result<MeasurementBatch> parse_batch(const std::string& text, const std::string& where);
+[[nodiscard]] Result<MeasurementBatch> read_batch(const std::string& path);
+
+}  // namespace trammel

@@ -1,0 +1,126 @@
+// The figures that calibration answers for, printed beside their aims: honest uncertainties, validation error, a robot
+// like the measured one, and the time of a fit beside SciPy's Levenberg-Marquardt (vectorised NumPy) on the same batch.
+// `calibrate_benchmark [SEEDS]`.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <random>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/calibrate/calibrate.h"
+#include "server/plan/plan.h"
+#include "tests/support/demand.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double rms_mm(const PhysicalModel& model, const MeasurementBatch& batch) {
+  double sum = 0;
+  for (const Measurement& m : batch.measurements) sum += (m.p_W - model.pose_W(m.context).translation()).squaredNorm();
+  return to_mm(std::sqrt(sum / static_cast<double>(batch.measurements.size())));
+}
+
+/// Random poses with every joint approached from a random side, as the robot's own course runs.
+MeasurementBatch both_sides(const VirtualRobot& robot, int count, std::uint64_t seed) {
+  const Cell& cell = *robot.truth.cell;
+  const Eigen::MatrixXd q = latin_hypercube(test::demand(planning_ranges(cell)), count, seed);
+  std::mt19937_64 random(seed);
+  std::vector<PoseContext> poses(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    PoseContext& pose = poses[static_cast<std::size_t>(i)];
+    pose.q = q.row(i).transpose();
+    for (int j = 0; j < cell.robot.size(); ++j) pose.direction.push_back(random() % 2 == 0 ? 1 : -1);
+  }
+  SimulateOptions options;
+  options.seed = seed + 1;
+  MeasurementBatch batch = test::demand(simulate(robot, poses, options));
+  batch.id = "both-sides";
+  return batch;
+}
+
+/// How many identifiable directions lie within U(k=2) of the truth.
+struct Coverage {
+  int inside = 0, all = 0;
+};
+
+Coverage coverage_of(const CalibrationResult& result, const PhysicalModel& truth) {
+  const auto P = static_cast<Eigen::Index>(result.parameters.size());
+  Eigen::VectorXd scale(P);
+  for (Eigen::Index i = 0; i < P; ++i) scale(i) = result.parameters[static_cast<std::size_t>(i)].parameter.prior_scale;
+  const Eigen::VectorXd inverse = scale.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      Eigen::MatrixXd(inverse.asDiagonal() * result.covariance * inverse.asDiagonal()));
+  const Eigen::VectorXd error = (result.model.values - truth.values).cwiseProduct(inverse);
+  Coverage coverage;
+  for (Eigen::Index k = 0; k < P; ++k) {
+    if (eigen.eigenvalues()(k) > 0.5) continue;  // the prior's, not the data's
+    ++coverage.all;
+    coverage.inside +=
+        std::abs(eigen.eigenvectors().col(k).dot(error)) <= 2 * std::sqrt(eigen.eigenvalues()(k)) ? 1 : 0;
+  }
+  return coverage;
+}
+
+void uncertainties_and_validation(int seeds) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  Coverage coverage;
+  double validation = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const auto s = static_cast<std::uint64_t>(seed);
+    const CalibrationResult result = test::demand(
+        calibrate(cell, {"base", "geometry", "compliance_linear"}, test::measured(robot, 120, 100 + s), {}));
+    const Coverage one = coverage_of(result, robot.truth);
+    coverage.inside += one.inside;
+    coverage.all += one.all;
+    if (seed <= 20) validation += rms_mm(result.model, test::measured(robot, 1000, 9000 + s)) / 20;
+  }
+  std::printf("identifiable directions within U(k=2), %d seeds: %.2f %% of %d (aim 93 to 98 %%)\n", seeds,
+              100.0 * coverage.inside / coverage.all, coverage.all);
+  std::printf("M3, 120 poses, validation rms, mean of 20 seeds: %.5f mm (aim 0.0237)\n", validation);
+}
+
+void robot_like_the_measured_one() {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot =
+      test::demand(read_virtual_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/truth/chapter-6.yaml", cell));
+  const CalibrationResult result = test::demand(
+      calibrate(cell,
+                {"base", "geometry", "compliance", "thermal_growth", "gear_transmission:1", "gear_transmission:2",
+                 "gear_transmission:3", "gear_transmission:4", "gear_transmission:5", "backlash:1", "backlash:2",
+                 "backlash:3", "link_bending:2", "link_bending:4"},
+                both_sides(robot, 600, 1), {}));
+  std::printf("chapter-6-like robot, 600 poses, orders not told, validation rms: %.5f mm (aim %.5f)\n",
+              rms_mm(result.model, both_sides(robot, 1000, 3)), 1.05 * 0.013 * std::sqrt(3.0));
+}
+
+void speed_beside_scipy() {
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 1000, 77);
+  const double begin = cpu_seconds();
+  const CalibrationResult result = test::demand(calibrate(cell, {"base", "geometry", "compliance_linear"}, batch, {}));
+  const double ours = cpu_seconds() - begin;
+  std::printf("1000 poses, 36 parameters: %.3f s, residual rms %.5f mm\n", ours, to_mm(result.rms));
+  const test::TemporaryFolder folder;
+  const std::string csv = folder.write("batch.csv", to_csv(batch));
+  std::fflush(stdout);
+  const std::string command = fmt::format(
+      "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 /usr/bin/python3 {}/tests/benchmarks/calibrate_scipy.py {} {}",
+      TRAMMEL_SOURCE_DIR, csv, ours);
+  if (std::system(command.c_str()) != 0) std::printf("SciPy is not at hand (Debian: python3-scipy)\n");
+}
+
+}  // namespace
+}  // namespace trammel
+
+int main(int argc, char** argv) {
+  trammel::uncertainties_and_validation(argc > 1 ? std::atoi(argv[1]) : 100);
+  trammel::robot_like_the_measured_one();
+  trammel::speed_beside_scipy();
+}

@@ -1,0 +1,126 @@
+#include "server/measurement/batch_file.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+
+namespace trammel {
+namespace {
+
+std::string refusal(const std::string& text) {
+  const auto batch = parse_robodk_csv(text, "rdk.csv");
+  return batch ? "accepted" : batch.error().message;
+}
+
+Matrix3 turned(double x, double y, double z, const char* order) {
+  Matrix3 R = Matrix3::Identity();
+  for (const char* axis = order; *axis != '\0'; ++axis) {
+    const double angle = *axis == 'x' ? x : *axis == 'y' ? y : z;
+    R = R * Eigen::AngleAxisd(angle, Vector3::Unit(*axis - 'x')).toRotationMatrix();
+  }
+  return R;
+}
+
+TEST(RoboDkCsv, FindsNamedColumnsWithEverySeparatorAndDecimalCommas) {
+  for (const char* text :
+       {"J1,J2,X,Y,Z\n90,-45.5,1,2,3\n", "J1;J2;X;Y;Z\n90;-45,5;1;2;3\n", "J1\tJ2\tX\tY\tZ\r\n90\t-45.5\t1\t2\t3\r\n",
+        "# measured\nZ (mm), X (mm), Y (mm), Joint 2 (deg), Joint 1 (deg)\n3, 1, 2, -45.5, 90\n"}) {
+    const auto batch = parse_robodk_csv(text, "data/rdk.csv");
+    ASSERT_TRUE(batch) << text << batch.error().message;
+    EXPECT_EQ(batch->id, "rdk");
+    ASSERT_EQ(batch->measurements.size(), 1u);
+    const Measurement& m = batch->measurements[0];
+    ASSERT_EQ(m.context.q.size(), 2) << text;
+    EXPECT_NEAR(m.context.q(0), kPi / 2, 1e-15);
+    EXPECT_NEAR(m.context.q(1), from_deg(-45.5), 1e-15);
+    EXPECT_LT((m.p_W - Vector3(1e-3, 2e-3, 3e-3)).norm(), 1e-15);
+    EXPECT_FALSE(m.R_WT);
+    EXPECT_EQ(m.pose_id, "1");
+  }
+}
+
+TEST(RoboDkCsv, TurnsEachKindOfAnglesAsItsControllerDoes) {
+  const double x = 0.1, y = -0.2, z = 2.5;
+  const auto rotation = [](const std::string& names, const std::string& values) {
+    const auto batch = parse_robodk_csv("J1,X,Y,Z," + names + "\n0,1,2,3," + values + "\n", "rdk.csv");
+    EXPECT_TRUE(batch) << batch.error().message;
+    return batch ? batch->measurements[0].R_WT.value_or(Matrix3::Zero()) : Matrix3::Zero();
+  };
+  const auto values = [](double a, double b, double c) { return fmt::format("{:.15g},{:.15g},{:.15g}", a, b, c); };
+  EXPECT_LT((rotation("A,B,C", values(to_deg(z), to_deg(y), to_deg(x))) - turned(x, y, z, "zyx")).norm(), 1e-12);
+  EXPECT_LT((rotation("W,P,R", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "zyx")).norm(), 1e-12);
+  EXPECT_LT((rotation("Rx,Ry,Rz", values(to_deg(x), to_deg(y), to_deg(z))) - turned(x, y, z, "xyz")).norm(), 1e-12);
+  EXPECT_LT((rotation("A (rad),B (rad),C (rad)", values(z, y, x)) - turned(x, y, z, "zyx")).norm(), 1e-12);
+  EXPECT_LT((rotation("qw,qx,qy,qz", "0.6,0,0,0.8") - turned(0, 0, 2 * std::acos(0.6), "z")).norm(), 1e-12);
+}
+
+TEST(RoboDkCsv, ReadsTheExportsByPosition) {
+  const auto points = parse_robodk_csv(
+      "Axis-1,Axis-2,Axis-3,Axis-4,Axis-5,Axis-6,mx,my,mz,tx,ty,tz\n10,20,30,40,50,60,1,2,3,7,8,9\n"
+      "11,20,30,40,50,60,4,5,6,7,8,9\n",
+      "rdk.csv");
+  ASSERT_TRUE(points) << points.error().message;
+  ASSERT_EQ(points->measurements.size(), 2u);
+  EXPECT_NEAR(points->measurements[1].context.q(0), from_deg(11), 1e-15);
+  EXPECT_LT((points->measurements[1].p_W - Vector3(4e-3, 5e-3, 6e-3)).norm(), 1e-15);
+  EXPECT_EQ(points->measurements[1].context.tool, "");
+  EXPECT_EQ(points->extra_columns, (std::vector<std::string>{"tcp_x_mm", "tcp_y_mm", "tcp_z_mm"}));
+  EXPECT_EQ(points->measurements[0].extra, (std::vector<std::string>{"7", "8", "9"}));
+
+  const auto poses = parse_robodk_csv("1,2,3,4,5,6,100,200,300,0.1,-0.2,2.5,7,8,9,0,0,0\n", "rdk.csv");
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz")).norm(), 1e-12);
+  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200,300,10,-20,170,7,8,9,0,0,0\n"), "rdk.csv row 1: rx_rad is 10, limit 6.28319");
+}
+
+TEST(RoboDkCsv, MakesAToolOfEachTcp) {
+  const auto batch =
+      parse_robodk_csv("1,2,3,4,5,6,1,2,3,7,8,9\n1,2,3,4,5,7,1,2,3,-7,8,9\n1,2,3,4,5,8,1,2,3,7,8,9\n", "rdk.csv");
+  ASSERT_TRUE(batch) << batch.error().message;
+  EXPECT_EQ(batch->measurements[0].context.tool, "tcp-1");
+  EXPECT_EQ(batch->measurements[1].context.tool, "tcp-2");
+  EXPECT_EQ(batch->measurements[2].context.tool, "tcp-1");
+}
+
+TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
+  EXPECT_EQ(refusal(""), "rdk.csv: empty file, expected joints and measured positions");
+  EXPECT_EQ(refusal("J1,X,Y,Z\n"), "rdk.csv: no measurements below the header, at least 1 is needed");
+  EXPECT_EQ(refusal("1,2,3,4\n"), "rdk.csv row 1: 4 columns and none named J1; without names expected 9, 12 or 18");
+  EXPECT_EQ(refusal("J1,J3,X,Y,Z\n1,2,3,4,5\n"), "rdk.csv: missing column J2 before J3");
+  EXPECT_EQ(refusal("J1,X,Y\n1,2,3\n"), "rdk.csv: 2 of the columns x, y, z; they come all together or not at all");
+  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"),
+            "rdk.csv: two orientations; expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz");
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), "rdk.csv row 3: Y is 'c', expected a number");
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2e7,3,4\n"), "rdk.csv row 2: X is 2e+07, limit 1e+06");
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), "rdk.csv row 2: 3 values, the header has 4 columns");
+  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"),
+            "rdk.csv: column J2 (turns): unit 'turns', expected deg or rad, of a rail mm");
+  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"), "rdk.csv row 3: pose_id 'a' is already that of row 2");
+}
+
+TEST(BatchFile, RecognisesKindsByTheirContent) {
+  EXPECT_EQ(recognise_batch("q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n"), BatchKind::kTrammel);
+  EXPECT_EQ(recognise_batch("# a\nJ1;J2;X;Y;Z\n1;2;3;4;5\n"), BatchKind::kRoboDk);
+  EXPECT_EQ(recognise_batch("a,b,c,d,e,f,g,h,i,j,k,l\n1,2,3,4,5,6,7,8,9,10,11,12\n"), BatchKind::kRoboDk);
+  EXPECT_EQ(recognise_batch("// SA\nMain p1 1 2 3\n"), BatchKind::kPoints);
+  EXPECT_EQ(recognise_batch("name,x_mm,y_mm,z_mm\nR1,1,2,3\n"), BatchKind::kPoints);
+  EXPECT_EQ(recognise_batch("x_mm,y_mm,z_mm\n1,2,3\n"), BatchKind::kTrammel);
+  EXPECT_EQ(recognise_batch(""), BatchKind::kTrammel);
+}
+
+TEST(BatchFile, ReadsBatchesOfEitherKindAndSaysHowPointsBecomeOne) {
+  const auto ours = parse_batch("q1_deg,x_mm,y_mm,z_mm\n90,1,2,3\n", "b.csv");
+  const auto other = parse_batch("J1;X;Y;Z\n90;1;2;3\n", "b.csv");
+  ASSERT_TRUE(ours) << ours.error().message;
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(to_csv(*ours), to_csv(*other));
+  const auto points = parse_batch("Main p1 1 2 3\n", "sa.txt");
+  ASSERT_FALSE(points);
+  EXPECT_NE(points.error().message.find("sa.txt: measured points without the joints"), std::string::npos);
+  EXPECT_NE(points.error().message.find("trammel convert --points"), std::string::npos);
+  const auto neither = parse_batch("q1,q2\n1,2\n", "b.csv");
+  EXPECT_FALSE(neither);
+}
+
+}  // namespace
+}  // namespace trammel
