@@ -39,6 +39,7 @@ int run_command_line(int argc, const char* const* argv) {
       "Exit codes: 0 done, 2 wrong usage, 3 refused data, 4 unreachable or busy service.\n"
       "A file named '-' is standard output.");
   Action chosen;
+  add_plan_command(app, chosen);
   add_pose_commands(app, chosen);
   add_measurement_commands(app, chosen);
   add_structure_commands(app, chosen);

@@ -14,7 +14,8 @@ namespace trammel::cli {
 
 using Action = std::function<Status()>;
 
-void add_pose_commands(CLI::App& app, Action& chosen);         // plan, simulate
+void add_plan_command(CLI::App& app, Action& chosen);
+void add_pose_commands(CLI::App& app, Action& chosen);         // simulate
 void add_measurement_commands(CLI::App& app, Action& chosen);  // convert, references
 void add_structure_commands(CLI::App& app, Action& chosen);    // cpa, deflection
 void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluate, report

@@ -1,6 +1,7 @@
 #include "server/calibrate/circle_point.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 

@@ -1,5 +1,7 @@
 #include "server/measurement/joint_list.h"
 
+#include <algorithm>
+
 #include "server/base/text_file.h"
 #include "server/measurement/csv_table.h"
 #include "server/measurement/pose_check.h"
@@ -30,16 +32,28 @@ Result<JointList> read_joint_csv(const std::string& path) {
 }
 
 std::string to_csv(const JointList& list) {
+  const auto any = [&](const auto& has) { return std::any_of(list.poses.begin(), list.poses.end(), has); };
+  const bool directions = any([](const CommandedPose& pose) { return !pose.context.direction.empty(); });
+  const bool tools = any([](const CommandedPose& pose) { return !pose.context.tool.empty(); });
+  const bool payloads = any([](const CommandedPose& pose) { return !pose.context.payload.empty(); });
+  const std::size_t n = list.joint_types.size();
   std::string text = "pose_id";
-  for (std::size_t j = 0; j < list.joint_types.size(); ++j) {
-    text += ',' + joint_column(static_cast<int>(j), list.joint_types[j]);
-  }
+  for (std::size_t j = 0; j < n; ++j) text += ',' + joint_column(static_cast<int>(j), list.joint_types[j]);
+  for (std::size_t j = 0; directions && j < n; ++j) text += fmt::format(",dir{}", j + 1);
+  if (tools) text += ",tool_id";
+  if (payloads) text += ",payload_id";
   text += '\n';
   for (const CommandedPose& pose : list.poses) {
+    const PoseContext& context = pose.context;
     text += csv_field(pose.pose_id);
-    for (std::size_t j = 0; j < list.joint_types.size(); ++j) {
-      text += ',' + csv_number(joint_to_column(pose.context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
+    for (std::size_t j = 0; j < n; ++j) {
+      text += ',' + csv_number(joint_to_column(context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
     }
+    for (std::size_t j = 0; directions && j < n; ++j) {
+      text += context.direction.empty() ? "," : fmt::format(",{}", context.direction[j]);
+    }
+    if (tools) text += ',' + csv_field(context.tool);
+    if (payloads) text += ',' + csv_field(context.payload);
     text += '\n';
   }
   return text;

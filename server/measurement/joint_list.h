@@ -27,7 +27,7 @@ struct JointList {
 /// Refuses as parse_batch_csv() does.
 [[nodiscard]] Result<JointList> parse_joint_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<JointList> read_joint_csv(const std::string& path);
-/// The list as parse_joint_csv() reads it.
+/// The list as parse_joint_csv() reads it; directions, tools and payloads only where a pose has them.
 [[nodiscard]] std::string to_csv(const JointList& list);
 
 /// The list made ready for `cell`, as batches are: joints counted and held against the robot's limits, tool and payload

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <tuple>
 
-#include "server/base/units.h"
+#include "server/plan/approach.h"
+#include "server/plan/optimal_design.h"
+#include "server/plan/visibility.h"
 
 namespace trammel {
 
@@ -40,29 +43,259 @@ Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint6
 
 namespace {
 
-/// At the robot's believed place: this is a plan, not a measurement.
-bool inside_workspace(const Cell& cell, const JointVector& q) {
-  if (!cell.workspace) return true;
-  const Pose X_FT = cell.tools.begin()->second.value_or(Pose::Identity());
-  const Vector3 p = (cell.robot.flange_pose(q) * X_FT).translation();
-  return (p.array() >= cell.workspace->lower.array()).all() && (p.array() <= cell.workspace->upper.array()).all();
+constexpr int kCandidates = 4000;
+constexpr int kLargestFactor = 512;        // of a hypercube of poses: fewer than 1 in 1000 is refused by then
+constexpr int kLargestDesignFactor = 64;   // of a hypercube of candidates
+constexpr int kCandidatesForEachPose = 4;  // at least
+
+/// What the cell allows: held against every tool that will be used, and every side a pose is approached from.
+class Filter {
+ public:
+  static Result<Filter> of(const Cell& cell, const std::vector<std::string>& tools, std::vector<int> directions) {
+    Filter filter(cell, std::move(directions));
+    for (const std::string& tool : tools) {
+      filter.X_FT_.push_back(cell.tools.at(tool).value_or(Pose::Identity()));
+      Result<Visibility> visibility = Visibility::of(cell, tool);
+      if (!visibility) return tl::make_unexpected(visibility.error());
+      filter.visibility_.push_back(std::move(*visibility));
+    }
+    return filter;
+  }
+
+  /// Counts the candidate; true when it may be planned.
+  bool keeps(const JointVector& q, DrawCount& count) const {
+    ++count.drawn;
+    std::vector<JointVector> visited = {q};
+    for (const int direction : directions_) {
+      const std::optional<JointVector> bump = bump_pose(cell_.robot, q, direction);
+      if (!bump) return ++count.no_way, false;
+      visited.push_back(*bump);
+    }
+    const auto inside = [&](const JointVector& v) { return inside_workspace(v); };
+    if (!std::all_of(visited.begin(), visited.end(), inside)) return ++count.outside, false;
+    const auto sees = [&](const Visibility& visibility) { return visibility.sees(q); };
+    if (!std::all_of(visibility_.begin(), visibility_.end(), sees)) return ++count.unseen, false;
+    return ++count.kept, true;
+  }
+
+ private:
+  Filter(const Cell& cell, std::vector<int> directions) : cell_(cell), directions_(std::move(directions)) {}
+
+  /// At the robot's believed place: this is a plan, not a measurement.
+  bool inside_workspace(const JointVector& q) const {
+    if (!cell_.workspace) return true;
+    const Pose X_BF = cell_.robot.flange_pose(q);
+    return std::all_of(X_FT_.begin(), X_FT_.end(), [&](const Pose& X_FT) {
+      const Vector3 p = X_BF * X_FT.translation();
+      return (p.array() >= cell_.workspace->lower.array()).all() && (p.array() <= cell_.workspace->upper.array()).all();
+    });
+  }
+
+  const Cell& cell_;
+  std::vector<int> directions_;
+  std::vector<Pose> X_FT_;
+  std::vector<Visibility> visibility_;
+};
+
+struct Drawn {
+  std::vector<JointVector> q;
+  DrawCount count;
+};
+
+/// `wanted` joint vectors that the filter keeps, of a Latin hypercube as large as that takes: twice as large each time,
+/// up to `largest_factor`. Refused when even that one keeps fewer than `needed`.
+template <typename Prepare>
+Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed, int largest_factor,
+                   std::uint64_t seed, const Prepare& prepare) {
+  const Result<JointRanges> ranges = planning_ranges(cell);
+  if (!ranges) return tl::make_unexpected(ranges.error());
+  Drawn drawn;
+  for (int factor = 1; factor <= largest_factor && static_cast<int>(drawn.q.size()) < wanted; factor *= 2) {
+    drawn = {};
+    const Eigen::MatrixXd candidates = latin_hypercube(*ranges, wanted * factor, seed);
+    for (Eigen::Index i = 0; i < candidates.rows(); ++i) {
+      JointVector q = candidates.row(i).transpose();
+      if (cell.robot.joint_outside_limits(q)) {
+        ++drawn.count.drawn;
+        ++drawn.count.no_way;
+        continue;
+      }
+      q = prepare(std::move(q));
+      if (filter.keeps(q, drawn.count)) drawn.q.push_back(std::move(q));
+    }
+  }
+  const DrawCount& count = drawn.count;
+  if (count.kept < needed) {
+    return refused(
+        "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the workspace, "
+        "{} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be approached",
+        cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way);
+  }
+  drawn.q.resize(static_cast<std::size_t>(std::min(wanted, count.kept)));
+  return drawn;
+}
+
+Status check_count(const PlanOptions& options) {
+  if (options.count >= 1) return {};
+  return failure(ErrorCode::kUsage, "a plan of {} poses; at least 1 is needed", options.count);
+}
+
+/// All that a plan is made with.
+struct Planning {
+  std::shared_ptr<const Cell> cell;
+  std::vector<std::string> tools, payloads;
+  std::vector<int> directions;  // each pose is approached in all of these
+};
+
+Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<std::string>& asked,
+                                          Result<std::string> (*resolve)(const Cell&, const std::string&)) {
+  std::vector<std::string> names;
+  for (const std::string& name : asked.empty() ? std::vector<std::string>{""} : asked) {
+    const Result<std::string> known = resolve(cell, name);
+    if (!known) return tl::make_unexpected(known.error());
+    names.push_back(*known);
+  }
+  return names;
+}
+
+/// Each pose with every side it is approached from, one after the other; tools and payloads in turn.
+std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector<JointVector>& q) {
+  std::vector<PoseContext> contexts;
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    for (const int direction : planning.directions) {
+      PoseContext context;
+      context.q = q[i];
+      context.direction.assign(static_cast<std::size_t>(q[i].size()), direction);
+      context.tool = planning.tools[i % planning.tools.size()];
+      context.payload = planning.payloads[i / planning.tools.size() % planning.payloads.size()];
+      contexts.push_back(std::move(context));
+    }
+  }
+  return contexts;
+}
+
+std::vector<PlannedPose> planned(const Planning& planning, std::vector<PoseContext> contexts) {
+  const std::size_t sides = planning.directions.size();
+  std::vector<std::size_t> order(contexts.size() / sides);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const PoseContext& left = contexts[a * sides];
+    const PoseContext& right = contexts[b * sides];
+    return std::tie(left.tool, left.payload) < std::tie(right.tool, right.payload);
+  });
+  std::vector<PlannedPose> poses;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    for (std::size_t side = 0; side < sides; ++side) {
+      PlannedPose pose;
+      const int direction = planning.directions[side];
+      pose.id = fmt::format("{}{}", i + 1, sides == 1 ? "" : direction > 0 ? "+" : "-");
+      pose.context = std::move(contexts[order[i] * sides + side]);
+      pose.context.index = static_cast<int>(poses.size());
+      const Chain& robot = planning.cell->robot;
+      pose.bump = on_program_grid(robot, bump_pose(robot, pose.context.q, direction).value());
+      poses.push_back(std::move(pose));
+    }
+  }
+  return poses;
+}
+
+Result<CausePair> pair_of(const Planning& planning, const PlanOptions& options) {
+  if (options.criterion == PlanCriterion::kSeparation) {
+    return make_cause_pair(planning.cell, options.cause, options.other);
+  }
+  Result<PhysicalModel> model = make_physical_model(planning.cell, planning.cell->model.error_sources);
+  if (!model) return tl::make_unexpected(model.error());
+  if (model->parameter_count() == 0) return refused("cell {}: its model has no error sources", planning.cell->name);
+  model->values = planning_values(*model);
+  return CausePair{std::move(*model), "", "", {}, {}};
+}
+
+Plan::Separation separation_of(const CausePair& pair, const Separability& plan, const Separability& latin_hypercube,
+                               const Separability& candidates) {
+  Plan::Separation separation{plan, latin_hypercube, candidates, {}, ""};
+  const auto shows = [](const ParameterSeparation& parameter) { return parameter.effect > 0; };
+  const bool any_shows = std::any_of(candidates.parameters.begin(), candidates.parameters.end(), shows);
+  for (const ParameterSeparation& parameter : candidates.parameters) {
+    // The order of a gear's error shows only once its amplitude is known: nothing to ask for.
+    if (any_shows && !shows(parameter)) continue;
+    const bool told = parameter.strength >= kLeastStrength && parameter.share >= kLeastShare;
+    if (!told) separation.hopeless.push_back(parameter.parameter);
+  }
+  if (!separation.hopeless.empty()) separation.needs = what_would_separate(pair.cause, pair.other);
+  return separation;
+}
+
+/// Chooses among `candidates`; `latin_hypercube` is what to compare with.
+Result<Plan> designed(const Planning& planning, const PlanOptions& options, const Drawn& candidates,
+                      const Drawn& latin_hypercube) {
+  const Result<CausePair> pair = pair_of(planning, options);
+  if (!pair) return tl::make_unexpected(pair.error());
+  const int sides = static_cast<int>(planning.directions.size());
+  const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
+  const DesignCandidates rows = design_candidates(pair->model, contexts, options.orientation, sides);
+  const Eigen::Index P = rows.rows.cols();
+  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(P, P);
+  const Result<Design> design = optimal_design(rows, prior, options.count, pair->rest);
+  if (!design) return tl::make_unexpected(design.error());
+
+  std::vector<PoseContext> chosen;
+  for (const std::size_t i : design->chosen) {
+    const auto first = contexts.begin() + static_cast<std::ptrdiff_t>(i) * sides;
+    chosen.insert(chosen.end(), first, first + sides);
+  }
+  const Eigen::MatrixXd evenly =
+      information_of(pair->model, contexts_of(planning, latin_hypercube.q), options.orientation);
+  Plan plan;
+  plan.draw = candidates.count;
+  plan.criterion = design->criterion;
+  plan.criterion_of_latin_hypercube = log_det(prior + evenly);
+  if (options.criterion == PlanCriterion::kSeparation) {
+    plan.criterion_of_latin_hypercube -= log_det((prior + evenly)(pair->rest, pair->rest));
+    const auto told = [&](const Eigen::MatrixXd& information) { return separability(*pair, information); };
+    plan.separation = separation_of(*pair, told(information_of(pair->model, chosen, options.orientation)), told(evenly),
+                                    told(rows.rows.transpose() * rows.rows));
+  }
+  plan.poses = planned(planning, std::move(chosen));
+  return plan;
 }
 
 }  // namespace
 
 Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options) {
-  if (options.count < 1) return failure(ErrorCode::kUsage, "a plan of {} poses; at least 1 is needed", options.count);
-  const Result<JointRanges> ranges = planning_ranges(cell);
-  if (!ranges) return tl::make_unexpected(ranges.error());
-  for (int factor = 1; factor <= 1000; factor *= 2) {
-    const Eigen::MatrixXd candidates = latin_hypercube(*ranges, options.count * factor, options.seed);
-    std::vector<Eigen::Index> kept;
-    for (Eigen::Index i = 0; i < candidates.rows() && static_cast<int>(kept.size()) < options.count; ++i) {
-      if (inside_workspace(cell, candidates.row(i).transpose())) kept.push_back(i);
-    }
-    if (static_cast<int>(kept.size()) == options.count) return Eigen::MatrixXd(candidates(kept, Eigen::all));
+  if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
+  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {});
+  if (!filter) return tl::make_unexpected(filter.error());
+  const Result<Drawn> drawn =
+      draw(cell, *filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; });
+  if (!drawn) return tl::make_unexpected(drawn.error());
+  Eigen::MatrixXd q(options.count, cell.robot.size());
+  for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = drawn->q[static_cast<std::size_t>(i)].transpose();
+  return q;
+}
+
+Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
+  if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
+  const auto tools = resolved(*cell, options.tools, resolve_tool);
+  if (!tools) return tl::make_unexpected(tools.error());
+  const auto payloads = resolved(*cell, options.payloads, resolve_payload);
+  if (!payloads) return tl::make_unexpected(payloads.error());
+  const Planning planning{cell, *tools, *payloads,
+                          options.bidirectional ? std::vector<int>{-1, 1} : std::vector<int>{-1}};
+  const Result<Filter> filter = Filter::of(*cell, planning.tools, planning.directions);
+  if (!filter) return tl::make_unexpected(filter.error());
+  const auto drawn = [&](int wanted, int largest_factor) {
+    return draw(*cell, *filter, wanted, options.count, largest_factor, options.seed,
+                [&](JointVector q) { return on_program_grid(cell->robot, std::move(q)); });
+  };
+  const Result<Drawn> latin_hypercube = drawn(options.count, kLargestFactor);
+  if (!latin_hypercube) return tl::make_unexpected(latin_hypercube.error());
+  if (options.criterion == PlanCriterion::kLatinHypercube) {
+    return Plan{planned(planning, contexts_of(planning, latin_hypercube->q)), latin_hypercube->count, 0, 0, {}};
   }
-  return refused("cell {}: fewer than 1 in 1000 poses of the joint ranges lies in the workspace", cell.name);
+  const Result<Drawn> candidates =
+      drawn(std::max(kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor);
+  if (!candidates) return tl::make_unexpected(candidates.error());
+  return designed(planning, options, *candidates, *latin_hypercube);
 }
 
 }  // namespace trammel

@@ -13,10 +13,11 @@
 namespace trammel {
 
 struct Tracker {
-  double sigma = 13e-6;            ///< m, one measurement, one axis
-  double sigma_rotation = 61e-6;   ///< rad, one measurement, one axis
-  std::optional<Vector3> p_W;      ///< where it stands, for visibility
-  std::optional<double> aperture;  ///< rad, half angle in which the target is seen
+  double sigma = 13e-6;                        ///< m, one measurement, one axis
+  double sigma_rotation = 61e-6;               ///< rad, one measurement, one axis
+  std::optional<Vector3> p_W;                  ///< where it stands, for visibility
+  std::optional<double> aperture;              ///< rad, half angle in which the target is seen
+  Vector3 target_normal_T = Vector3::UnitZ();  ///< where the target looks, unit vector in T
 };
 
 /// What to identify and what to learn. Sources as spelled on the command line: `geometry`, `gear_transmission:3`.

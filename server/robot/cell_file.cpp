@@ -68,14 +68,23 @@ Pose read_pose(const YamlMap& map) {
 namespace {
 
 Tracker read_tracker(const YamlMap& map) {
-  map.only({"sigma_mm", "sigma_deg", "xyz_mm", "aperture_deg"});
+  map.only({"sigma_mm", "sigma_deg", "xyz_mm", "aperture_deg", "target_normal"});
   Tracker tracker;
   tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
   tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
   if (tracker.sigma <= 0) map.refuse("sigma_mm", "must be above 0");
   if (tracker.sigma_rotation <= 0) map.refuse("sigma_deg", "must be above 0");
   if (!map.is_null("xyz_mm")) tracker.p_W = read_vector(map, "xyz_mm") * from_mm(1);
-  if (map.has("aperture_deg")) tracker.aperture = from_deg(map.number("aperture_deg"));
+  if (map.has("aperture_deg")) {
+    tracker.aperture = from_deg(map.number("aperture_deg"));
+    if (!(*tracker.aperture > 0 && *tracker.aperture <= kPi))
+      map.refuse("aperture_deg", "must be above 0, at most 180");
+  }
+  if (map.has("target_normal")) {
+    tracker.target_normal_T = read_vector(map, "target_normal");
+    if (tracker.target_normal_T.norm() < 1e-9) map.refuse("target_normal", "a direction of length 0");
+    tracker.target_normal_T.normalize();
+  }
   return tracker;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <random>
 
 #include "server/base/units.h"
@@ -45,8 +46,6 @@ Chain perturbed(const Chain& nominal, std::uint64_t seed) {
 
 /// Where a point of link `joint` (its frame as the row leaves it) stands in B.
 Vector3 point_of_link(const Chain& chain, const JointVector& q, int joint, const Vector3& p) {
-  std::vector<Joint> joints;
-  for (int i = 0; i <= joint; ++i) joints.push_back(chain.joint(i));
   Pose X = Pose::Identity();
   const std::vector<LinkGeometry> links = chain.links_at(q);
   for (int i = 0; i <= joint; ++i) {
@@ -194,7 +193,6 @@ TEST(CirclePoint, StatesUncertaintiesThatHold) {
   for (const Campaign& campaign : {narrow, broad}) {
     for (const CirclePointOptions& options : {CirclePointOptions{}, CirclePointOptions{.sigma = 10e-6}}) {
       const double share = share_within_u(campaign, options);
-      RecordProperty("share_within_u", std::to_string(share));
       EXPECT_GT(share, 0.92) << options.sigma.value_or(0);
       EXPECT_LT(share, 0.997) << options.sigma.value_or(0);
     }

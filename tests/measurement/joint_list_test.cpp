@@ -43,6 +43,14 @@ TEST(JointList, WhatIsWrittenReadsBackTheSame) {
   EXPECT_EQ(to_csv(*list), text);
 }
 
+TEST(JointList, WritesWhatIsKnownOfEachPose) {
+  const std::string text =
+      "pose_id,q1_mm,q2_deg,dir1,dir2,tool_id,payload_id\n1,1500,45.25,-1,1,hook,full\n2,0,-90,0,-1,,empty\n";
+  const auto list = parse_joint_csv(text, "j.csv");
+  ASSERT_TRUE(list) << list.error().message;
+  EXPECT_EQ(to_csv(*list), text);
+}
+
 TEST(JointList, ResolvesTheOnlyTool) {
   const auto list = check_against_cell(parse_joint_csv("q1_mm,q2_deg\n1,2\n", "j.csv").value(), cell());
   ASSERT_TRUE(list) << list.error().message;

@@ -1,0 +1,44 @@
+#include "server/plan/approach.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/check.h"
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kBumpAngle = from_deg(5);
+constexpr double kBumpLength = from_mm(50);
+constexpr double kLeastShare = 0.2;  // of a bump
+constexpr double kGrid = 1e-4;       // deg, mm
+
+}  // namespace
+
+std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, int direction) {
+  TRAMMEL_CHECK(direction == 1 || direction == -1);
+  JointVector bump = q;
+  for (int j = 0; j < robot.size(); ++j) {
+    const Joint& joint = robot.joint(j);
+    const double way = joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
+    bump(j) = std::clamp(q(j) - direction * way, joint.lower, joint.upper);
+    if (std::abs(bump(j) - q(j)) < kLeastShare * way) return std::nullopt;
+  }
+  return bump;
+}
+
+JointVector on_program_grid(const Chain& robot, JointVector q) {
+  for (int j = 0; j < robot.size(); ++j) {
+    const Joint& joint = robot.joint(j);
+    const double step = joint.type == JointType::kRevolute ? from_deg(kGrid) : from_mm(kGrid);
+    double steps = std::round(q(j) / step);
+    if (steps * step > joint.upper) steps = std::floor(joint.upper / step);
+    if (steps * step < joint.lower) steps = std::ceil(joint.lower / step);
+    q(j) = steps * step;
+  }
+  return q;
+}
+
+}  // namespace trammel

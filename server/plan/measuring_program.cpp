@@ -1,0 +1,167 @@
+#include "server/plan/measuring_program.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr std::size_t kRapidName = 32;
+constexpr std::size_t kKrlName = 24;
+constexpr int kKrlTools = 16;
+constexpr std::size_t kLineLength = 80;
+
+bool is_name(const std::string& text, std::size_t longest) {
+  const auto allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
+  return !text.empty() && text.size() <= longest && std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
+         std::all_of(text.begin(), text.end(), allowed);
+}
+
+/// A prefix keeps it clear of reserved words and of the names inside.
+std::string module_name(const std::string& name) {
+  std::string text = "T_" + name;
+  for (char& c : text) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return text.substr(0, kRapidName);
+}
+
+/// Text that may stand in a comment: one line of plain letters, of the length that controllers take.
+std::string comment(const std::string& sign, std::string text) {
+  for (char& c : text) {
+    if (c < ' ' || c > '~') c = '_';
+  }
+  return (sign + " " + text).substr(0, kLineLength - 4);
+}
+
+/// Which joints are the six axes and which is the rail.
+struct Axes {
+  std::vector<int> turning;
+  std::optional<int> rail;
+};
+
+Result<Axes> axes_of(const Chain& robot, const ProgramOptions& options) {
+  Axes axes;
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type == JointType::kRevolute) {
+      axes.turning.push_back(j);
+    } else if (!axes.rail && (j == 0 || j + 1 == robot.size())) {
+      axes.rail = j;
+    } else {
+      return refused("robot {}: joint {} is prismatic; a program holds six turning axes and one rail before or after",
+                     robot.name(), j + 1);
+    }
+  }
+  if (axes.turning.size() != 6) {
+    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size());
+  }
+  if (!(options.wait_s >= 0 && std::isfinite(options.wait_s))) {
+    return refused("a wait of {} s at each pose; expected 0 or more", options.wait_s);
+  }
+  return axes;
+}
+
+/// Four decimals, and never a minus before nothing.
+std::string number(double value) {
+  std::string text = fmt::format("{:.4f}", value);
+  if (text.find_first_not_of("-0.") == std::string::npos) return "0";
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+/// What must be on the robot before this pose can be measured; empty where it is on it already.
+std::string change_before(const Plan& plan, std::size_t i) {
+  const PoseContext& now = plan.poses[i].context;
+  if (i == 0) return "";
+  const PoseContext& before = plan.poses[i - 1].context;
+  if (before.tool == now.tool && before.payload == now.payload) return "";
+  return fmt::format("now tool {}, payload {}", now.tool, now.payload.empty() ? "none" : now.payload);
+}
+
+std::string rapid_target(const std::string& name, const Axes& axes, const JointVector& q) {
+  std::vector<std::string> degrees;
+  for (const int j : axes.turning) degrees.push_back(number(to_deg(q(j))));
+  const std::string rail = axes.rail ? number(to_mm(q(*axes.rail))) : "9E9";
+  return fmt::format("  CONST jointtarget {}:=\n    [[{}],\n    [{},9E9,9E9,9E9,9E9,9E9]];\n", name,
+                     fmt::join(degrees, ","), rail);
+}
+
+std::string krl_motion(const Axes& axes, const JointVector& q) {
+  std::vector<std::string> values;
+  for (std::size_t k = 0; k < axes.turning.size(); ++k) {
+    values.push_back(fmt::format("A{} {}", k + 1, number(to_deg(q(axes.turning[k])))));
+  }
+  if (axes.rail) values.push_back("E1 " + number(to_mm(q(*axes.rail))));
+  return fmt::format("  PTP {{{}}}\n", fmt::join(values, ","));
+}
+
+}  // namespace
+
+Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
+  const Result<Axes> axes = axes_of(robot, options);
+  if (!axes) return tl::make_unexpected(axes.error());
+  if (!is_name(options.rapid_tool, kRapidName)) {
+    return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most", options.rapid_tool,
+                   kRapidName);
+  }
+  std::string text = fmt::format("MODULE {}\n", module_name(options.name));
+  text += "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text += fmt::format("  CONST num trammel_wait:={:g};\n", options.wait_s);
+  text += "  CONST speeddata trammel_fast:=[200,20,200,20];\n";
+  text += "  CONST speeddata trammel_slow:=[20,2,20,2];\n";
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    text += rapid_target(fmt::format("trammel_b{}", i + 1), *axes, plan.poses[i].bump);
+    text += rapid_target(fmt::format("trammel_p{}", i + 1), *axes, plan.poses[i].context.q);
+  }
+  text += "\n  PROC trammel_measure()\n";
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    if (const std::string change = change_before(plan, i); !change.empty()) {
+      text += "    " + comment("!", change) + "\n    Stop;\n";
+    }
+    text += "    " + comment("!", "pose " + plan.poses[i].id) + "\n";
+    text += fmt::format("    MoveAbsJ trammel_b{}\\NoEOffs,trammel_fast,fine,{};\n", i + 1, options.rapid_tool);
+    text += fmt::format("    MoveAbsJ trammel_p{}\\NoEOffs,trammel_slow,fine,{};\n", i + 1, options.rapid_tool);
+    text += "    WaitTime \\InPos,trammel_wait;\n";
+  }
+  return text + "  ENDPROC\nENDMODULE\n";
+}
+
+Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
+  const Result<Axes> axes = axes_of(robot, options);
+  if (!axes) return tl::make_unexpected(axes.error());
+  if (options.krl_tool < 0 || options.krl_tool > kKrlTools) {
+    return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools);
+  }
+  if (!is_name(options.name, kKrlName)) {
+    return refused("KRL program '{}': expected a letter, then letters, digits or '_', {} at most, as its file is named",
+                   options.name, kKrlName);
+  }
+  std::string text = fmt::format("&ACCESS RVP\n&REL 1\nDEF {} ( )\n", options.name);
+  text += "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
+  text += "  EXT BAS (BAS_COMMAND :IN,REAL :IN)\n";
+  text += "  DECL REAL TRAMMEL_WAIT\n";
+  text += "  BAS (#INITMOV,0)\n";
+  text += fmt::format("  BAS (#TOOL,{})\n", options.krl_tool);
+  text += "  BAS (#BASE,0)\n";
+  text += "  BAS (#ACC_PTP,20)\n";
+  text += fmt::format("  TRAMMEL_WAIT={:g}\n", options.wait_s);
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    if (const std::string change = change_before(plan, i); !change.empty()) {
+      text += "  " + comment(";", change) + "\n  HALT\n";
+    }
+    text += "  " + comment(";", "pose " + plan.poses[i].id) + "\n";
+    text += "  BAS (#VEL_PTP,20)\n" + krl_motion(*axes, plan.poses[i].bump);
+    text += "  BAS (#VEL_PTP,2)\n" + krl_motion(*axes, plan.poses[i].context.q);
+    text += "  WAIT SEC TRAMMEL_WAIT\n";
+  }
+  return text + "END\n";
+}
+
+}  // namespace trammel

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+#include "server/base/result.h"
+#include "server/plan/plan.h"
+
+/// A plan as a program that the robot's own controller runs: for each pose fast to the pose it is approached from,
+/// slowly to the pose, and wait there until the arm is still and measured (source section 3.2.4.2). Joints are the
+/// robot's commanded values, degrees (mm for a rail) with four decimals. The program stops where tool or payload must
+/// be changed by hand.
+namespace trammel {
+
+struct ProgramOptions {
+  std::string name = "measure";      ///< of the program, as its file's without the ending
+  double wait_s = 5;                 ///< at each pose
+  std::string rapid_tool = "tool0";  ///< a tooldata that the controller has: its load makes the moves safe
+  int krl_tool = 0;                  ///< number in $TOOL_DATA; 0 is the flange
+};
+
+/// ABB RAPID: a module `T_name` (letters that RAPID does not take become `_`) of jointtargets and MoveAbsJ. A rail that
+/// comes before or after the six axes is eax_a in mm. Refuses a robot that is not six turning joints with at most one
+/// rail at either end, a tool name that is no RAPID identifier (32 letters, digits or `_`, a letter first), and a wait
+/// that is negative or not finite.
+[[nodiscard]] Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const ProgramOptions& options);
+
+/// KUKA KRL: a .src of PTP motions. A rail is E1 in mm. Refuses as to_rapid(), a tool number outside 0 to 16, and a
+/// name that is no KRL name (24 letters, digits or `_`, a letter first), because it must be the file's.
+[[nodiscard]] Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOptions& options);
+
+}  // namespace trammel

@@ -1,0 +1,108 @@
+#include "server/plan/approach.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "server/base/units.h"
+#include "server/plan/plan.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+TEST(Approach, TheBumpIsFiveDegreesOnTheSideTheJointsComeFrom) {
+  const Chain robot = test::cell_7()->robot;
+  const JointVector q = JointVector::Constant(6, 0.1);
+  EXPECT_TRUE(bump_pose(robot, q, -1)->isApprox(JointVector::Constant(6, 0.1 + from_deg(5))));
+  EXPECT_TRUE(bump_pose(robot, q, 1)->isApprox(JointVector::Constant(6, 0.1 - from_deg(5))));
+}
+
+TEST(Approach, TheBumpStaysWithinTheLimitsAndLeavesEnoughWay) {
+  const Chain robot = test::cell_7()->robot;
+  JointVector q = JointVector::Zero(6);
+  q(1) = from_deg(83);  // 2 deg below its limit
+  EXPECT_NEAR((*bump_pose(robot, q, -1))(1), from_deg(85), 1e-12);
+  EXPECT_NEAR((*bump_pose(robot, q, 1))(1), from_deg(78), 1e-12);
+  q(1) = from_deg(84.5);
+  EXPECT_FALSE(bump_pose(robot, q, -1));
+  EXPECT_TRUE(bump_pose(robot, q, 1));
+}
+
+TEST(Approach, TheProgramGridNeverLeavesTheLimits) {
+  Joint joint;
+  joint.lower = from_deg(-10.00004);
+  joint.upper = from_deg(10.00006);
+  const Chain robot = Chain::make("one", {joint}).value();
+  const auto on_grid = [&](double deg) {
+    return to_deg(on_program_grid(robot, JointVector::Constant(1, from_deg(deg)))(0));
+  };
+  EXPECT_NEAR(on_grid(3.141592), 3.1416, 1e-10);
+  EXPECT_NEAR(on_grid(10.00006), 10.0, 1e-10);
+  EXPECT_NEAR(on_grid(-10.00004), -10.0, 1e-10);
+}
+
+/// The side each joint really comes from, seen from the two poses of a plan.
+void expect_directions_are_those_of_the_bump(const Cell& cell, const Plan& plan) {
+  for (const PlannedPose& pose : plan.poses) {
+    EXPECT_FALSE(cell.robot.joint_outside_limits(pose.bump));
+    ASSERT_EQ(pose.context.direction.size(), 6u);
+    for (int j = 0; j < 6; ++j) {
+      const double way_deg = to_deg(pose.context.q(j) - pose.bump(j));
+      EXPECT_EQ(pose.context.direction[static_cast<std::size_t>(j)], way_deg > 0 ? 1 : -1);
+      EXPECT_GE(std::abs(way_deg), 0.999);
+      EXPECT_LE(std::abs(way_deg), 5.001);
+    }
+  }
+}
+
+TEST(Approach, APlanComesFromAboveUnlessItIsBidirectional) {
+  const auto cell = test::cell_7();
+  PlanOptions options{40, 7};
+  const Plan plan = make_plan(cell, options).value();
+  ASSERT_EQ(plan.poses.size(), 40u);
+  expect_directions_are_those_of_the_bump(*cell, plan);
+  for (const PlannedPose& pose : plan.poses) EXPECT_EQ(pose.context.direction[0], -1);
+
+  options.bidirectional = true;
+  const Plan both = make_plan(cell, options).value();
+  ASSERT_EQ(both.poses.size(), 80u);
+  expect_directions_are_those_of_the_bump(*cell, both);
+  std::set<std::string> ids;
+  for (std::size_t i = 0; i < both.poses.size(); ++i) ids.insert(both.poses[i].id);
+  EXPECT_EQ(ids.size(), 80u);
+  for (std::size_t i = 0; i < both.poses.size(); i += 2) {
+    EXPECT_EQ(both.poses[i].context.q, both.poses[i + 1].context.q);
+    EXPECT_EQ(both.poses[i].context.direction[3], -both.poses[i + 1].context.direction[3]);
+  }
+}
+
+TEST(Approach, TheArmStaysInTheWorkspaceOnTheWay) {
+  Cell cell = *test::cell_7();
+  cell.workspace = Workspace{{0, -1.4, 0.8}, {2, 1.4, 3.2}};
+  const Plan plan = make_plan(std::make_shared<const Cell>(cell), {40, 1}).value();
+  for (const PlannedPose& pose : plan.poses) {
+    for (const JointVector& q : {pose.context.q, pose.bump}) {
+      const Vector3 p = (cell.robot.flange_pose(q) * *cell.tools.at("spindle")).translation();
+      EXPECT_TRUE((p.array() >= cell.workspace->lower.array() - 1e-5).all() &&
+                  (p.array() <= cell.workspace->upper.array() + 1e-5).all());
+    }
+  }
+  EXPECT_GT(plan.draw.outside, 0);
+}
+
+TEST(Approach, SeveralPayloadsComeInTurnAndTogether) {
+  Cell cell = *test::cell_7();
+  cell.payloads["empty"] = Payload{};
+  PlanOptions options{20, 1};
+  const auto shared = std::make_shared<const Cell>(cell);
+  EXPECT_FALSE(make_plan(shared, options)) << "which payload?";
+  options.payloads = {"spindle", "empty"};
+  const Plan plan = make_plan(shared, options).value();
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(plan.poses[i].context.payload, i < 10 ? "empty" : "spindle");
+  options.payloads = {"anvil"};
+  EXPECT_FALSE(make_plan(shared, options));
+}
+
+}  // namespace
+}  // namespace trammel
