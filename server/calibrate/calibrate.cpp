@@ -243,7 +243,9 @@ double log_likelihood(const Residuals& r, const Weights& weights, double sigma_r
   double sum = 0;
   const auto add = [&](const auto& residual, double sigma, double discrepancy) {
     const double variance = sigma * sigma + discrepancy * discrepancy;
-    sum -= 0.5 * residual.squaredNorm() / variance + 1.5 * std::log(2 * kPi * variance);
+    // A suspect counts as far off, not as proof against the model.
+    const double square = std::min(residual.squaredNorm() / variance, kSuspect * kSuspect);
+    sum -= 0.5 * square + 1.5 * std::log(2 * kPi * variance);
   };
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) add(r.position.col(i), r.sigma(i), weights.discrepancy);
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {

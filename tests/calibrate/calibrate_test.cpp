@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
+#include "server/plan/plan.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -142,6 +143,95 @@ TEST(Calibrate, WeighsAPointByItsOwnSigma) {
     m.p_W += 1e-3 * Vector3(std::sin(double(i)), std::cos(2.0 * double(i)), std::sin(3.0 * double(i)));
   }
   EXPECT_LE(validation_rms_mm(*calibrate(cell, kM3, batch, {}), measured(robot, 300, 13)), 0.0255);
+}
+
+TEST(Calibrate, ListsABadPoseAndIsNotPulledByIt) {
+  const auto cell = cell_7();
+  const VirtualRobot robot = chapter_5_robot(cell);
+  MeasurementBatch batch = measured(robot, 120, 15);
+  batch.measurements[40].p_W += Vector3(0, 0.4e-3, 0);
+  const Result<CalibrationResult> result = calibrate(cell, kM3, batch, {});
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->suspects.size(), 1u);
+  EXPECT_EQ(result->suspects[0].pose_id, batch.measurements[40].pose_id);
+  EXPECT_NEAR(to_mm(result->suspects[0].distance), 0.4, 0.06);
+  EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 16)), 0.0245);
+  EXPECT_TRUE(calibrate(cell, kM3, measured(robot, 120, 15), {})->suspects.empty());
+}
+
+TEST(Calibrate, FindsTheOrdersOfGearsItWasNotTold) {
+  const auto cell = cell_7();
+  VirtualRobot robot = chapter_5_robot(cell);
+  PhysicalModel geared = *make_physical_model(
+      cell, {"base", "geometry", "compliance_linear", "gear_transmission:1@63.4", "gear_transmission:4@28.7"});
+  geared.values.head(36 - 6) = robot.truth.values.head(36 - 6);
+  geared.values.tail(6) = robot.truth.values.tail(6);
+  geared.values.segment(30, 6) << 63.4, 3e-5, -2e-5, 28.7, 4e-5, 5e-5;
+  robot.truth = geared;
+  const Result<CalibrationResult> result =
+      calibrate(cell, {"base", "geometry", "compliance_linear", "gear_transmission:1", "gear_transmission:4"},
+                measured(robot, 200, 17), {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_NEAR(parameter(*result, "order1").value, 63.4, 0.1);
+  EXPECT_NEAR(parameter(*result, "order4").value, 28.7, 0.1);
+  EXPECT_NEAR(parameter(*result, "gear_sin1").value, 3e-5, 4e-6);
+  EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 18)), 0.0255);
+}
+
+TEST(Calibrate, TellsTwoToolsAndTwoPayloadsApartInOneBatch) {
+  auto cell = std::make_shared<Cell>(*cell_7());
+  cell->tools["probe"] = make_pose(rotation_exp({0.2, -0.4, 0.1}), {-0.05, 0.12, 0.22});
+  cell->payloads["light"] = Payload{30, {0, 0.02, 0.05}};
+  VirtualRobot robot = chapter_5_robot(cell);
+  robot.truth.tools["probe"].translation() += Vector3(0.8e-3, -0.5e-3, 0.3e-3);  // the probe was bent
+  MeasurementBatch batch;
+  batch.id = "two";
+  const Eigen::MatrixXd q = latin_hypercube(*planning_ranges(*cell), 240, 19);
+  std::vector<PoseContext> poses(240);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].q = q.row(static_cast<Eigen::Index>(i)).transpose();
+    poses[i].tool = i % 2 == 0 ? "spindle" : "probe";
+    poses[i].payload = i % 3 == 0 ? "spindle" : "light";
+  }
+  batch = *simulate(robot, poses, {});
+  batch.id = "two";
+  const Result<CalibrationResult> result =
+      calibrate(cell, {"base", "geometry", "compliance_linear", "tool", "payload"}, batch, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LE(to_mm(result->rms), 0.0235);
+  // What two tools share is the last link's; their difference is known.
+  EXPECT_NEAR(parameter(*result, "tx[probe]").value - parameter(*result, "tx[spindle]").value, 0.8e-3, 2e-5);
+  EXPECT_NEAR(parameter(*result, "ty[probe]").value - parameter(*result, "ty[spindle]").value, -0.5e-3, 2e-5);
+  // One mass scales the compliances; two masses leave their ratio known: neither may be off alone.
+  EXPECT_NEAR(parameter(*result, "mass[light]").value / 30, parameter(*result, "mass[spindle]").value / 100, 0.01);
+}
+
+TEST(Calibrate, RefitsTheToolAndLeavesTheRobotAlone) {
+  const auto cell = cell_7();
+  VirtualRobot robot = chapter_5_robot(cell);
+  const CalibrationResult first =
+      *calibrate(cell, {"base", "geometry", "compliance_linear", "tool"}, measured(robot, 200, 20), {});
+  robot.truth.tools["spindle"].translation() += Vector3(1e-3, -2e-3, 0.5e-3);  // another tool of the same kind
+  const Result<CalibrationResult> second = refit(first.model, measured(robot, 15, 21), {"tool"});
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_LE(validation_rms_mm(*second, measured(robot, 300, 22)), 0.030);
+  for (const IdentifiedParameter& p : second->parameters) {
+    if (p.parameter.name.starts_with("t")) continue;
+    EXPECT_NEAR(p.value, parameter(first, p.parameter.name).value, 1e-9) << p.parameter.name;
+  }
+  EXPECT_FALSE(refit(first.model, measured(robot, 15, 21), {"payload"}));
+}
+
+TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {
+  const auto cell = cell_7();
+  const MeasurementBatch batch = measured(chapter_5_robot(cell), 30, 23);
+  const std::pair<const char*, const char*> lacking[] = {
+      {"thermal_growth", "temperature_c"}, {"tracker_drift", "time_s"}, {"backlash:2", "dir2"}, {"time_lag", "time_s"}};
+  for (const auto& [spec, column] : lacking) {
+    const Result<CalibrationResult> result = calibrate(cell, {"base", spec}, batch, {});
+    ASSERT_FALSE(result) << spec;
+    EXPECT_NE(result.error().message.find(column), std::string::npos) << result.error().message;
+  }
 }
 
 TEST(Calibrate, RefusesWhatCannotBeFound) {
