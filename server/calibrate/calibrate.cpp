@@ -22,7 +22,9 @@ constexpr double kHuberPosition = 4.03;   // norm that 1 in 1000 exceeds, 3 norm
 constexpr double kHuberPose = 4.74;       // the same, 6 axes
 constexpr double kSuspect = 5.5;          // norm of 3 axes that 1 in 10^6 exceeds
 constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation, at most, is left of what was not known
-constexpr double kHeld = 1e-9;            // of the priors of sources that are not to change
+// Of the priors of sources that are not to change: nothing any data could move, and numbers that the solver keeps
+// digits of.
+constexpr double kHeld = 1e-4;
 constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 /// Standard deviations with which residuals are weighed: the measurement's and, on top, the model's own.
