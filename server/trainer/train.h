@@ -27,4 +27,13 @@ struct TrainOptions {
 [[nodiscard]] Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const MeasurementBatch& batch,
                                              const TrainOptions& options);
 
+/// What `physics` leaves over of the measured positions, in B: what a bias is learned from.
+[[nodiscard]] BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch);
+
+/// `calibrated` with a bias learned anew from what its physics leaves over of `batch`, whose poses become its domain:
+/// calibrated wherever the robot reaches, learned where it works. Of `options` only bias, seed, trained_at and progress
+/// matter. Refusals as train().
+[[nodiscard]] Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const MeasurementBatch& batch,
+                                                  const TrainOptions& options);
+
 }  // namespace trammel
