@@ -8,6 +8,13 @@ namespace {
 
 using nlohmann::ordered_json;
 
+std::string figures_line(const char* level, const ErrorFigures& figures) {
+  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms), to_mm(figures.mean),
+                     to_mm(figures.p997), to_mm(figures.max));
+}
+
+}  // namespace
+
 ordered_json figures_json(const ErrorFigures& figures) {
   ordered_json axes;
   for (int k = 0; k < 3; ++k) {
@@ -20,13 +27,6 @@ ordered_json figures_json(const ErrorFigures& figures) {
           {"max_mm", to_mm(figures.max)},
           {"axis", axes}};
 }
-
-std::string figures_line(const char* level, const ErrorFigures& figures) {
-  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms), to_mm(figures.mean),
-                     to_mm(figures.p997), to_mm(figures.max));
-}
-
-}  // namespace
 
 std::string evaluation_table(const Evaluation& evaluation) {
   return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +

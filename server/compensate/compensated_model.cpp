@@ -15,7 +15,8 @@ constexpr double kRangeMargin = 0.05;           // of a joint's training range, 
 constexpr double kInterval95 = 1.959963984540;  // standard deviations
 constexpr double kRotationTolerance = 1e-7;     // rad, of a corrected target
 
-/// |e| of all columns and their axes. `e_B`: 3 x N, m, not empty.
+}  // namespace
+
 ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
   const auto n = e_B.cols();
   TRAMMEL_CHECK(n > 0);
@@ -36,8 +37,6 @@ ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
   }
   return figures;
 }
-
-}  // namespace
 
 std::string_view to_string(CorrectionStatus status) {
   switch (status) {

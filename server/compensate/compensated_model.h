@@ -19,6 +19,8 @@ struct ErrorFigures {
   double rms = 0, mean = 0, p997 = 0, max = 0;
   Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
 };
+/// Of the errors in the columns of `e_B` (3 x N, m, not empty).
+[[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
 
 /// The three levels of one model on one set of poses.
 struct Evaluation {
@@ -115,7 +117,8 @@ class CompensatedModel {
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
   /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty. Poses of another
-  /// batch than the model's own are met as served: what began at a pose has happened, what the tracker did does not count.
+  /// batch than the model's own are met as served: what began at a pose has happened, what the tracker did does not
+  /// count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:

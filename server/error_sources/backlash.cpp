@@ -33,13 +33,10 @@ class Backlash final : public ErrorSource {
     const ArmKinematics kinematics(state);
     const double torque = kinematics.gravity_torque()(joint_);
     if (jacobian != nullptr) {
-      const Eigen::RowVectorXd torque_change =
-          kinematics.gravity_torque_jacobian().row(joint_) * jacobian->matrix.leftCols(first_column);
+      const double rate = direction * values(1) * std::copysign(1.0, torque);
+      jacobian->pass_on_to_joint(joint_, rate * kinematics.gravity_torque_jacobian().row(joint_));
       jacobian->add_to_joint(joint_, first_column, direction);
       jacobian->add_to_joint(joint_, first_column + 1, direction * std::abs(torque));
-      for (int k = 0; k < first_column; ++k) {
-        jacobian->add_to_joint(joint_, k, direction * values(1) * std::copysign(1.0, torque) * torque_change(k));
-      }
     }
     state.add_to_joint(joint_, direction * (values(0) + values(1) * std::abs(torque)));
   }

@@ -23,10 +23,10 @@ class Base final : public ErrorSource {
     const Matrix3 RzRy = Rz * Eigen::AngleAxisd(values(4), Vector3::UnitY()).toRotationMatrix();
     const int translation = jacobian->rows.base(0);
     const int rotation = jacobian->rows.base(3);
-    jacobian->matrix.block<3, 3>(translation, first_column) = R;
-    jacobian->matrix.block<3, 1>(rotation, first_column + 3) = R.col(2);
-    jacobian->matrix.block<3, 1>(rotation, first_column + 4) = R * Rz.col(1);
-    jacobian->matrix.block<3, 1>(rotation, first_column + 5) = R * RzRy.col(0);
+    jacobian->add_block(translation, first_column, R);
+    jacobian->add_block(rotation, first_column + 3, R.col(2));
+    jacobian->add_block(rotation, first_column + 4, R * Rz.col(1));
+    jacobian->add_block(rotation, first_column + 5, R * RzRy.col(0));
   }
 
  private:

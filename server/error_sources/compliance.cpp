@@ -1,4 +1,5 @@
-#include <functional>
+#include <utility>
+#include <vector>
 
 #include "server/error_sources/parameter.h"
 #include "server/error_sources/sources.h"
@@ -25,11 +26,15 @@ class Compliance : public ErrorSource {
   std::string explanation() const override { return "the gearboxes give way under the weight of the payload"; }
 
  protected:
-  static int row_of(const ArmState& state, const StateRows& rows, int joint) {
-    return state.chain->joint(joint).type == JointType::kRevolute ? rows.theta(joint) : rows.d(joint);
+  /// State rows of all joints.
+  static std::vector<int> joint_rows(const Chain& chain) {
+    const StateRows rows(chain.size());
+    std::vector<int> all;
+    for (int j = 0; j < chain.size(); ++j) all.push_back(rows.of_joint(chain, j));
+    return all;
   }
 
-  static void deflect(ArmState& state, const Eigen::VectorXd& deflection) {
+  static void deflect(ArmState& state, const JointArray& deflection) {
     for (int j = 0; j < state.chain->size(); ++j) {
       LinkGeometry& link = state.links[static_cast<std::size_t>(j)];
       (state.chain->joint(j).type == JointType::kRevolute ? link.theta : link.d) += deflection(j);
@@ -49,14 +54,12 @@ class ComplianceFirstOrder final : public Compliance {
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
              int first_column) const override {
     const ArmKinematics kinematics(state);
-    const Eigen::VectorXd torque = kinematics.gravity_torque();
+    const JointArray torque = kinematics.gravity_torque();
     if (jacobian != nullptr) {
-      auto earlier = jacobian->matrix.leftCols(first_column);
-      const Eigen::MatrixXd torque_change = kinematics.gravity_torque_jacobian() * earlier;
+      const std::vector<int> rows = joint_rows(*state.chain);
+      jacobian->pass_on(rows, C.asDiagonal() * kinematics.gravity_torque_jacobian());
       for (int j = 0; j < state.chain->size(); ++j) {
-        const int row = row_of(state, jacobian->rows, j);
-        earlier.row(row) += C(j) * torque_change.row(j);
-        jacobian->matrix(row, first_column + j) = torque(j);
+        jacobian->add(rows[static_cast<std::size_t>(j)], first_column + j, torque(j));
       }
     }
     deflect(state, C.cwiseProduct(torque));
@@ -72,9 +75,9 @@ class ComplianceEquilibrium final : public Compliance {
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
              int first_column) const override {
     const ArmState unloaded = state;
-    Eigen::VectorXd deflection = Eigen::VectorXd::Zero(C.size());
+    JointArray deflection = JointArray::Zero(C.size());
     for (int step = 0; step < kMaxEquilibriumSteps; ++step) {
-      const Eigen::VectorXd next = C.cwiseProduct(ArmKinematics(state).gravity_torque());
+      const JointArray next = C.cwiseProduct(ArmKinematics(state).gravity_torque());
       const double moved = (next - deflection).cwiseAbs().maxCoeff();
       deflection = next;
       state = unloaded;
@@ -84,17 +87,20 @@ class ComplianceEquilibrium final : public Compliance {
     if (jacobian == nullptr) return;
     // dq = C tau + C T (dq + ds): (I - C T_q) dq = tau dC + C T_s ds, T the torque's derivative in the loaded posture.
     const ArmKinematics loaded(state);
-    const Eigen::VectorXd torque = loaded.gravity_torque();
-    const Eigen::MatrixXd T = loaded.gravity_torque_jacobian();
+    const JointArray torque = loaded.gravity_torque();
+    const JointStateMatrix T = loaded.gravity_torque_jacobian();
     const int n = state.chain->size();
-    Eigen::MatrixXd balance = Eigen::MatrixXd::Identity(n, n);
-    for (int j = 0; j < n; ++j) balance.col(j) -= C.cwiseProduct(T.col(row_of(state, jacobian->rows, j)));
-    auto earlier = jacobian->matrix.leftCols(first_column);
-    Eigen::MatrixXd right(n, first_column + n);
-    right << C.asDiagonal() * (T * earlier), Eigen::MatrixXd(torque.asDiagonal());
-    const Eigen::MatrixXd change = balance.partialPivLu().solve(right);
-    for (int j = 0; j < n; ++j)
-      jacobian->matrix.row(row_of(state, jacobian->rows, j)).head(first_column + n) += change.row(j);
+    const std::vector<int> rows = joint_rows(*state.chain);
+    using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxJoints>;
+    Square balance = Square::Identity(n, n);
+    for (int j = 0; j < n; ++j) balance.col(j) -= C.cwiseProduct(T.col(rows[static_cast<std::size_t>(j)]));
+    const Square inverse = balance.partialPivLu().inverse();
+    jacobian->pass_on(rows, inverse * C.asDiagonal() * T);
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        jacobian->add(rows[static_cast<std::size_t>(i)], first_column + j, inverse(i, j) * torque(j));
+      }
+    }
   }
 };
 
@@ -107,16 +113,16 @@ class ComplianceLinear final : public Compliance {
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& C, ArmState& state, StateJacobian* jacobian,
              int first_column) const override {
     const ArmKinematics kinematics(state);
-    const Eigen::VectorXd torque = kinematics.gravity_torque();
-    const Eigen::MatrixXd J = kinematics.deflection_jacobian();
-    const Eigen::VectorXd deflection = C.cwiseProduct(torque);
+    const JointArray torque = kinematics.gravity_torque();
+    const ArmKinematics::DeflectionJacobian J = kinematics.deflection_jacobian();
+    const JointArray deflection = C.cwiseProduct(torque);
     if (jacobian != nullptr) {
-      auto earlier = jacobian->matrix.leftCols(first_column);
-      const int tip = jacobian->rows.tip(0);
-      const Eigen::MatrixXd by_state = J * C.asDiagonal() * kinematics.gravity_torque_jacobian() +
-                                       kinematics.deflection_jacobian_derivative(deflection);
-      jacobian->matrix.block(tip, 0, 6, first_column) += (by_state * earlier).eval();
-      jacobian->matrix.block(tip, first_column, 6, C.size()) = J * torque.asDiagonal();
+      const ArmKinematics::DeflectionJacobian by_torque = J * C.asDiagonal();
+      const JointStateMatrix T = kinematics.gravity_torque_jacobian();
+      Eigen::MatrixXd by_state = kinematics.deflection_jacobian_derivative(deflection);
+      for (int row = 0; row < T.cols(); ++row) by_state.col(row) += by_torque.lazyProduct(T.col(row));
+      jacobian->pass_on(jacobian->rows.whole_tip(), std::move(by_state));
+      jacobian->add_block(jacobian->rows.tip(0), first_column, J * torque.asDiagonal());
     }
     state.tip_W += J * deflection;
   }

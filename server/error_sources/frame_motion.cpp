@@ -23,16 +23,14 @@ void move_tool(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
   const int translation = jacobian->rows.tool(0);
   const int rotation = jacobian->rows.tool(3);
   // A motion [v; w] of T in F becomes [R v + t x R w; R w].
-  auto earlier_v = jacobian->matrix.block(translation, 0, 3, first_column);
-  auto earlier_w = jacobian->matrix.block(rotation, 0, 3, first_column);
-  const Eigen::MatrixXd turned_w = motion.linear() * earlier_w;
-  earlier_v = (motion.linear() * earlier_v + skew(t) * turned_w).eval();
-  earlier_w = turned_w;
+  Eigen::Matrix<double, 6, 6> earlier;
+  earlier << motion.linear(), skew(t) * motion.linear(), Matrix3::Zero(), motion.linear();
+  jacobian->transform(translation, earlier);
   const Matrix3 axes = rotation_axes(values);
-  jacobian->matrix.block<3, 3>(translation, first_column).setIdentity();
-  jacobian->matrix.block<3, 3>(rotation, first_column + 3) = axes;
+  jacobian->add_block(translation, first_column, Matrix3::Identity());
+  jacobian->add_block(rotation, first_column + 3, axes);
   // These axes go through t, the rows through the origin of F.
-  jacobian->matrix.block<3, 3>(translation, first_column + 3) = skew(t) * axes;
+  jacobian->add_block(translation, first_column + 3, skew(t) * axes);
 }
 
 void move_base_in_world(const Eigen::Ref<const Eigen::VectorXd>& values, double rate, ArmState& state,
@@ -44,10 +42,9 @@ void move_base_in_world(const Eigen::Ref<const Eigen::VectorXd>& values, double 
   if (jacobian == nullptr) return;
   const int translation = jacobian->rows.base(0);
   const int rotation = jacobian->rows.base(3);
-  auto earlier_w = jacobian->matrix.block(rotation, 0, 3, first_column);
-  earlier_w = (motion.linear() * earlier_w).eval();
-  jacobian->matrix.block<3, 3>(translation, first_column) = rate * Matrix3::Identity();
-  jacobian->matrix.block<3, 3>(rotation, first_column + 3) = rate * rotation_axes(moved);
+  jacobian->transform(rotation, motion.linear());
+  jacobian->add_block(translation, first_column, rate * Matrix3::Identity());
+  jacobian->add_block(rotation, first_column + 3, rate * rotation_axes(moved));
 }
 
 }  // namespace trammel

@@ -35,7 +35,7 @@ class Geometry final : public ErrorSource {
     for (std::size_t k = 0; k < entries_.size(); ++k) {
       const auto column = static_cast<Eigen::Index>(k);
       state.links[entries_[k].link].*entries_[k].member += values(column);
-      if (jacobian != nullptr) jacobian->matrix(entries_[k].row, first_column + column) = 1;
+      if (jacobian != nullptr) jacobian->add(entries_[k].row, first_column + static_cast<int>(k), 1);
     }
   }
 

@@ -40,9 +40,8 @@ class LinkBending final : public ErrorSource {
       Eigen::Matrix<double, 6, 15> by_points;
       for (int i = 0; i < 6; ++i) by_points.row(i) = with_derivative(i).derivatives().transpose();
       const int tip = jacobian->rows.tip(0);
-      const Eigen::MatrixXd by_state = values(0) * by_points * kinematics.loaded_link_jacobian(joint_);
-      jacobian->matrix.block(tip, 0, 6, first_column) += (by_state * jacobian->matrix.leftCols(first_column)).eval();
-      jacobian->matrix.block<6, 1>(tip, first_column) = unit;
+      jacobian->pass_on(jacobian->rows.whole_tip(), values(0) * by_points * kinematics.loaded_link_jacobian(joint_));
+      jacobian->add_block(tip, first_column, unit);
     }
     state.tip_W += values(0) * unit;
   }

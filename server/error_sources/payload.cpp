@@ -18,8 +18,8 @@ void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, Stat
   state.payload.mass += values(0);
   state.payload.p_FoCog_F += values.segment<3>(1);
   if (jacobian == nullptr) return;
-  jacobian->matrix(jacobian->rows.mass(), first_column) += 1;
-  for (int k = 0; k < 3; ++k) jacobian->matrix(jacobian->rows.cog(k), first_column + 1 + k) += 1;
+  jacobian->add(jacobian->rows.mass(), first_column, 1);
+  for (int k = 0; k < 3; ++k) jacobian->add(jacobian->rows.cog(k), first_column + 1 + k, 1);
 }
 
 /// A payload weighs, or carries its weight, other than the cell file says; four parameters for each payload of the

@@ -75,7 +75,7 @@ Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& pa
     first += count;
   }
   const ArmKinematics kinematics(state);
-  if (jacobian != nullptr) *jacobian = kinematics.pose_jacobian() * by_parameters->matrix;
+  if (jacobian != nullptr) *jacobian = by_parameters->times(kinematics.pose_jacobian());
   return kinematics.tool_pose_W();
 }
 

@@ -22,8 +22,8 @@ class ThermalGrowth final : public ErrorSource {
     const double factor = 1 + values(0) * warming;
     const auto grow = [&](double& length, int row) {
       if (jacobian != nullptr) {
-        jacobian->matrix.row(row).head(first_column) *= factor;
-        jacobian->matrix(row, first_column) += length * warming;
+        jacobian->transform(row, Eigen::Matrix<double, 1, 1>(factor));
+        jacobian->add(row, first_column, length * warming);
       }
       length *= factor;
     };

@@ -1,6 +1,8 @@
 #include "server/robot/arm_state.h"
 
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "server/base/check.h"
 
@@ -13,76 +15,144 @@ void ArmState::add_to_joint(int joint, double delta) {
   }
 }
 
+StateJacobian::StateJacobian(const Chain& chain, int parameters)
+    : rows(chain.size()), chain_(&chain), parameters_(parameters) {
+  constexpr std::size_t kRowsOfMost = 3;  // most parameters move fewer numbers than this
+  entries_.reserve(kRowsOfMost * static_cast<std::size_t>(parameters));
+}
+
+void StateJacobian::add(int row, int column, double rate) { entries_.push_back({row, column, rate}); }
+
+void StateJacobian::add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates) {
+  for (int column = 0; column < rates.cols(); ++column) {
+    for (int row = 0; row < rates.rows(); ++row) {
+      if (rates(row, column) != 0) add(first_row + row, first_column + column, rates(row, column));
+    }
+  }
+}
+
 void StateJacobian::add_to_joint(int joint, int column, double rate) {
   for (int i = 0; i < chain_->size(); ++i) {
-    const int row = chain_->joint(i).type == JointType::kRevolute ? rows.theta(i) : rows.d(i);
-    matrix(row, column) += chain_->transmission()(i, joint) * rate;
+    const double share = chain_->transmission()(i, joint);
+    if (share != 0) add(rows.of_joint(*chain_, i), column, share * rate);
   }
+}
+
+void StateJacobian::pass_on(std::vector<int> into, Eigen::MatrixXd by_state) {
+  TRAMMEL_CHECK(by_state.rows() == static_cast<Eigen::Index>(into.size()) && by_state.cols() == rows.size());
+  passages_.push_back({entries_.size(), std::move(into), 0, std::move(by_state)});
+}
+
+void StateJacobian::pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_state) {
+  std::vector<int> into;
+  for (int i = 0; i < chain_->size(); ++i) into.push_back(rows.of_joint(*chain_, i));
+  pass_on(std::move(into), chain_->transmission().col(joint) * by_state);
+}
+
+void StateJacobian::transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor) {
+  std::vector<int> into(static_cast<std::size_t>(factor.rows()));
+  std::iota(into.begin(), into.end(), first_row);
+  passages_.push_back(
+      {entries_.size(), std::move(into), first_row, factor - Eigen::MatrixXd::Identity(factor.rows(), factor.cols())});
+}
+
+Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
+  // The state after a passage is (I + E L) times the state before: what comes after sees E L through `by_state`, what
+  // was recorded before sees by_state (I + E L).
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(6, parameters_);
+  std::size_t end = entries_.size();
+  const auto collect = [&](std::size_t begin) {
+    for (std::size_t i = begin; i < end; ++i) {
+      product.col(entries_[i].column).head<6>() += entries_[i].rate * by_state.col(entries_[i].row);
+    }
+    end = begin;
+  };
+  for (auto passage = passages_.rbegin(); passage != passages_.rend(); ++passage) {
+    collect(passage->entries);
+    const Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints> through = by_state(Eigen::all, passage->rows);
+    for (Eigen::Index column = 0; column < passage->by_state.cols(); ++column) {
+      Vector6 sum = by_state.col(passage->first_column + column);
+      for (Eigen::Index k = 0; k < through.cols(); ++k) sum += passage->by_state(k, column) * through.col(k);
+      by_state.col(passage->first_column + column) = sum;
+    }
+  }
+  collect(0);
+  return product;
 }
 
 ArmKinematics::ArmKinematics(const ArmState& state)
     : chain_(state.chain), X_WB_(state.X_WB), gravity_W_(state.gravity_W) {
   TRAMMEL_CHECK(chain_ != nullptr && state.links.size() == static_cast<std::size_t>(chain_->size()));
-  Pose X = state.X_WB;
-  for (int i = 0; i < chain_->size(); ++i) {
-    const LinkGeometry& link = state.links[static_cast<std::size_t>(i)];
-    z_.push_back(X.linear().col(2));
-    p_.push_back(X.translation());
-    X.linear() = (X.linear() * Eigen::AngleAxisd(link.theta, Vector3::UnitZ())).eval();
-    const Vector3 x = X.linear().col(0);
-    X.translation() += z_.back() * link.d + x * link.a;
-    X.linear() = (X.linear() * Eigen::AngleAxisd(link.alpha, Vector3::UnitX())).eval();
-    x_.push_back(x);
-    y_.push_back(X.linear().col(1));
-    q_.push_back(X.translation());
-    if (link.beta != 0) X.linear() = (X.linear() * Eigen::AngleAxisd(link.beta, Vector3::UnitY())).eval();
+  Vector3 x = state.X_WB.linear().col(0);
+  Vector3 y = state.X_WB.linear().col(1);
+  Vector3 z = state.X_WB.linear().col(2);
+  Vector3 p = state.X_WB.translation();
+  const auto turn = [](Vector3& from, Vector3& to, double angle) {  // about the third axis
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    const Vector3 turned = c * from + s * to;
+    to = c * to - s * from;
+    from = turned;
+  };
+  for (std::size_t i = 0; i < state.links.size(); ++i) {
+    const LinkGeometry& geometry = state.links[i];
+    Link& link = links_[i];
+    link.z = z;
+    link.p = p;
+    turn(x, y, geometry.theta);
+    p += z * geometry.d + x * geometry.a;
+    turn(y, z, geometry.alpha);
+    link.x = x;
+    link.y = y;
+    link.q = p;
+    if (geometry.beta != 0) turn(z, x, geometry.beta);
   }
-  X_WF_ = X;
-  X_WT_ = X * state.X_FT;
+  X_WF_ = Pose::Identity();
+  X_WF_.linear() << x, y, z;
+  X_WF_.translation() = p;
+  X_WT_ = X_WF_ * state.X_FT;
   kinematic_tip_W_ = X_WT_.translation();
   tip_rotation_W_ = state.tip_W.tail<3>();
   X_WT_.translation() += state.tip_W.head<3>();
   if (!tip_rotation_W_.isZero(0)) {
     X_WT_.linear() = (rotation_exp(tip_rotation_W_) * X_WT_.linear()).eval();
   }
-  p_cog_W_ = X * state.payload.p_FoCog_F;
+  p_cog_W_ = X_WF_ * state.payload.p_FoCog_F;
   force_W_ = state.payload.mass * kGravity * gravity_W_;
 }
 
-ArmKinematics::Motion ArmKinematics::link_motion(int row) const {
-  const auto i = static_cast<std::size_t>(row / 5);
-  Motion motion;
-  switch (row % 5) {
-    case 0:
-      motion.w = z_[i];
-      motion.origin = p_[i];
-      break;
-    case 1:
-      motion.v = z_[i];
-      break;
-    case 2:
-      motion.v = x_[i];
-      break;
-    case 3:
-      motion.w = x_[i];
-      motion.origin = q_[i];
-      break;
-    default:
-      motion.w = y_[i];
-      motion.origin = q_[i];
+ArmKinematics::LinkVectors ArmKinematics::velocities_of(const Vector3& point) const {
+  LinkVectors velocities(3, 5 * chain_->size());
+  for (int i = 0; i < chain_->size(); ++i) {
+    const Link& link = links_[static_cast<std::size_t>(i)];
+    velocities.col(5 * i) = link.z.cross(point - link.p);
+    velocities.col(5 * i + 1) = link.z;
+    velocities.col(5 * i + 2) = link.x;
+    velocities.col(5 * i + 3) = link.x.cross(point - link.q);
+    velocities.col(5 * i + 4) = link.y.cross(point - link.q);
   }
-  return motion;
+  return velocities;
 }
 
-Eigen::MatrixXd ArmKinematics::pose_jacobian() const {
-  const StateRows rows(chain_->size());
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, rows.size());
-  const Vector3& p = kinematic_tip_W_;
-  for (int row = 0; row < rows.base(0); ++row) {
-    const Motion motion = link_motion(row);
-    J.col(row).head<3>() = motion.v + motion.w.cross(p - motion.origin);
-    J.col(row).tail<3>() = motion.w;
+ArmKinematics::LinkVectors ArmKinematics::turns() const {
+  LinkVectors turns(3, 5 * chain_->size());
+  for (int i = 0; i < chain_->size(); ++i) {
+    const Link& link = links_[static_cast<std::size_t>(i)];
+    turns.col(5 * i) = link.z;
+    turns.col(5 * i + 1).setZero();
+    turns.col(5 * i + 2).setZero();
+    turns.col(5 * i + 3) = link.x;
+    turns.col(5 * i + 4) = link.y;
   }
+  return turns;
+}
+
+StateMatrix<6> ArmKinematics::pose_jacobian() const {
+  const StateRows rows(chain_->size());
+  StateMatrix<6> J = StateMatrix<6>::Zero(6, rows.size());
+  const Vector3& p = kinematic_tip_W_;
+  J.topLeftCorner(3, rows.base(0)) = velocities_of(p);
+  J.bottomLeftCorner(3, rows.base(0)) = turns();
   J.block<3, 3>(0, rows.base(0)).setIdentity();
   J.block<3, 3>(0, rows.base(3)) = -skew(p - X_WB_.translation());
   J.block<3, 3>(3, rows.base(3)).setIdentity();
@@ -90,114 +160,106 @@ Eigen::MatrixXd ArmKinematics::pose_jacobian() const {
   J.block<3, 3>(0, rows.tool(0)) = R_WF;
   J.block<3, 3>(0, rows.tool(3)) = -skew(p - X_WF_.translation()) * R_WF;
   J.block<3, 3>(3, rows.tool(3)) = R_WF;
-  // R_WT = exp(tip) R_kinematic.
-  if (!tip_rotation_W_.isZero(0)) J.bottomRows<3>() = (rotation_exp(tip_rotation_W_) * J.bottomRows<3>()).eval();
+  if (!tip_rotation_W_.isZero(0)) {  // R_WT = exp(tip) R_kinematic
+    const Matrix3 R_tip = rotation_exp(tip_rotation_W_);
+    for (int row = 0; row < rows.tip(0); ++row) J.col(row).tail<3>() = (R_tip * J.col(row).tail<3>()).eval();
+  }
   J.block<3, 3>(0, rows.tip(0)).setIdentity();
   J.block<3, 3>(3, rows.tip(3)) = left_jacobian(tip_rotation_W_);
   return J;
 }
 
-Eigen::MatrixXd ArmKinematics::deflection_jacobian() const {
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, chain_->size());
+ArmKinematics::DeflectionJacobian ArmKinematics::deflection_jacobian() const {
+  DeflectionJacobian J = DeflectionJacobian::Zero(6, chain_->size());
   for (int j = 0; j < chain_->size(); ++j) {
-    const auto k = static_cast<std::size_t>(j);
+    const Link& link = links_[static_cast<std::size_t>(j)];
     if (chain_->joint(j).type == JointType::kRevolute) {
-      J.col(j).head<3>() = z_[k].cross(kinematic_tip_W_ - p_[k]);
-      J.col(j).tail<3>() = z_[k];
+      J.col(j).head<3>() = link.z.cross(kinematic_tip_W_ - link.p);
+      J.col(j).tail<3>() = link.z;
     } else {
-      J.col(j).head<3>() = z_[k];
+      J.col(j).head<3>() = link.z;
     }
   }
   return J;
 }
 
-Eigen::MatrixXd ArmKinematics::deflection_jacobian_derivative(const Eigen::VectorXd& deflection) const {
+StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& deflection) const {
   const StateRows rows(chain_->size());
-  const Eigen::MatrixXd J = deflection_jacobian();
-  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(6, rows.size());
-  const auto turn = [&](int row, int joint, const Vector3& w) {  // the joint's whole column turns with what is upstream
-    D.col(row).head<3>() += deflection(joint) * w.cross(J.col(joint).head<3>());
-    D.col(row).tail<3>() += deflection(joint) * w.cross(J.col(joint).tail<3>());
+  const DeflectionJacobian J = deflection_jacobian();
+  const LinkVectors velocity = velocities_of(kinematic_tip_W_);
+  const LinkVectors turn = turns();
+  StateMatrix<6> D = StateMatrix<6>::Zero(6, rows.size());
+  // The columns of joints beyond a link turn with it; of those up to it, only the lever changes.
+  Vector6 beyond = J * deflection;
+  Vector3 up_to = Vector3::Zero();
+  const auto turned = [&](int row, const Vector3& w) {
+    D.col(row).head<3>() += w.cross(beyond.head<3>());
+    D.col(row).tail<3>() += w.cross(beyond.tail<3>());
   };
-  const auto shift = [&](int row, int joint, const Vector3& tip_motion) {  // only its lever changes
-    D.col(row).head<3>() += deflection(joint) * J.col(joint).tail<3>().cross(tip_motion);
-  };
-  for (int j = 0; j < chain_->size(); ++j) {
-    for (int row = 0; row < rows.base(0); ++row) {
-      const Motion motion = link_motion(row);
-      if (row / 5 < j) {
-        turn(row, j, motion.w);
-      } else {
-        shift(row, j, motion.v + motion.w.cross(kinematic_tip_W_ - motion.origin));
-      }
+  const auto shifted = [&](int row, const Vector3& tip_motion) { D.col(row).head<3>() += up_to.cross(tip_motion); };
+  for (int axis = 0; axis < 3; ++axis) turned(rows.base(3 + axis), Vector3::Unit(axis));
+  for (int i = 0; i < chain_->size(); ++i) {
+    beyond -= deflection(i) * J.col(i);
+    up_to += deflection(i) * J.col(i).tail<3>();
+    for (int row = rows.theta(i); row <= rows.beta(i); ++row) {
+      turned(row, turn.col(row));
+      shifted(row, velocity.col(row));
     }
-    for (int axis = 0; axis < 3; ++axis) {
-      turn(rows.base(3 + axis), j, Vector3::Unit(axis));
-      shift(rows.tool(axis), j, X_WF_.linear().col(axis));
-      shift(rows.tool(3 + axis), j, X_WF_.linear().col(axis).cross(kinematic_tip_W_ - X_WF_.translation()));
-    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    shifted(rows.tool(axis), X_WF_.linear().col(axis));
+    shifted(rows.tool(3 + axis), X_WF_.linear().col(axis).cross(kinematic_tip_W_ - X_WF_.translation()));
   }
   return D;
 }
 
-Eigen::VectorXd ArmKinematics::gravity_torque() const {
-  Eigen::VectorXd torque(chain_->size());
+JointArray ArmKinematics::gravity_torque() const {
+  JointArray torque(chain_->size());
   for (int j = 0; j < chain_->size(); ++j) {
-    const auto k = static_cast<std::size_t>(j);
-    torque(j) = chain_->joint(j).type == JointType::kRevolute ? z_[k].dot((p_cog_W_ - p_[k]).cross(force_W_))
-                                                              : z_[k].dot(force_W_);
+    const Link& link = links_[static_cast<std::size_t>(j)];
+    torque(j) = chain_->joint(j).type == JointType::kRevolute ? link.z.dot((p_cog_W_ - link.p).cross(force_W_))
+                                                              : link.z.dot(force_W_);
   }
   return torque;
 }
 
-Eigen::MatrixXd ArmKinematics::gravity_torque_jacobian() const {
+JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
   const StateRows rows(chain_->size());
   const int n = chain_->size();
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(n, rows.size());
+  const LinkVectors velocity = velocities_of(p_cog_W_);
+  const LinkVectors turn = turns();
+  JointStateMatrix T = JointStateMatrix::Zero(n, rows.size());
   for (int j = 0; j < n; ++j) {
-    const auto k = static_cast<std::size_t>(j);
+    const Vector3& z = links_[static_cast<std::size_t>(j)].z;
     const bool revolute = chain_->joint(j).type == JointType::kRevolute;
-    const Vector3 arm = p_cog_W_ - p_[k];
+    // The force's direction that does work: tau = leverage . F.
+    const Vector3 leverage = revolute ? z.cross(p_cog_W_ - links_[static_cast<std::size_t>(j)].p) : z;
     // Upstream of the joint a rotation turns arm and axis alike: the same as turning the force back.
-    const auto upstream = [&](const Vector3& w) {
-      const Vector3 turned = -w.cross(force_W_);
-      return revolute ? z_[k].dot(arm.cross(turned)) : z_[k].dot(turned);
-    };
-    const auto downstream = [&](const Vector3& cog_motion) {
-      return revolute ? z_[k].dot(cog_motion.cross(force_W_)) : 0.0;
-    };
-    for (int row = 0; row < rows.base(0); ++row) {
-      const Motion motion = link_motion(row);
-      T(j, row) = row / 5 < j ? upstream(motion.w) : downstream(motion.v + motion.w.cross(p_cog_W_ - motion.origin));
-    }
-    for (int axis = 0; axis < 3; ++axis) T(j, rows.base(3 + axis)) = upstream(Vector3::Unit(axis));
-    const Vector3 weight = kGravity * gravity_W_;
-    T(j, rows.mass()) = revolute ? z_[k].dot(arm.cross(weight)) : z_[k].dot(weight);
-    for (int axis = 0; axis < 3; ++axis) T(j, rows.cog(axis)) = downstream(X_WF_.linear().col(axis));
+    const Vector3 by_turn = leverage.cross(force_W_);
+    const Vector3 by_cog = revolute ? force_W_.cross(z) : Vector3::Zero();
+    for (int row = 0; row < rows.theta(j); ++row) T(j, row) = by_turn.dot(turn.col(row));
+    for (int row = rows.theta(j); row < rows.base(0); ++row) T(j, row) = by_cog.dot(velocity.col(row));
+    T.block<1, 3>(j, rows.base(3)) = by_turn.transpose();
+    T(j, rows.mass()) = kGravity * leverage.dot(gravity_W_);
+    T.block<1, 3>(j, rows.cog(0)) = by_cog.transpose() * X_WF_.linear();
   }
   return T;
 }
 
 ArmKinematics::LoadedLink ArmKinematics::loaded_link(int joint) const {
-  const auto k = static_cast<std::size_t>(joint);
-  return {p_[k], q_[k], p_cog_W_, kinematic_tip_W_, force_W_};
+  const Link& link = links_[static_cast<std::size_t>(joint)];
+  return {link.p, link.q, p_cog_W_, kinematic_tip_W_, force_W_};
 }
 
-Eigen::MatrixXd ArmKinematics::loaded_link_jacobian(int joint) const {
+StateMatrix<15> ArmKinematics::loaded_link_jacobian(int joint) const {
   const StateRows rows(chain_->size());
   const LoadedLink link = loaded_link(joint);
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(15, rows.size());
-  for (int row = 0; row < rows.base(0); ++row) {
-    const Motion motion = link_motion(row);
-    const auto moved = [&](const Vector3& p) -> Vector3 { return motion.v + motion.w.cross(p - motion.origin); };
-    // alpha and beta of a link turn about its far end, which stays.
-    if (row / 5 < joint) J.block<3, 1>(0, row) = moved(link.start);
-    if (row / 5 <= joint) J.block<3, 1>(3, row) = moved(link.end);
-    J.block<3, 1>(6, row) = moved(link.cog);
-    J.block<3, 1>(9, row) = moved(link.tip);
-  }
+  StateMatrix<15> J = StateMatrix<15>::Zero(15, rows.size());
   const Vector3 points[] = {link.start, link.end, link.cog, link.tip};
+  // What moves each point: links before its own; alpha and beta of a link turn about its far end, which stays.
+  const int moving[] = {rows.theta(joint), rows.theta(joint) + 5, rows.base(0), rows.base(0)};
   for (int p = 0; p < 4; ++p) {
+    J.block(3 * p, 0, 3, moving[p]) = velocities_of(points[p]).leftCols(moving[p]);
     J.block<3, 3>(3 * p, rows.base(0)).setIdentity();
     J.block<3, 3>(3 * p, rows.base(3)) = -skew(points[p] - X_WB_.translation());
   }

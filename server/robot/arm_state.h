@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -41,30 +42,69 @@ class StateRows {
   [[nodiscard]] int a(int joint) const { return 5 * joint + 2; }
   [[nodiscard]] int alpha(int joint) const { return 5 * joint + 3; }
   [[nodiscard]] int beta(int joint) const { return 5 * joint + 4; }
+  /// The row that joint `joint` of `chain` itself turns or shifts.
+  [[nodiscard]] int of_joint(const Chain& chain, int joint) const {
+    return chain.joint(joint).type == JointType::kRevolute ? theta(joint) : d(joint);
+  }
   [[nodiscard]] int base(int k) const { return 5 * joints_ + k; }
   [[nodiscard]] int tool(int k) const { return 5 * joints_ + 6 + k; }
   [[nodiscard]] int mass() const { return 5 * joints_ + 12; }
   [[nodiscard]] int cog(int k) const { return 5 * joints_ + 13 + k; }
   [[nodiscard]] int tip(int k) const { return 5 * joints_ + 16 + k; }
+  [[nodiscard]] std::vector<int> whole_tip() const { return {tip(0), tip(1), tip(2), tip(3), tip(4), tip(5)}; }
   [[nodiscard]] int size() const { return 5 * joints_ + 22; }
 
  private:
   int joints_;
 };
 
-/// d(state)/d(parameters): rows as StateRows, one column a parameter.
+constexpr int kMaxStateRows = 5 * kMaxJoints + 22;
+
+/// Something of `Rows` numbers by every number of the state: one column for each of StateRows.
+template <int Rows>
+using StateMatrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, kMaxStateRows>;
+/// The same with a row for each joint.
+using JointStateMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxStateRows>;
+
+/// d(state)/d(parameters), recorded while sources act and multiplied out once from its end, so that a source costs the
+/// same however many parameters came before it.
 class StateJacobian {
  public:
-  StateJacobian(const Chain& chain, int parameters)
-      : rows(chain.size()), matrix(Eigen::MatrixXd::Zero(rows.size(), parameters)), chain_(&chain) {}
+  StateJacobian(const Chain& chain, int parameters);
+  /// The parameter in `column` moves the number in state row `row` by `rate` per unit.
+  void add(int row, int column, double rate);
+  /// The same for several rows from `first_row` and columns from `first_column`; zeros cost nothing.
+  void add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates);
   /// The parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per unit.
   void add_to_joint(int joint, int column, double rate);
+  /// Whatever has moved the state so far moves the numbers in `rows` in addition, by `by_state` (one row for each of
+  /// them, a column for each of StateRows).
+  void pass_on(std::vector<int> rows, Eigen::MatrixXd by_state);
+  /// Whatever has moved the state so far moves `joint` (as ArmState::add_to_joint) in addition, by `by_state`.
+  void pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_state);
+  /// The numbers in the state rows from `first_row` on become `factor` times what they were, with all that moved them.
+  void transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor);
+  /// `by_state` (6 x StateRows::size()) times all that was recorded: 6 x parameters.
+  [[nodiscard]] Eigen::MatrixXd times(StateMatrix<6> by_state) const;
 
   StateRows rows;
-  Eigen::MatrixXd matrix;
 
  private:
+  struct Entry {
+    int row;
+    int column;
+    double rate;
+  };
+  struct Passage {
+    std::size_t entries;  ///< how many were recorded before
+    std::vector<int> rows;
+    int first_column;  ///< of by_state in the state
+    Eigen::MatrixXd by_state;
+  };
   const Chain* chain_;
+  int parameters_;
+  std::vector<Entry> entries_;
+  std::vector<Passage> passages_;
 };
 
 /// Forward kinematics of a state with everything needed to differentiate it.
@@ -73,37 +113,40 @@ class ArmKinematics {
   explicit ArmKinematics(const ArmState& state);
 
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
-  /// 6 x StateRows::size(): [dp_WT; rotation vector] in W per unit of each state row.
-  [[nodiscard]] Eigen::MatrixXd pose_jacobian() const;
+  /// [dp_WT; rotation vector] in W per unit of each state row.
+  [[nodiscard]] StateMatrix<6> pose_jacobian() const;
   /// n: moment of the payload's weight about each joint's axis (force along a prismatic one), Nm (N), physical wrench:
   /// gravity at the centre of gravity, eq. (3.6) without C and the outer J.
-  [[nodiscard]] Eigen::VectorXd gravity_torque() const;
-  /// n x StateRows::size(): derivative of gravity_torque().
-  [[nodiscard]] Eigen::MatrixXd gravity_torque_jacobian() const;
+  [[nodiscard]] JointArray gravity_torque() const;
+  /// Derivative of gravity_torque().
+  [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
   /// 6 x n: the tool's motion in W per joint deflection (signs and couplings do not enter), the J of eq. (3.6).
-  [[nodiscard]] Eigen::MatrixXd deflection_jacobian() const;
-  /// 6 x StateRows::size(): derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
-  [[nodiscard]] Eigen::MatrixXd deflection_jacobian_derivative(const Eigen::VectorXd& deflection) const;
+  using DeflectionJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints>;
+  [[nodiscard]] DeflectionJacobian deflection_jacobian() const;
+  /// Derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
+  [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& deflection) const;
   /// Points in W that bending depends on: axis of `joint`, far end of its link, centre of gravity, tool point; and the
   /// weight, N.
   struct LoadedLink {
     Vector3 start, end, cog, tip, weight;
   };
   [[nodiscard]] LoadedLink loaded_link(int joint) const;
-  /// 15 x StateRows::size(): derivative of the five vectors of loaded_link(joint), one under the other.
-  [[nodiscard]] Eigen::MatrixXd loaded_link_jacobian(int joint) const;
+  /// Derivative of the five vectors of loaded_link(joint), one under the other.
+  [[nodiscard]] StateMatrix<15> loaded_link_jacobian(int joint) const;
 
  private:
-  struct Motion {  // what is downstream moves by [v + w x (p - origin); w]
-    Vector3 v = Vector3::Zero();
-    Vector3 w = Vector3::Zero();
-    Vector3 origin = Vector3::Zero();
+  /// In W: joint axis and a point on it; x and y axis at the link's end q.
+  struct Link {
+    Vector3 z, p, x, y, q;
   };
-  [[nodiscard]] Motion link_motion(int row) const;
+  using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
+  /// One column a link row: how fast `point` moves in W, carried by everything downstream of the link.
+  [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
+  /// One column a link row: the rotation of everything downstream.
+  [[nodiscard]] LinkVectors turns() const;
 
   const Chain* chain_;
-  std::vector<Vector3> z_, p_, x_, y_,
-      q_;  // per link, in W: joint axis and a point on it; x and y axis at the link's end q
+  std::array<Link, kMaxJoints> links_;
   Pose X_WB_, X_WF_, X_WT_;
   Vector3 kinematic_tip_W_, tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
   Vector3 p_cog_W_, force_W_, gravity_W_;

@@ -10,6 +10,7 @@ namespace trammel {
 Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vector<Coupling> couplings) {
   const int n = static_cast<int>(joints.size());
   if (n == 0) return refused("robot {}: no joints", name);
+  if (n > kMaxJoints) return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints);
   Chain chain;
   chain.transmission_ = Eigen::MatrixXd::Zero(n, n);
   for (int i = 0; i < n; ++i) {
@@ -40,7 +41,7 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
 
 std::vector<LinkGeometry> Chain::links_at(const JointVector& q) const {
   TRAMMEL_CHECK(q.size() == size());
-  const Eigen::VectorXd value = transmission_ * q;
+  const JointArray value = transmission_ * q;
   std::vector<LinkGeometry> links;
   links.reserve(joints_.size());
   for (int i = 0; i < size(); ++i) {
@@ -67,7 +68,7 @@ Pose Chain::flange_pose(const JointVector& q) const { return ArmKinematics(bare_
 Eigen::MatrixXd Chain::jacobian(const JointVector& q, const Vector3& p_F) const {
   ArmState state = bare_arm(*this, q);
   state.X_FT.translation() = p_F;
-  const Eigen::MatrixXd all = ArmKinematics(state).pose_jacobian();
+  const StateMatrix<6> all = ArmKinematics(state).pose_jacobian();
   const StateRows rows(size());
   Eigen::MatrixXd per_joint(6, size());
   for (int i = 0; i < size(); ++i) {

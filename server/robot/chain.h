@@ -13,6 +13,11 @@ namespace trammel {
 
 enum class JointType { kRevolute, kPrismatic };
 
+constexpr int kMaxJoints = 12;  // of a chain; what is computed at every pose lives in storage of this size
+
+/// One number per joint.
+using JointArray = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxJoints, 1>;
+
 /// The five numbers of a link. Link i is Tz(d) Rz(theta) Tx(a) Rx(alpha), eq. (3.3), or, where the axis is parallel
 /// to the next one, Rz(theta) Tx(a) Rx(alpha) Ry(beta), eq. (3.4). m, rad.
 struct LinkGeometry {
@@ -47,7 +52,8 @@ struct Coupling {
 class Chain {
  public:
   Chain() = default;
-  /// Refuses: no joints, an empty or reversed limit, a coupling of a joint that does not exist or with itself.
+  /// Refuses: no joints or more than kMaxJoints, an empty or reversed limit, a coupling of a joint that does not exist
+  /// or with itself.
   [[nodiscard]] static Result<Chain> make(std::string name, std::vector<Joint> joints,
                                           std::vector<Coupling> couplings = {});
 

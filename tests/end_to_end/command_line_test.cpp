@@ -95,6 +95,18 @@ TEST_F(CommandLine, HelpOfEveryCommandEndsWith0AndNamesItsOptions) {
   }
 }
 
+TEST_F(CommandLine, AStudyPutsTheSourcesFiguresBesideOurs) {
+  const json study = json::parse(must({"study", "cal", "--json", "-"}).out);
+  ASSERT_EQ(study["rows"].size(), 8u);
+  for (const json& row : study["rows"]) {
+    for (const char* side : {"ours", "thesis"}) {
+      EXPECT_TRUE(row[side].contains("rms_mm") && row[side].contains("max_mm") && row[side]["axis"].contains("z"));
+    }
+  }
+  EXPECT_EQ(study["rows"][7]["aim"]["rms_most_mm"], 0.0237);
+  EXPECT_TRUE(study["parameters"][0]["levels"]["M3"].contains("thesis"));
+}
+
 TEST_F(CommandLine, WrongUsageEndsWith2AndNamesWhatIsWrong) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
       {{}, "A command is required"},
