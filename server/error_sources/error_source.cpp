@@ -108,7 +108,7 @@ int acting_order(const std::string& source_name) {
 
 std::vector<std::string> alternatives(const std::string& spec, const Cell& cell) {
   if (spec != "compliance") return {spec};
-  if (cell.payloads.empty()) return {"compliance_first_order"};
+  if (cell.payloads.empty() && !cell.robot.has_link_masses()) return {"compliance_first_order"};
   return {"compliance_first_order", "compliance_equilibrium", "compliance_linear"};
 }
 

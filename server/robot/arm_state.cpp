@@ -106,6 +106,11 @@ ArmKinematics::ArmKinematics(const ArmState& state)
     link.y = y;
     link.q = p;
     if (geometry.beta != 0) turn(z, x, geometry.beta);
+    const Joint& joint = chain_->joint(static_cast<int>(i));
+    if (joint.mass > 0) {
+      const Vector3 cog = p + x * joint.p_cog.x() + y * joint.p_cog.y() + z * joint.p_cog.z();
+      bodies_[static_cast<std::size_t>(body_count_++)] = {cog, joint.mass * kGravity * gravity_W_, static_cast<int>(i)};
+    }
   }
   X_WF_ = Pose::Identity();
   X_WF_.linear() << x, y, z;
@@ -119,6 +124,7 @@ ArmKinematics::ArmKinematics(const ArmState& state)
   }
   p_cog_W_ = X_WF_ * state.payload.p_FoCog_F;
   force_W_ = state.payload.mass * kGravity * gravity_W_;
+  bodies_[static_cast<std::size_t>(body_count_++)] = {p_cog_W_, force_W_, chain_->size() - 1};
 }
 
 ArmKinematics::LinkVectors ArmKinematics::velocities_of(const Vector3& point) const {
@@ -214,11 +220,14 @@ StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& d
 }
 
 JointArray ArmKinematics::gravity_torque() const {
-  JointArray torque(chain_->size());
-  for (int j = 0; j < chain_->size(); ++j) {
-    const Link& link = links_[static_cast<std::size_t>(j)];
-    torque(j) = chain_->joint(j).type == JointType::kRevolute ? link.z.dot((p_cog_W_ - link.p).cross(force_W_))
-                                                              : link.z.dot(force_W_);
+  JointArray torque = JointArray::Zero(chain_->size());
+  for (int k = 0; k < body_count_; ++k) {
+    const Body& body = bodies_[static_cast<std::size_t>(k)];
+    for (int j = 0; j <= body.last; ++j) {
+      const Link& link = links_[static_cast<std::size_t>(j)];
+      torque(j) += chain_->joint(j).type == JointType::kRevolute ? link.z.dot((body.p - link.p).cross(body.force))
+                                                                 : link.z.dot(body.force);
+    }
   }
   return torque;
 }
@@ -226,22 +235,26 @@ JointArray ArmKinematics::gravity_torque() const {
 JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
   const StateRows rows(chain_->size());
   const int n = chain_->size();
-  const LinkVectors velocity = velocities_of(p_cog_W_);
   const LinkVectors turn = turns();
   JointStateMatrix T = JointStateMatrix::Zero(n, rows.size());
-  for (int j = 0; j < n; ++j) {
-    const Vector3& z = links_[static_cast<std::size_t>(j)].z;
-    const bool revolute = chain_->joint(j).type == JointType::kRevolute;
-    // The force's direction that does work: tau = leverage . F.
-    const Vector3 leverage = revolute ? z.cross(p_cog_W_ - links_[static_cast<std::size_t>(j)].p) : z;
-    // Upstream of the joint a rotation turns arm and axis alike: the same as turning the force back.
-    const Vector3 by_turn = leverage.cross(force_W_);
-    const Vector3 by_cog = revolute ? force_W_.cross(z) : Vector3::Zero();
-    for (int row = 0; row < rows.theta(j); ++row) T(j, row) = by_turn.dot(turn.col(row));
-    for (int row = rows.theta(j); row < rows.base(0); ++row) T(j, row) = by_cog.dot(velocity.col(row));
-    T.block<1, 3>(j, rows.base(3)) = by_turn.transpose();
-    T(j, rows.mass()) = kGravity * leverage.dot(gravity_W_);
-    T.block<1, 3>(j, rows.cog(0)) = by_cog.transpose() * X_WF_.linear();
+  for (int k = 0; k < body_count_; ++k) {
+    const Body& body = bodies_[static_cast<std::size_t>(k)];
+    const LinkVectors velocity = velocities_of(body.p);
+    for (int j = 0; j <= body.last; ++j) {
+      const Vector3& z = links_[static_cast<std::size_t>(j)].z;
+      const bool revolute = chain_->joint(j).type == JointType::kRevolute;
+      // The force's direction that does work: tau = leverage . F.
+      const Vector3 leverage = revolute ? z.cross(body.p - links_[static_cast<std::size_t>(j)].p) : z;
+      // Upstream of the joint a rotation turns arm and axis alike: the same as turning the force back.
+      const Vector3 by_turn = leverage.cross(body.force);
+      const Vector3 by_cog = revolute ? body.force.cross(z) : Vector3::Zero();
+      for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));
+      for (int row = rows.theta(j); row < 5 * (body.last + 1); ++row) T(j, row) += by_cog.dot(velocity.col(row));
+      T.block<1, 3>(j, rows.base(3)) += by_turn.transpose();
+      if (k + 1 < body_count_) continue;
+      T(j, rows.mass()) += kGravity * leverage.dot(gravity_W_);
+      T.block<1, 3>(j, rows.cog(0)) += by_cog.transpose() * X_WF_.linear();
+    }
   }
   return T;
 }

@@ -115,8 +115,9 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: moment of the payload's weight about each joint's axis (force along a prismatic one), Nm (N), physical wrench:
-  /// gravity at the centre of gravity, eq. (3.6) without C and the outer J.
+  /// n: moment of all weights about each joint's axis (force along a prismatic one), Nm (N): the payload's and, where
+  /// the robot file gives them, the links', each at its centre of gravity (the physical wrench), eq. (3.6) without C
+  /// and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
@@ -139,6 +140,11 @@ class ArmKinematics {
   struct Link {
     Vector3 z, p, x, y, q;
   };
+  /// Something heavy, carried by link `last` and all before it.
+  struct Body {
+    Vector3 p, force;  ///< in W
+    int last;
+  };
   using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
   /// One column a link row: how fast `point` moves in W, carried by everything downstream of the link.
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
@@ -147,6 +153,8 @@ class ArmKinematics {
 
   const Chain* chain_;
   std::array<Link, kMaxJoints> links_;
+  std::array<Body, kMaxJoints + 1> bodies_;  // the links', then the payload's
+  int body_count_ = 0;
   Pose X_WB_, X_WF_, X_WT_;
   Vector3 kinematic_tip_W_, tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
   Vector3 p_cog_W_, force_W_, gravity_W_;

@@ -12,9 +12,14 @@ namespace trammel {
 
 namespace {
 
+Vector3 read_vector(const YamlMap& map, const std::string& key) {
+  const std::vector<double> v = map.numbers(key, 3);
+  return {v[0], v[1], v[2]};
+}
+
 Joint read_joint(const YamlMap& map) {
   map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg", "limits_mm", "sign",
-            "gear_ratio", "compliance_rad_per_nmm", "max_speed_deg_s", "max_speed_mm_s"});
+            "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm", "max_speed_deg_s", "max_speed_mm_s"});
   Joint joint;
   const std::string type = map.text("type", "revolute");
   if (type != "revolute" && type != "prismatic") map.refuse("type", "expected revolute or prismatic");
@@ -30,6 +35,9 @@ Joint read_joint(const YamlMap& map) {
   joint.sign = map.number("sign", 1);
   joint.gear_ratio = map.number("gear_ratio", 0);
   joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
+  joint.mass = map.number("mass_kg", 0);
+  if (joint.mass < 0) map.refuse("mass_kg", "below 0");
+  if (map.has("cog_mm")) joint.p_cog = read_vector(map, "cog_mm") * from_mm(1);
   const bool revolute = joint.type == JointType::kRevolute;
   const std::string limits = revolute ? "limits_deg" : "limits_mm";
   const std::string speed = revolute ? "max_speed_deg_s" : "max_speed_mm_s";
@@ -41,11 +49,6 @@ Joint read_joint(const YamlMap& map) {
   }
   if (map.has(speed)) joint.max_speed = si(map.number(speed));
   return joint;
-}
-
-Vector3 read_vector(const YamlMap& map, const std::string& key) {
-  const std::vector<double> v = map.numbers(key, 3);
-  return {v[0], v[1], v[2]};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "server/robot/chain.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/base/check.h"
@@ -75,6 +76,10 @@ Eigen::MatrixXd Chain::jacobian(const JointVector& q, const Vector3& p_F) const 
     per_joint.col(i) = all.col(joint(i).type == JointType::kRevolute ? rows.theta(i) : rows.d(i));
   }
   return per_joint * transmission_;
+}
+
+bool Chain::has_link_masses() const {
+  return std::any_of(joints_.begin(), joints_.end(), [](const Joint& joint) { return joint.mass > 0; });
 }
 
 std::optional<int> Chain::joint_outside_limits(const JointVector& q, double tolerance) const {

@@ -38,6 +38,8 @@ struct Joint {
   double upper = std::numeric_limits<double>::infinity();
   double gear_ratio = 0;            ///< motor turns per joint turn; 0 when unknown
   double compliance_prior = 0;      ///< rad/Nm
+  double mass = 0;                  ///< kg, of the link that follows; 0 when its weight is left to the controller
+  Vector3 p_cog = Vector3::Zero();  ///< m, its centre of gravity in the link's own frame (at its far end)
   std::optional<double> max_speed;  ///< rad/s (m/s)
 };
 
@@ -69,6 +71,8 @@ class Chain {
   [[nodiscard]] Pose flange_pose(const JointVector& q) const;
   /// 6 x n geometric Jacobian of the point `p_F` (m, in F): [dp; rotation vector] in B per commanded joint, eq. (3.7).
   [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
+  /// Whether any link's weight is known.
+  [[nodiscard]] bool has_link_masses() const;
   /// Index of the first joint outside its limits (beyond `tolerance`), if any.
   [[nodiscard]] std::optional<int> joint_outside_limits(const JointVector& q, double tolerance = 1e-9) const;
 

@@ -30,6 +30,10 @@ Chain odd_arm() {
   Joint wrist;
   wrist.link = {0.1, 0.6, 0.1, 1.1, 0};
   wrist.sign = -1;
+  elbow.mass = 12;
+  elbow.p_cog = {-0.4, 0.05, 0.1};
+  wrist.mass = 5;
+  wrist.p_cog = {0.02, -0.1, 0.03};
   return *Chain::make("odd", {rail, shoulder, elbow, wrist}, {{3, 2, -0.8}});
 }
 
@@ -168,6 +172,34 @@ TEST(ArmKinematics, TorqueIsTheWorkOfTheWeightPerJointMotion) {
     const Vector3 behind = ArmKinematics(moved(at_cog, row, -1e-6)).tool_pose_W().translation();
     EXPECT_NEAR(torque(j), weight.dot(ahead - behind) / 2e-6, 1e-4) << "joint " << j + 1;
   }
+}
+
+TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
+  // Virtual work again, for a robot whose links weigh: tau_j = sum over bodies of weight . d(cog)/dq_j.
+  std::mt19937_64 random(4);
+  const Chain heavy = shipped("universal-robots_ur10.yaml");
+  ArmState state = loaded_arm(heavy, random);
+  state.payload.mass = 0;
+  const Eigen::VectorXd torque = ArmKinematics(state).gravity_torque();
+  Eigen::VectorXd work = Eigen::VectorXd::Zero(6);
+  for (int body = 0; body < 6; ++body) {
+    // The link's centre of gravity is the tool point of an arm that ends with that link.
+    ArmState cut = state;
+    std::vector<Joint> joints;
+    for (int i = 0; i <= body; ++i) joints.push_back(heavy.joint(i));
+    const Chain shorter = *Chain::make("cut", joints);
+    cut.chain = &shorter;
+    cut.links.resize(static_cast<std::size_t>(body + 1));
+    cut.X_FT = make_pose(Matrix3::Identity(), heavy.joint(body).p_cog);
+    for (int j = 0; j <= body; ++j) {
+      const Vector3 motion =
+          (ArmKinematics(moved(cut, StateRows(body + 1).theta(j), 1e-6)).tool_pose_W().translation() -
+           ArmKinematics(moved(cut, StateRows(body + 1).theta(j), -1e-6)).tool_pose_W().translation()) /
+          2e-6;
+      work(j) += heavy.joint(body).mass * kGravity * state.gravity_W.dot(motion);
+    }
+  }
+  EXPECT_LT((torque - work).norm(), 1e-5 * work.norm());
 }
 
 TEST(Chain, RefusesWhatIsNoRobot) {

@@ -125,7 +125,7 @@ TEST_F(RealRobot, Ur10SeriesCIsExplainedAndCompensated) {
   EXPECT_LE(c.compensated_mm, 0.30);
 }
 
-const char* const kJointMaps = "M2,joint_map:1,joint_map:2,joint_map:3,joint_map:4,joint_map:5,joint_map:6";
+const char* const kJointMaps = "M3,joint_map:1,joint_map:2,joint_map:3,joint_map:4,joint_map:5,joint_map:6";
 
 TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
   const CompensatedModel c = test::demand(train(cell(), series("c"), quick(kJointMaps, "none")));
@@ -136,7 +136,7 @@ TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
   refit.from = c;
   const CompensatedModel d = test::demand(train(cell(), series("d", 60, 7), refit));
   EXPECT_LE(to_mm(d.parts().validation->calibrated.rms), 0.45);
-  const CompensatedModel without = test::demand(train(cell(), series("c"), quick("M2", "none")));
+  const CompensatedModel without = test::demand(train(cell(), series("c"), quick("M3", "none")));
   refit.from = without;
   const CompensatedModel d_without = test::demand(train(cell(), series("d", 60, 7), refit));
   RecordProperty("series_d_mm", fmt::format("{:.4f}", to_mm(d.parts().validation->calibrated.rms)));
