@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kMaxReweightings = 12;
 constexpr double kSettledStep = 0.05;       // standard deviations; a smaller step is the last one
+constexpr double kFirstSettledStep = 1;     // the same while residuals only serve to find the discrepancy
 constexpr double kNoise = 1e-6;             // of the cost: a rise by less is no rise
 constexpr double kSettledSigma = 2e-3;      // share by which a weighting sigma may still change
 constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together
@@ -156,7 +157,6 @@ struct Expansion {
   double cost = 0;
   Eigen::VectorXd gradient;
   Eigen::MatrixXd information;  ///< second derivative without the priors' share
-  bool beyond_huber = false;    ///< some residual is farther out than a good one
 };
 
 Expansion expand(const CalibrationProblem& problem, const Scaled& s, const Weights& weights, bool robust,
@@ -181,7 +181,6 @@ Expansion expand(const CalibrationProblem& problem, const Scaled& s, const Weigh
     auto r = residuals.segment(filled, cost.num_residuals());
     const double norm = finite ? r.norm() : std::numeric_limits<double>::infinity();
     const double limit = huber_limit(m);
-    at.beyond_huber |= norm > limit;
     if (robust && norm > limit) {
       const double root_weight = std::sqrt(limit / norm);
       r *= root_weight;
@@ -237,7 +236,7 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
     const Eigen::VectorXd step = bounded_step(now.last, now.x, lower);
     const double in_standard_deviations = std::sqrt(step.dot(now.last.information * step) + step.squaredNorm());
     now.x += step;
-    if (in_standard_deviations < kSettledStep) {
+    if (in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep)) {
       now.converged = true;
       now.message = fmt::format("last step {:.1e} standard deviations", in_standard_deviations);
     }
@@ -416,8 +415,7 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
     const auto settled = [](double sigma, double a, double b) {
       return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <= kSettledSigma * std::hypot(sigma, a);
     };
-    const bool outliers_heard = options.robust && !before.estimated && minimum.last.beyond_huber;
-    if (!outliers_heard && settled(tracker.sigma, weights.discrepancy, before.discrepancy) &&
+    if (before.estimated && settled(tracker.sigma, weights.discrepancy, before.discrepancy) &&
         settled(tracker.sigma_rotation, weights.discrepancy_rotation, before.discrepancy_rotation)) {
       break;
     }
