@@ -18,14 +18,17 @@ namespace trammel {
 namespace {
 
 constexpr int kMaxReweightings = 12;
-constexpr double kHuberPosition = 4.03;   // norm that 1 in 1000 exceeds, 3 normal axes
-constexpr double kHuberPose = 4.74;       // the same, 6 axes
-constexpr double kSuspect = 5.5;          // norm of 3 axes that 1 in 10^6 exceeds
-constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation, at most, is left of what was not known
-// Of the priors of sources that are not to change: nothing any data could move, and numbers that the solver keeps
-// digits of.
-constexpr double kHeld = 1e-4;
-constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
+constexpr double kSettledStep = 0.05;       // standard deviations; a smaller step is the last one
+constexpr double kFirstSettledStep = 1;     // the same while residuals only serve to find the discrepancy
+constexpr double kNoise = 1e-6;             // of the cost: a rise by less is no rise
+constexpr double kSettledSigma = 2e-3;      // share by which a weighting sigma may still change
+constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together
+constexpr double kHuberPosition = 4.03;     // norm that 1 in 1000 exceeds, 3 normal axes
+constexpr double kHuberPose = 4.74;         // the same, 6 axes
+constexpr double kSuspect = 5.5;            // norm of 3 axes that 1 in 10^6 exceeds
+constexpr double kIdentifiedShare = 0.5;    // of the prior's standard deviation, at most, is left of what was not known
+constexpr double kHeld = 1e-6;              // of the priors of sources that are not to change
+constexpr double kUnknownWidening = 500;    // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 /// Standard deviations with which residuals are weighed: the measurement's and, on top, the model's own.
 struct Weights {
@@ -63,11 +66,11 @@ class PoseCost final : public ceres::CostFunction {
     if (derivative) {
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
           jacobians[0], num_residuals(), scale_.size());
-      out.topRows<3>().noalias() = -weight_ * J.topRows<3>() * scale_.asDiagonal();
-      if (measurement_.R_WT) {
-        // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
-        out.bottomRows<3>().noalias() =
-            -rotation_weight_ * right_jacobian_inverse(turn) * J.bottomRows<3>() * scale_.asDiagonal();
+      // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
+      const Matrix3 by_turn = -rotation_weight_ * right_jacobian_inverse(turn);
+      for (Eigen::Index k = 0; k < scale_.size(); ++k) {
+        out.col(k).head<3>() = -weight_ * scale_(k) * J.col(k).head<3>();
+        if (measurement_.R_WT) out.col(k).tail<3>() = scale_(k) * (by_turn * J.col(k).tail<3>());
       }
     }
     return X_WT.translation().allFinite();
@@ -143,15 +146,112 @@ Scaled scaled(const PhysicalModel& model, const CalibrateOptions& options) {
   return s;
 }
 
-ceres::Solver::Summary minimise(const CalibrationProblem& problem, const PhysicalModel& model, const Scaled& s,
-                                const Weights& weights, const CalibrateOptions& calibrate_options, Eigen::VectorXd& x) {
+double huber_limit(const Measurement& m) { return m.R_WT ? kHuberPose : kHuberPosition; }
+
+/// Before the discrepancy is known nothing can be called an outlier.
+bool is_robust(const CalibrateOptions& options, const Weights& weights) { return options.robust && weights.estimated; }
+
+/// Half the weighted sum of squares about one point, by the parameters in units of their priors; to second order as
+/// Gauss and Newton have it.
+struct Expansion {
+  double cost = 0;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd information;  ///< second derivative without the priors' share
+};
+
+Expansion expand(const CalibrationProblem& problem, const Scaled& s, const Weights& weights, bool robust,
+                 const Eigen::VectorXd& x) {
+  const Eigen::Index P = s.scale.size();
+  const Eigen::VectorXd from_prior = x - s.prior;
+  Expansion at{0.5 * from_prior.squaredNorm(), from_prior, Eigen::MatrixXd::Zero(P, P)};
+  Eigen::MatrixXd jacobians(P, 6 * kPosesAtATime);  // one column an equation
+  Eigen::VectorXd residuals(6 * kPosesAtATime);
+  Eigen::Index filled = 0;
+  const auto add_filled = [&] {
+    const auto J = jacobians.leftCols(filled);
+    at.gradient.noalias() += J * residuals.head(filled);
+    at.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
+    filled = 0;
+  };
+  for (const Measurement& m : problem.batch.measurements) {
+    const PoseCost cost(problem.model, s.scale, m, weights);
+    const double* values = x.data();
+    double* jacobian = jacobians.col(filled).data();
+    const bool finite = cost.Evaluate(&values, residuals.data() + filled, &jacobian);
+    auto r = residuals.segment(filled, cost.num_residuals());
+    const double norm = finite ? r.norm() : std::numeric_limits<double>::infinity();
+    const double limit = huber_limit(m);
+    if (robust && norm > limit) {
+      const double root_weight = std::sqrt(limit / norm);
+      r *= root_weight;
+      jacobians.middleCols(filled, cost.num_residuals()) *= root_weight;
+      at.cost += limit * (norm - 0.5 * limit);
+    } else {
+      at.cost += 0.5 * norm * norm;
+    }
+    filled += cost.num_residuals();
+    if (filled + 6 > residuals.size()) add_filled();
+  }
+  add_filled();
+  at.information = Eigen::MatrixXd(at.information.selfadjointView<Eigen::Lower>());
+  return at;
+}
+
+/// What minimising came to.
+struct Minimum {
+  Eigen::VectorXd x;
+  Expansion last;  ///< about x, or a negligible step before it
+  std::vector<double> costs;
+  bool converged = false;
+  std::string message;
+};
+
+/// Gauss-Newton step from where `at` was taken. Parameters that stand at their bound and would leave it are held.
+Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
+  Eigen::VectorXd downhill = -at.gradient;
+  Eigen::MatrixXd curvature = at.information;
+  curvature.diagonal().array() += 1;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    if (x(i) > lower(i) || downhill(i) >= 0) continue;
+    downhill(i) = 0;
+    curvature.row(i).setZero();
+    curvature.col(i).setZero();
+    curvature(i, i) = 1;
+  }
+  return (x + curvature.llt().solve(downhill)).cwiseMax(lower) - x;
+}
+
+/// Full Gauss-Newton steps, enough wherever the start is near; nothing where one of them leads uphill.
+std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scaled& s, const Weights& weights,
+                                  const CalibrateOptions& options, const Eigen::VectorXd& start) {
+  Eigen::VectorXd lower(start.size());
+  for (Eigen::Index i = 0; i < lower.size(); ++i)
+    lower(i) = s.parameters[static_cast<std::size_t>(i)].lower / s.scale(i);
+  Minimum now{start.cwiseMax(lower), {}, {}, false, "too many steps"};
+  for (int k = 0; k < std::max(1, options.max_iterations) && !now.converged; ++k) {
+    now.last = expand(problem, s, weights, is_robust(options, weights), now.x);
+    const double cost = now.last.cost;
+    if (!std::isfinite(cost) || (k > 0 && cost > now.costs.back() + kNoise)) return std::nullopt;
+    now.costs.push_back(cost);
+    const Eigen::VectorXd step = bounded_step(now.last, now.x, lower);
+    const double in_standard_deviations = std::sqrt(step.dot(now.last.information * step) + step.squaredNorm());
+    now.x += step;
+    if (in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep)) {
+      now.converged = true;
+      now.message = fmt::format("last step {:.1e} standard deviations", in_standard_deviations);
+    }
+  }
+  return now;
+}
+
+/// From any start.
+Result<Minimum> guarded_steps(const CalibrationProblem& problem, const Scaled& s, const Weights& weights,
+                              const CalibrateOptions& calibrate_options, Eigen::VectorXd x) {
+  const bool robust = is_robust(calibrate_options, weights);
   ceres::Problem ceres_problem;
   for (const Measurement& m : problem.batch.measurements) {
-    // Before the discrepancy is known nothing can be called an outlier.
-    const bool robust = calibrate_options.robust && weights.estimated;
-    ceres_problem.AddResidualBlock(new PoseCost(model, s.scale, m, weights),
-                                   robust ? new ceres::HuberLoss(m.R_WT ? kHuberPose : kHuberPosition) : nullptr,
-                                   x.data());
+    ceres_problem.AddResidualBlock(new PoseCost(problem.model, s.scale, m, weights),
+                                   robust ? new ceres::HuberLoss(huber_limit(m)) : nullptr, x.data());
   }
   ceres_problem.AddResidualBlock(new PriorCost(s.prior), nullptr, x.data());
   for (std::size_t i = 0; i < s.parameters.size(); ++i) {
@@ -169,7 +269,19 @@ ceres::Solver::Summary minimise(const CalibrationProblem& problem, const Physica
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
-  return summary;
+  if (!summary.IsSolutionUsable()) {
+    return refused("calibration of batch {}: the solver failed: {}", problem.batch.id, summary.message);
+  }
+  Minimum found{
+      x, expand(problem, s, weights, robust, x), {}, summary.termination_type == ceres::CONVERGENCE, summary.message};
+  for (const ceres::IterationSummary& step : summary.iterations) found.costs.push_back(step.cost);
+  return found;
+}
+
+Result<Minimum> minimise(const CalibrationProblem& problem, const Scaled& s, const Weights& weights,
+                         const CalibrateOptions& options, const Eigen::VectorXd& start) {
+  if (std::optional<Minimum> found = full_steps(problem, s, weights, options, start)) return std::move(*found);
+  return guarded_steps(problem, s, weights, options, start);
 }
 
 /// The residuals at `values`, SI: 3 x N positions, 3 x M rotations.
@@ -256,76 +368,72 @@ double log_likelihood(const Residuals& r, const Weights& weights, double sigma_r
   return sum;
 }
 
-Information information(const PhysicalModel& model, const MeasurementBatch& batch, const Scaled& s,
-                        const Weights& weights, const Eigen::VectorXd& x) {
-  const auto P = s.scale.size();
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(P, P);
-  for (const Measurement& m : batch.measurements) {
-    const PoseCost cost(model, s.scale, m, weights);
-    Eigen::VectorXd r(cost.num_residuals());
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> J(cost.num_residuals(), P);
-    const double* values = x.data();
-    double* jacobian = J.data();
-    cost.Evaluate(&values, r.data(), &jacobian);
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal.selfadjointView<Eigen::Lower>());
+/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1.
+double freedom_of(const Eigen::MatrixXd& information) {
+  const Eigen::Index P = information.rows();
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(P, P);
+  return static_cast<double>(P) - (information + identity).llt().solve(identity).trace();
+}
+
+Information decomposed(const Eigen::MatrixXd& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const PhysicalModel& model = problem.model;
+  const Tracker& tracker = model.cell->tracker;
   const Scaled s = scaled(model, options);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = model;
-  Eigen::VectorXd x = model.values.cwiseQuotient(s.scale);
   Weights weights;
-  ceres::Solver::Summary summary;
+  Minimum minimum;
+  minimum.x = model.values.cwiseQuotient(s.scale);
+  minimum.converged = P == 0;
+  minimum.message = "nothing to identify";
   Residuals r;
-  double freedom = static_cast<double>(P);  // parameters that the data, not the priors, decide
   for (int round = 0; round < kMaxReweightings; ++round) {
+    double freedom = 0;
     if (P > 0) {
-      summary = minimise(problem, model, s, weights, options, x);
-      result.iterations += static_cast<int>(summary.iterations.size());
-      for (const ceres::IterationSummary& step : summary.iterations) result.cost_record.push_back(step.cost);
-      if (!summary.IsSolutionUsable()) {
-        return refused("calibration of batch {}: the solver failed: {}", problem.batch.id, summary.message);
-      }
-      const Information seen = information(model, problem.batch, s, weights, x);
-      const Eigen::ArrayXd square = seen.singular_values.array().square();
-      freedom = (square / (square + 1)).sum();
+      Result<Minimum> found = minimise(problem, s, weights, options, minimum.x);
+      if (!found) return tl::make_unexpected(found.error());
+      minimum = std::move(*found);
+      result.iterations += static_cast<int>(minimum.costs.size());
+      result.cost_record.insert(result.cost_record.end(), minimum.costs.begin(), minimum.costs.end());
+      freedom = freedom_of(minimum.last.information);
     }
-    r = residuals_of(model, problem.batch, x.cwiseProduct(s.scale));
+    r = residuals_of(model, problem.batch, minimum.x.cwiseProduct(s.scale));
     const double positions = 3.0 * static_cast<double>(r.position.cols());
     const double rotations = 3.0 * static_cast<double>(r.rotation.cols());
     const double share = std::max(0.0, 1 - freedom / (positions + rotations));
     const Weights before = weights;
-    if (options.robust && weights.estimated) r = without_suspects(r, weights);
+    const Residuals trusted = is_robust(options, weights) ? without_suspects(r, weights) : r;
     weights.estimated = true;
-    weights.discrepancy = surplus(r.position, r.sigma, 3.0 * static_cast<double>(r.position.cols()) * share);
+    weights.discrepancy =
+        surplus(trusted.position, trusted.sigma, 3.0 * static_cast<double>(trusted.position.cols()) * share);
     weights.discrepancy_rotation =
-        surplus(r.rotation, Eigen::VectorXd::Constant(r.rotation.cols(), model.cell->tracker.sigma_rotation),
-                rotations * share);
-    const auto settled = [](double a, double b, double floor) { return std::abs(a - b) <= 0.01 * std::max(a, floor); };
-    if (settled(weights.discrepancy, before.discrepancy, model.cell->tracker.sigma) &&
-        settled(weights.discrepancy_rotation, before.discrepancy_rotation, model.cell->tracker.sigma_rotation)) {
+        surplus(r.rotation, Eigen::VectorXd::Constant(r.rotation.cols(), tracker.sigma_rotation), rotations * share);
+    const auto settled = [](double sigma, double a, double b) {
+      return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <= kSettledSigma * std::hypot(sigma, a);
+    };
+    if (before.estimated && settled(tracker.sigma, weights.discrepancy, before.discrepancy) &&
+        settled(tracker.sigma_rotation, weights.discrepancy_rotation, before.discrepancy_rotation)) {
       break;
     }
   }
-  r = residuals_of(model, problem.batch, x.cwiseProduct(s.scale));
-  result.model.values = x.cwiseProduct(s.scale);
+  result.model.values = minimum.x.cwiseProduct(s.scale);
   result.discrepancy = weights.discrepancy;
   result.discrepancy_rotation = weights.discrepancy_rotation;
-  result.log_likelihood = log_likelihood(r, weights, model.cell->tracker.sigma_rotation);
+  result.log_likelihood = log_likelihood(r, weights, tracker.sigma_rotation);
   result.suspects = suspects_of(problem.batch, r, weights);
   result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
-  result.converged = P == 0 || summary.termination_type == ceres::CONVERGENCE;
-  result.message = P == 0 ? "nothing to identify" : summary.message;
+  result.converged = minimum.converged;
+  result.message = minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;
 
-  const Information seen = information(model, problem.batch, s, weights, x);
+  const Information seen = decomposed(minimum.last.information);
   const Eigen::VectorXd variance = (seen.singular_values.array().square() + 1).inverse();
   const Eigen::MatrixXd scaled_covariance = seen.directions * variance.asDiagonal() * seen.directions.transpose();
   result.covariance = s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
