@@ -62,8 +62,35 @@ std::string model_text(const CompensatedModel& model) {
   for (const UnidentifiableCombination& combination : parts.unidentifiable) {
     text += fmt::format("  {}\n", combination.sentence);
   }
+  if (!parts.suspects.empty())
+    text += "poses that do not fit the others (bounded in their pull; measure them again):\n";
+  for (const SuspectPose& pose : parts.suspects) {
+    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
+                        to_mm(pose.distance), pose.sigmas);
+  }
   return text;
 }
+
+namespace {
+
+/// Pairs of parameters whose estimates hang together.
+ordered_json correlations_json(const CompensatedModel::Parts& parts) {
+  constexpr double kWorthTelling = 0.9;
+  ordered_json pairs = ordered_json::array();
+  for (std::size_t i = 0; i < parts.parameters.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto a = static_cast<Eigen::Index>(i);
+      const auto b = static_cast<Eigen::Index>(j);
+      const double correlation = parts.covariance(a, b) / std::sqrt(parts.covariance(a, a) * parts.covariance(b, b));
+      if (std::abs(correlation) < kWorthTelling) continue;
+      pairs.push_back({{"parameters", {parts.parameters[j].parameter.name, parts.parameters[i].parameter.name}},
+                       {"correlation", correlation}});
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
 
 ordered_json model_json(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
@@ -83,6 +110,11 @@ ordered_json model_json(const CompensatedModel& model) {
                             {"singular_value", combination.singular_value},
                             {"sentence", combination.sentence}});
   }
+  ordered_json suspects = ordered_json::array();
+  for (const SuspectPose& pose : parts.suspects) {
+    suspects.push_back(
+        {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"sigmas", pose.sigmas}});
+  }
   ordered_json json = {{"model", provenance.id},
                        {"hash", provenance.hash},
                        {"cell", model.cell().name},
@@ -95,6 +127,10 @@ ordered_json model_json(const CompensatedModel& model) {
                        {"seed", provenance.seed},
                        {"rank", parts.rank},
                        {"condition_number", parts.condition_number},
+                       {"observability_index", parts.observability_index},
+                       {"cost_record", parts.cost_record},
+                       {"suspect_poses", suspects},
+                       {"correlations", correlations_json(parts)},
                        {"parameters", parameters},
                        {"not_identifiable", combinations},
                        {"training", evaluation_json(parts.training)}};

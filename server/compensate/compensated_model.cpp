@@ -236,33 +236,38 @@ bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
   return batch_hash(batch) == parts().provenance.batch_hash;
 }
 
-Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
+CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch& batch) const {
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Eigen::Matrix3Xd nominal(3, n);
-  Eigen::Matrix3Xd calibrated(3, n);
-  Eigen::Matrix3Xd compensated(3, n);
-  Evaluation evaluation;
-  evaluation.poses = static_cast<int>(n);
+  LevelErrors errors{
+      Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
   const bool own = is_own(batch);
-  Eigen::Index covered = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
     PoseContext context = m.context;
     context.served = !own;
     const Vector3 p_B = X_BW * m.p_W;
     const ErrorPrediction prediction = predict(context, Domain::kDecide);
-    nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
-    calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();
-    compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
-    covered += (compensated.col(i).array().abs() <= kInterval95 * prediction.stddev_B.array()).count();
-    evaluation.in_domain += prediction.in_domain ? 1 : 0;
+    errors.nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
+    errors.calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();
+    errors.compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
+    errors.stddev.col(i) = prediction.stddev_B;
+    errors.in_domain.push_back(prediction.in_domain);
   }
-  evaluation.nominal = figures_of(nominal);
-  evaluation.calibrated = figures_of(calibrated);
-  evaluation.compensated = figures_of(compensated);
-  evaluation.coverage_95 = static_cast<double>(covered) / static_cast<double>(3 * n);
+  return errors;
+}
+
+Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
+  const LevelErrors errors = errors_B(batch);
+  Evaluation evaluation;
+  evaluation.poses = static_cast<int>(batch.measurements.size());
+  evaluation.nominal = figures_of(errors.nominal);
+  evaluation.calibrated = figures_of(errors.calibrated);
+  evaluation.compensated = figures_of(errors.compensated);
+  evaluation.coverage_95 =
+      (errors.compensated.array().abs() <= kInterval95 * errors.stddev.array()).cast<double>().mean();
+  evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   return evaluation;
 }
 

@@ -92,6 +92,9 @@ class CompensatedModel {
     Eigen::MatrixXd covariance;  ///< of the parameters, SI
     int rank = 0;
     double condition_number = 0;
+    double observability_index = 0;  ///< see CalibrationResult, as the next two
+    std::vector<SuspectPose> suspects;
+    std::vector<double> cost_record;
     double discrepancy = 0;  ///< m per axis, see CalibrationResult
     std::optional<BiasState> bias;
     JointVector q_min, q_max;                                    ///< range of the training poses, rad
@@ -116,6 +119,13 @@ class CompensatedModel {
   /// Target correction, source section 3.4.1.
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
+  /// Measured - predicted of every pose, 3 x N, m, in B, at the three levels.
+  struct LevelErrors {
+    Eigen::Matrix3Xd nominal, calibrated, compensated;
+    Eigen::Matrix3Xd stddev;  ///< expected of compensated
+    std::vector<bool> in_domain;
+  };
+  [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
   /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty. Poses of another
   /// batch than the model's own are met as served: what began at a pose has happened, what the tracker did does not
   /// count.

@@ -123,6 +123,11 @@ Json content_of(const CompensatedModel::Parts& parts) {
     unidentifiable.push_back(
         {{"singular_value", u.singular_value}, {"parameters", u.parameters}, {"sentence", u.sentence}});
   }
+  Json suspects = Json::array();
+  for (const SuspectPose& pose : parts.suspects) {
+    suspects.push_back(
+        {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_m", pose.distance}, {"sigmas", pose.sigmas}});
+  }
   Json content = {{"cell_yaml", physics.cell->cell_yaml},
                   {"robot_yaml", physics.cell->robot_yaml},
                   {"X_WB", to_json(physics.X_WB)},
@@ -134,6 +139,9 @@ Json content_of(const CompensatedModel::Parts& parts) {
                   {"unidentifiable", std::move(unidentifiable)},
                   {"rank", parts.rank},
                   {"condition_number", parts.condition_number},
+                  {"observability_index", parts.observability_index},
+                  {"suspects", std::move(suspects)},
+                  {"cost_record", parts.cost_record},
                   {"discrepancy_m", parts.discrepancy},
                   {"q_min", to_json(Eigen::MatrixXd(parts.q_min))},
                   {"q_max", to_json(Eigen::MatrixXd(parts.q_max))},
@@ -184,6 +192,11 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   }
   parts.rank = content.at("rank");
   parts.condition_number = content.at("condition_number");
+  parts.observability_index = content.at("observability_index");
+  for (const Json& pose : content.at("suspects")) {
+    parts.suspects.push_back({pose.at("pose_id"), pose.at("row"), pose.at("distance_m"), pose.at("sigmas")});
+  }
+  content.at("cost_record").get_to(parts.cost_record);
   parts.discrepancy = content.at("discrepancy_m");
   parts.q_min = matrix_from(content.at("q_min"));
   parts.q_max = matrix_from(content.at("q_max"));

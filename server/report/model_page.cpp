@@ -157,6 +157,18 @@ std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
   return html + "</ul>\n";
 }
 
+std::string suspects_text(const CompensatedModel::Parts& parts) {
+  if (parts.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
+  std::string html =
+      "<p>These fit the others so badly that their pull was bounded. Measure them again.</p>\n<table>\n"
+      "<tr><th>pose</th><th>row</th><th>off by, mm</th><th>sigma</th></tr>\n";
+  for (const SuspectPose& pose : parts.suspects) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.0f}</td></tr>\n", html_text(pose.pose_id),
+                        pose.row, to_mm(pose.distance), pose.sigmas);
+  }
+  return html + "</table>\n";
+}
+
 /// |error| of each pose, mm, at two levels.
 struct PoseErrors {
   std::vector<double> calibrated, compensated;
@@ -165,12 +177,10 @@ struct PoseErrors {
 
 PoseErrors errors_of(const CompensatedModel& model, const MeasurementBatch& batch) {
   PoseErrors errors{{}, {}, fmt::format("Poses of batch {} by their error", batch.id)};
-  for (const Measurement& measurement : batch.measurements) {
-    MeasurementBatch one;
-    one.measurements = {measurement};
-    const Evaluation evaluation = model.evaluate(one);
-    errors.calibrated.push_back(to_mm(evaluation.calibrated.rms));
-    errors.compensated.push_back(to_mm(evaluation.compensated.rms));
+  const CompensatedModel::LevelErrors levels = model.errors_B(batch);
+  for (Eigen::Index i = 0; i < levels.calibrated.cols(); ++i) {
+    errors.calibrated.push_back(to_mm(levels.calibrated.col(i).norm()));
+    errors.compensated.push_back(to_mm(levels.compensated.col(i).norm()));
   }
   return errors;
 }
@@ -252,6 +262,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"provenance", provenance_table(model, compared.evaluation)},
                   {"parameters", parameter_table(model)},
                   {"unidentifiable", unidentifiable_text(model.parts())},
+                  {"suspects", suspects_text(model.parts())},
                   {"data", chart_data(model, batch, compared.evaluation)},
                   {"chart_js", std::string(embedded::chart_js)}});
 }

@@ -70,11 +70,17 @@ double domain_limit(const BiasModel& bias) {
 }
 
 /// The bias of `kernel`, learned from what the physics of `parts` leaves over of `batch`.
-Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const std::string& kernel,
+Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, const std::string& kernel,
                 std::uint64_t seed, const std::function<bool(double)>& progress) {
   parts.bias.reset();
   parts.prior_share_limit = 0;
   if (kernel == "none") return {};
+  // What does not fit the others is not learned: a smooth function would spread it over its neighbours.
+  MeasurementBatch batch = all;
+  std::erase_if(batch.measurements, [&](const Measurement& m) {
+    return std::any_of(parts.suspects.begin(), parts.suspects.end(),
+                       [&](const SuspectPose& pose) { return pose.pose_id == m.pose_id && pose.row == m.row; });
+  });
   if (batch.measurements.size() < kLeastBiasPoses) {
     return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
                    batch.measurements.size(), kLeastBiasPoses);
@@ -157,6 +163,9 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   parts.covariance = std::move(calibration->covariance);
   parts.rank = calibration->rank;
   parts.condition_number = calibration->condition_number;
+  parts.observability_index = calibration->observability_index;
+  parts.suspects = std::move(calibration->suspects);
+  parts.cost_record = std::move(calibration->cost_record);
   parts.discrepancy = calibration->discrepancy;
 
   const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), options.seed,

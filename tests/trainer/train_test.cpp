@@ -49,6 +49,46 @@ TEST(Train, HoldsOutTheRowsThatTheBatchCallsValidation) {
   EXPECT_GT(spoiled.parts().validation->calibrated.rms, 5e-3);
 }
 
+TEST(Train, TheModelRemembersThePosesThatDidNotFit) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 100, 46);
+  batch.measurements[7].p_W += Vector3(0.5e-3, 0, 0);
+  const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "none")));
+  const CompensatedModel stored = test::demand(deserialize(serialize(model), "memory"));
+  ASSERT_EQ(stored.parts().suspects.size(), 1u);
+  EXPECT_EQ(stored.parts().suspects[0].pose_id, batch.measurements[7].pose_id);
+  EXPECT_NEAR(to_mm(stored.parts().suspects[0].distance), 0.5, 0.06);
+  EXPECT_GT(stored.parts().observability_index, 1);
+  EXPECT_GE(stored.parts().cost_record.size(), 2u);
+}
+
+TEST(Train, ABadPoseIsNotLearned) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch batch = test::measured(robot, 120, 49);
+  batch.measurements[18].p_W += Vector3(0.5e-3, 0, 0);
+  const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "se")));
+  const Evaluation fresh = model.evaluate(test::measured(robot, 400, 50));
+  EXPECT_LT(to_mm(fresh.compensated.rms), 0.026);
+  EXPECT_LT(to_mm(fresh.compensated.max), 0.08);
+}
+
+TEST(Train, ATrackerThatMovedIsNoPartOfWhatIsServed) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 160, 47);
+  const Pose moved = make_pose(rotation_exp({1e-4, -2e-4, 3e-4}), {0.4e-3, -0.3e-3, 0.2e-3});
+  for (std::size_t i = 90; i < batch.measurements.size(); ++i) {
+    Measurement& m = batch.measurements[i];
+    m.p_W = moved * m.p_W;
+    m.R_WT = (moved.linear() * *m.R_WT).eval();
+  }
+  const CompensatedModel model = test::demand(train(cell, batch, quick("M3,tracker_moved@91", "none")));
+  EXPECT_LT(to_mm(model.parts().training.calibrated.rms), 0.024);
+  // Another day's batch, the tracker where it was at first.
+  const Evaluation fresh = model.evaluate(test::measured(test::chapter_5_robot(cell), 300, 48));
+  EXPECT_LT(to_mm(fresh.calibrated.rms), 0.025);
+}
+
 TEST(Train, GivesUpWhenAsked) {
   const auto cell = test::cell_7();
   TrainOptions options = quick("M1", "se");
