@@ -516,6 +516,41 @@ Status check_context(const CalibrationProblem& problem) {
   return {};
 }
 
+/// The source that `name` means in the model (a cause stands for the form that is there), set back to its prior; added
+/// where the model has none of it. Returns its full name.
+Result<std::string> free_source(PhysicalModel& model, const std::string& name) {
+  std::vector<std::string> names = alternatives(name, *model.cell);
+  names.insert(names.begin(), name);
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    if (contains(names, source->name())) {
+      for (Eigen::Index k = 0; k < count; ++k) {
+        model.values(first + k) = source->parameters()[static_cast<std::size_t>(k)].prior;
+      }
+      return source->name();
+    }
+    first += count;
+  }
+  Result<ErrorSourcePtr> added = make_error_source(name, *model.cell);
+  if (!added) return tl::make_unexpected(added.error());
+  std::size_t place = 0;
+  first = 0;
+  while (place < model.sources.size() && acting_order(model.sources[place]->name()) <= acting_order((*added)->name())) {
+    first += static_cast<Eigen::Index>(model.sources[place++]->parameters().size());
+  }
+  const std::vector<Parameter>& parameters = (*added)->parameters();
+  const Eigen::Index after = model.values.size() - first;
+  Eigen::VectorXd values(model.values.size() + static_cast<Eigen::Index>(parameters.size()));
+  values.head(first) = model.values.head(first);
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    values(first + static_cast<Eigen::Index>(k)) = parameters[k].prior;
+  values.tail(after) = model.values.tail(after);
+  model.values = values;
+  model.sources.insert(model.sources.begin() + static_cast<std::ptrdiff_t>(place), *added);
+  return (*added)->name();
+}
+
 /// First value index of each source.
 std::vector<Eigen::Index> first_values(const PhysicalModel& model) {
   std::vector<Eigen::Index> first;
@@ -614,21 +649,27 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
 Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
                                 const std::vector<std::string>& only, CalibrateOptions options) {
   if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
-  for (const std::string& name : only) {
-    if (std::none_of(model.sources.begin(), model.sources.end(), [&](const auto& s) { return s->name() == name; })) {
-      return failure(ErrorCode::kUsage, "error source '{}' to be refitted is not in the model", name);
-    }
-  }
   CalibrationProblem problem{model, batch};
-  options.only = only;
-  const std::vector<Eigen::Index> first = first_values(model);
-  for (std::size_t k = 0; k < model.sources.size(); ++k) {
-    const auto count = static_cast<Eigen::Index>(model.sources[k]->parameters().size());
-    if (contains(only, model.sources[k]->name())) problem.model.values.segment(first[k], count).setZero();
+  for (const std::string& name : only) {
+    Result<std::string> source = free_source(problem.model, name);
+    if (!source) return tl::make_unexpected(source.error());
+    options.only.push_back(std::move(*source));
   }
+  if (Status fit = check_context(problem); !fit) return tl::make_unexpected(fit.error());
   if (Status located = locate_unknown_frames(problem.model, batch); !located)
     return tl::make_unexpected(located.error());
-  return identify(problem, options);
+  Result<CalibrationResult> result = identify(problem, options);
+  if (!result) return result;
+  // What is held is known: nothing is to be said of it.
+  std::erase_if(result->unidentifiable, [&](const UnidentifiableCombination& combination) {
+    return std::none_of(problem.model.sources.begin(), problem.model.sources.end(), [&](const ErrorSourcePtr& source) {
+      const std::vector<Parameter>& own = source->parameters();
+      return contains(options.only, source->name()) && std::any_of(own.begin(), own.end(), [&](const Parameter& p) {
+               return p.name == combination.parameters.front();
+             });
+    });
+  });
+  return result;
 }
 
 Eigen::MatrixXd CalibrationResult::correlation() const {

@@ -74,7 +74,8 @@ struct CalibrationResult {
                                                   const CalibrateOptions& options);
 
 /// Identifies the sources in `only` anew on `batch` (the tracker was set up again, the tool was changed), and leaves
-/// all others at what `model` says. Unknown frames are found anew; the sources in `only` start at zero.
+/// all others at what `model` says. Unknown frames are found anew; the sources in `only` start at
+/// their priors and are added where the model has none.
 [[nodiscard]] Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
                                               const std::vector<std::string>& only, CalibrateOptions options = {});
 

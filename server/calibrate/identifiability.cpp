@@ -32,9 +32,9 @@ Eigen::MatrixXd disentangled(Eigen::MatrixXd directions) {
   return directions;
 }
 
-/// `direction` in typical units.
+/// `direction` in typical units; `strength` of each parameter alone, in prior units.
 UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd& direction,
-                                   const std::vector<Parameter>& parameters) {
+                                   const std::vector<Parameter>& parameters, const Eigen::VectorXd& strength) {
   constexpr double kMatters = 0.1;  // of the largest part
   std::vector<std::size_t> order(parameters.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -48,10 +48,16 @@ UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd&
     if (weight(i) >= kMatters * weight(order.front())) combination.parameters.push_back(parameters[i].name);
   }
   const std::string names = joined(combination.parameters);
-  combination.sentence =
-      combination.parameters.size() == 1
-          ? fmt::format("{}: these poses do not show it; it stays at its prior", names)
-          : fmt::format("{} move the tool the same way at these poses: only a combination of them is known", names);
+  if (combination.parameters.size() > 1) {
+    combination.sentence =
+        fmt::format("{} move the tool the same way at these poses: only a combination of them is known", names);
+  } else if (strength(static_cast<Eigen::Index>(order.front())) < 1) {
+    combination.sentence = fmt::format("{}: these poses do not show it; it stays at its prior", names);
+  } else {
+    combination.sentence = fmt::format(
+        "{}: several other parameters together move the tool the same way at these poses; it stays at its prior",
+        names);
+  }
   return combination;
 }
 
@@ -62,12 +68,14 @@ std::vector<UnidentifiableCombination> unidentifiable_combinations(const Informa
                                                                    const Eigen::VectorXd& to_typical) {
   const auto unseen = (seen.singular_values.array() < 1).count();  // ascending: the first ones
   if (unseen == 0) return {};
+  const Eigen::VectorXd strength =
+      (seen.singular_values.asDiagonal() * seen.directions.transpose()).colwise().norm().transpose();
   const Eigen::MatrixXd directions = disentangled(to_typical.asDiagonal() * seen.directions.leftCols(unseen));
   std::vector<UnidentifiableCombination> combinations;
   for (Eigen::Index k = 0; k < unseen; ++k) {
     const Eigen::VectorXd in_prior_units = directions.col(k).cwiseQuotient(to_typical).normalized();
     const double value = (seen.singular_values.asDiagonal() * seen.directions.transpose() * in_prior_units).norm();
-    combinations.push_back(in_words(value, directions.col(k), parameters));
+    combinations.push_back(in_words(value, directions.col(k), parameters, strength));
   }
   return combinations;
 }

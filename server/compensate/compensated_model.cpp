@@ -108,13 +108,42 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
   return predict(context, Domain::kDecide);
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain domain) const {
+Vector3 CompensatedModel::variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
+                                             const Vector3& p_B) const {
+  const PhysicalModel& physics = parts().physics;
+  const Pose X_BW = physics.X_WB.inverse();
+  Vector3 variance = Vector3::Zero();
+  const auto add = [&](const PoseContext& other) {
+    variance += (X_BW * physics.pose_W(other).translation() - p_B).cwiseAbs2();
+  };
+  bool warm = false;
+  for (const ErrorSourcePtr& source : physics.sources) {
+    const ContextNeeds needs = source->needs();
+    warm = warm || needs.temperature;
+    if (!needs.direction || !context.direction.empty()) continue;
+    PoseContext approached = context;
+    approached.direction.assign(static_cast<std::size_t>(context.q.size()), 0);
+    approached.direction[static_cast<std::size_t>(source->joint())] = 1;
+    add(approached);
+  }
+  if (warm && temperature_unsaid && context.temperature) {
+    PoseContext warmer = context;
+    *warmer.temperature += parts().temperature_stddev;
+    add(warmer);
+  }
+  return variance;
+}
+
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked, Domain domain) const {
+  PoseContext context = asked;
+  if (!context.temperature) context.temperature = parts().temperature_mean;
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   Eigen::MatrixXd J_W;
   ErrorPrediction prediction;
   prediction.X_BT_nominal = X_BW * physics.nominal_pose_W(context);
   prediction.X_BT_predicted = X_BW * physics.pose_W(context, physics.values, &J_W);
+  const Vector3 unsaid = variance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
   const Eigen::MatrixXd J_B = X_BW.linear() * J_W.topRows<3>();
   const Vector3 identified = (J_B * parts().covariance * J_B.transpose()).diagonal();
   const double sigma = cell().tracker.sigma;
@@ -138,7 +167,7 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& context, Domain dom
       variance += bias.mean_B.cwiseAbs2() + bias.stddev_B.cwiseAbs2();
     }
   }
-  prediction.stddev_B = variance.cwiseSqrt();
+  prediction.stddev_B = (variance + unsaid).cwiseSqrt();
   prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
   return prediction;
 }
@@ -250,6 +279,7 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
     const Vector3 p_B = X_BW * m.p_W;
     const ErrorPrediction prediction = predict(context, Domain::kDecide);
     errors.nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
+    if (!context.temperature) context.temperature = parts().temperature_mean;
     errors.calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();
     errors.compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
     errors.stddev.col(i) = prediction.stddev_B;

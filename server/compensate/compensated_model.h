@@ -97,8 +97,10 @@ class CompensatedModel {
     std::vector<double> cost_record;
     double discrepancy = 0;  ///< m per axis, see CalibrationResult
     std::optional<BiasState> bias;
-    JointVector q_min, q_max;                                    ///< range of the training poses, rad
-    double prior_share_limit = 0;                                ///< in domain: prior share not above this
+    std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
+    double temperature_stddev = 0;           ///< K
+    JointVector q_min, q_max;                ///< range of the training poses, rad
+    double prior_share_limit = 0;            ///< in domain: prior share not above this
     std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
     ModelProvenance provenance;                                  ///< id and hash are filled in by make()
     Evaluation training;                                         ///< on the poses it was trained on
@@ -139,6 +141,10 @@ class CompensatedModel {
   enum class Domain { kDecide, kInside, kOutside };
   [[nodiscard]] ErrorPrediction predict(const PoseContext& context, Domain domain) const;
   [[nodiscard]] bool in_range(const JointVector& q) const;
+  /// Variance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
+  /// approached, how warm the arm is.
+  [[nodiscard]] Vector3 variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
+                                           const Vector3& p_B) const;
   [[nodiscard]] bool is_own(const MeasurementBatch& batch) const;
   explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
   std::shared_ptr<const Inside> inside_;

@@ -154,6 +154,9 @@ Json content_of(const CompensatedModel::Parts& parts) {
                     {"batch_hash", parts.provenance.batch_hash},
                     {"training_poses", parts.provenance.training_poses},
                     {"seed", parts.provenance.seed}}}};
+  if (parts.temperature_mean) {
+    content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
+  }
   if (parts.bias) content["bias"] = to_json(*parts.bias);
   if (parts.validation) content["validation"] = to_json(*parts.validation);
   return content;
@@ -203,6 +206,10 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.prior_share_limit = content.at("prior_share_limit");
   content.at("trained_with").get_to(parts.trained_with);
   parts.training = evaluation_from(content.at("training"));
+  if (content.contains("temperature_c")) {
+    parts.temperature_mean = content.at("temperature_c").at("mean").get<double>();
+    parts.temperature_stddev = content.at("temperature_c").at("stddev");
+  }
   if (content.contains("bias")) parts.bias = bias_from(content.at("bias"));
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   const Json& provenance = content.at("provenance");

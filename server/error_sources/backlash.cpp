@@ -7,8 +7,9 @@ namespace trammel {
 
 namespace {
 
-/// Play in a gear: the joint stops short on the side it came from, by half the play, and by more the harder the load
-/// presses: delta q = dir (b + k |tau|). Approached from one side only it is a joint zero.
+/// Play in a gear: the joint hangs back from where its motor is, by half the play and by more the harder the load
+/// presses: delta q = -dir (b + k |tau|), dir the sense of the approach. Approached from one side only it is a joint
+/// zero.
 class Backlash final : public ErrorSource {
  public:
   explicit Backlash(const SourceSpec& spec)
@@ -29,7 +30,8 @@ class Backlash final : public ErrorSource {
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
     if (context.direction.empty()) return;
-    const double direction = context.direction[static_cast<std::size_t>(joint_)];
+    // Moving up, the joint hangs back, and so below what its motor says.
+    const double direction = -context.direction[static_cast<std::size_t>(joint_)];
     const ArmKinematics kinematics(state);
     const double torque = kinematics.gravity_torque()(joint_);
     if (jacobian != nullptr) {

@@ -12,6 +12,8 @@ namespace trammel {
 
 namespace {
 
+constexpr double kMostPoses = 1e6;  // in a batch, for steps
+
 enum class Joint { kNone, kOne };
 enum class At { kNone, kPose, kNumbers };
 
@@ -86,7 +88,8 @@ Result<SourceSpec> parse_spec(const std::string& text, const Known& known, const
       spec.at.push_back(value);
     }
   }
-  if (known.at == At::kPose && (spec.at.size() != 1 || spec.at[0] != std::floor(spec.at[0]))) {
+  if (known.at == At::kPose &&
+      (spec.at.size() != 1 || spec.at[0] != std::floor(spec.at[0]) || spec.at[0] > kMostPoses)) {
     return failure(ErrorCode::kUsage, "error source '{}': expected {}@pose, the row of the batch at which it begins",
                    text, text.substr(0, at));
   }

@@ -43,9 +43,6 @@ class ErrorSource {
   [[nodiscard]] virtual ContextNeeds needs() const { return {}; }
   /// 0-based joint it concerns; -1 where it concerns the whole arm.
   [[nodiscard]] virtual int joint() const { return -1; }
-  /// True for what belongs to one measuring session and not to the robot (a tracker that moved): no part of a
-  /// prediction.
-  [[nodiscard]] virtual bool of_the_session() const { return false; }
   /// A source that needs a search over its first parameter before anything can be refined (the order of a gear's error)
   /// says so: range and step of the search.
   struct Search {

@@ -10,7 +10,8 @@ namespace {
 class JointSlip final : public JointError {
  public:
   explicit JointSlip(const SourceSpec& spec)
-      : JointError(spec.text, spec.joint, {angle_parameter(fmt::format("slip{}", spec.joint + 1), 2e-3)}),
+      : JointError(spec.text, spec.joint,
+                   {angle_parameter(fmt::format("slip{}@{:.0f}", spec.joint + 1, spec.at[0]), 2e-3)}),
         first_(static_cast<int>(spec.at[0]) - 1) {}
   std::string explanation() const override {
     return fmt::format("joint {} lost its zero at pose {}", joint() + 1, first_ + 1);

@@ -56,7 +56,7 @@ class PayloadError final : public ErrorSource {
 class PayloadChanged final : public ErrorSource {
  public:
   explicit PayloadChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
-    add_four(parameters_, "_changed");
+    add_four(parameters_, fmt::format("@{}", first_ + 1));
   }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }

@@ -85,6 +85,10 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
     if (!source) return tl::make_unexpected(source.error());
     for (const ErrorSourcePtr& other : model.sources) {
+      if (other->name().starts_with("compliance") && (*source)->name().starts_with("compliance")) {
+        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(),
+                       spec);
+      }
       if (other->name() == (*source)->name()) return failure(ErrorCode::kUsage, "error source '{}' given twice", spec);
     }
     model.sources.push_back(std::move(*source));

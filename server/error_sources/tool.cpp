@@ -46,7 +46,7 @@ class Tool final : public ErrorSource {
 class ToolChanged final : public ErrorSource {
  public:
   explicit ToolChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
-    add_six(parameters_, "_changed");
+    add_six(parameters_, fmt::format("@{}", first_ + 1));
   }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }

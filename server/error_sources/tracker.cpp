@@ -12,7 +12,14 @@ constexpr double kSecondsPerHour = 3600;
 /// with its rotation about the origin of B.
 class TrackerMoved final : public ErrorSource {
  public:
-  explicit TrackerMoved(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {}
+  explicit TrackerMoved(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
+    for (const char* name : {"mx", "my", "mz"}) {
+      parameters_.push_back(length_parameter(fmt::format("{}@{}", name, first_ + 1), 0.5));
+    }
+    for (const char* name : {"mrz", "mry", "mrx"}) {
+      parameters_.push_back(angle_parameter(fmt::format("{}@{}", name, first_ + 1), 5e-4));
+    }
+  }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
@@ -27,9 +34,7 @@ class TrackerMoved final : public ErrorSource {
  private:
   std::string name_;
   int first_;
-  const std::vector<Parameter> parameters_ = {length_parameter("mx", 0.5),  length_parameter("my", 0.5),
-                                              length_parameter("mz", 0.5),  angle_parameter("mrz", 5e-4),
-                                              angle_parameter("mry", 5e-4), angle_parameter("mrx", 5e-4)};
+  std::vector<Parameter> parameters_;
 };
 
 /// The tracker creeps: the same motion in proportion to the time since the first pose.

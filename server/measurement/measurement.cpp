@@ -19,7 +19,11 @@ Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& 
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
     return tl::make_unexpected(columns.error());
   }
+  const auto timed = std::find_if(batch.measurements.begin(), batch.measurements.end(),
+                                  [](const Measurement& m) { return m.context.time.has_value(); });
+  const double origin = timed == batch.measurements.end() ? 0 : *timed->context.time;
   for (Measurement& measurement : batch.measurements) {
+    if (measurement.context.time) *measurement.context.time -= origin;
     if (measurement.context.q.size() != cell.robot.size()) {
       return refused("{} row {}: {} joints, robot {} has {}", where, measurement.row, measurement.context.q.size(),
                      cell.robot.name(), cell.robot.size());

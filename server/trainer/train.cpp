@@ -97,6 +97,19 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   return {};
 }
 
+/// What to take the arm's temperature for where a request does not say it.
+void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
+  std::vector<double> known;
+  for (const Measurement& m : trained.measurements) {
+    if (m.context.temperature) known.push_back(*m.context.temperature);
+  }
+  parts.temperature_mean.reset();
+  if (known.empty()) return;
+  const Eigen::Map<const Eigen::ArrayXd> t(known.data(), static_cast<Eigen::Index>(known.size()));
+  parts.temperature_mean = t.mean();
+  parts.temperature_stddev = std::sqrt((t - t.mean()).square().mean());
+}
+
 /// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
 void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const MeasurementBatch& trained,
                      const TrainOptions& options) {
@@ -106,6 +119,7 @@ void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& bat
     parts.q_max = parts.q_max.cwiseMax(m.context.q);
     parts.trained_with.emplace(m.context.tool, m.context.payload);
   }
+  record_temperature(parts, trained);
   parts.provenance.level.clear();
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();

@@ -219,7 +219,23 @@ TEST(Calibrate, RefitsTheToolAndLeavesTheRobotAlone) {
     if (p.parameter.name.starts_with("t")) continue;
     EXPECT_NEAR(p.value, parameter(first, p.parameter.name).value, 1e-7) << p.parameter.name;
   }
-  EXPECT_FALSE(refit(first.model, measured(robot, 15, 21), {"payload"}));
+  EXPECT_FALSE(refit(first.model, measured(robot, 15, 21), {"gremlins"}));
+}
+
+TEST(Calibrate, RefitsACauseThatTheModelDidNotHaveAndTheFormThatItHas) {
+  const auto cell = cell_7();
+  VirtualRobot robot = chapter_5_robot(cell);
+  const CalibrationResult plain =
+      *calibrate(cell, {"base", "geometry", "compliance_linear"}, measured(robot, 200, 24), {});
+  robot.truth.tools["spindle"].translation() += Vector3(-1e-3, 1e-3, 1e-3);
+  const Result<CalibrationResult> added = refit(plain.model, measured(robot, 40, 25), {"tool", "compliance"});
+  ASSERT_TRUE(added) << added.error().message;
+  EXPECT_LE(validation_rms_mm(*added, measured(robot, 300, 26)), 0.030);
+  EXPECT_NEAR(parameter(*added, "tx").value, -1e-3, 5e-5);
+  for (const UnidentifiableCombination& combination : added->unidentifiable) {
+    EXPECT_TRUE(combination.parameters.front()[0] == 't' || combination.parameters.front()[0] == 'C')
+        << combination.sentence;
+  }
 }
 
 TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {

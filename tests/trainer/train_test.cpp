@@ -5,6 +5,8 @@
 #include <filesystem>
 
 #include "server/base/units.h"
+#include "server/plan/plan.h"
+#include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -71,6 +73,40 @@ TEST(Train, ABadPoseIsNotLearned) {
   const Evaluation fresh = model.evaluate(test::measured(robot, 400, 50));
   EXPECT_LT(to_mm(fresh.compensated.rms), 0.026);
   EXPECT_LT(to_mm(fresh.compensated.max), 0.08);
+}
+
+TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot =
+      test::demand(read_virtual_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/truth/chapter-6.yaml", cell));
+  const Eigen::MatrixXd q = test::demand(plan_poses(*cell, {.count = 250, .seed = 51}));
+  std::vector<PoseContext> poses(250);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].q = q.row(static_cast<Eigen::Index>(i)).transpose();
+    for (int j = 0; j < 6; ++j)
+      poses[i].direction.push_back((i * 7 + static_cast<std::size_t>(j) * 3) % 5 < 2 ? 1 : -1);
+  }
+  MeasurementBatch batch = test::demand(simulate(robot, poses, {}));
+  batch.id = "warm";
+  const std::string level = "M3,thermal_growth,backlash:1,backlash:2,backlash:3";
+  const CompensatedModel model = test::demand(train(cell, batch, quick(level, "none")));
+  // The same robot, another day: nobody says how warm it is or from where it comes.
+  for (Measurement& m : batch.measurements) {
+    m.context.temperature.reset();
+    m.context.direction.clear();
+  }
+  const Evaluation unsaid = model.evaluate(batch);
+  EXPECT_GT(unsaid.coverage_95, 0.9);
+  EXPECT_GT(unsaid.calibrated.rms, 1.2 * model.parts().training.calibrated.rms);
+  // A clock that counts from another day is the same session.
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].time = 1.7e9 + 20.0 * static_cast<double>(i);
+  MeasurementBatch later = test::demand(simulate(robot, poses, {}));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    later.measurements[i].context.temperature = 20.5 + 0.02 * static_cast<double>(i);
+  }
+  const MeasurementBatch checked = test::demand(check_against_cell(later, *cell));
+  EXPECT_EQ(*checked.measurements.front().context.time, 0);
+  EXPECT_EQ(*checked.measurements[100].context.time, 2000);
 }
 
 TEST(Train, ATrackerThatMovedIsNoPartOfWhatIsServed) {
