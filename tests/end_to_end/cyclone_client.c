@@ -55,6 +55,8 @@ static void* take_one(dds_entity_t participant, dds_entity_t reader) {
 
 int main(int argc, char** argv) {
   if (argc != 3) return fail("usage: cyclone_client DOMAIN CELL");
+  /* Without it Cyclone DDS would speak on every interface; with it, on the loopback profile that it holds. */
+  if (getenv("CYCLONEDDS_URI") == NULL) return fail("CYCLONEDDS_URI must hold the loopback profile");
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
   if (participant < 0) return fail("no participant");
 
