@@ -178,6 +178,20 @@ TEST(ErrorSources, AStepBeginsAtItsPose) {
   }
 }
 
+TEST(ErrorSources, AJointWithPlayHangsBackFromWhereItIsGoing) {
+  const auto cell = cell_7();
+  PhysicalModel model = *make_physical_model(cell, {"backlash:1"});
+  model.values(0) = 1e-4;
+  PoseContext context = some_pose(*cell, 14);
+  const auto reached = [&](int sense) {
+    context.direction = {sense, 0, 0, 0, 0, 0};
+    return rotation_log(model.pose_W(context).linear() * model.nominal_pose_W(context).linear().transpose());
+  };
+  // Joint 1 turns about the base's z axis.
+  EXPECT_LT((reached(1) - Vector3(0, 0, -1e-4)).norm(), 1e-9);
+  EXPECT_LT((reached(-1) - Vector3(0, 0, 1e-4)).norm(), 1e-9);
+}
+
 TEST(ErrorSources, BendingIsTheCantileverOfTheTextbook) {
   // Link 2 level, load at its end: F l^3 / 3EI down, slope F l^2 / 2EI, plus the moment of the load's lever beyond the
   // end.
