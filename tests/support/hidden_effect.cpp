@@ -1,0 +1,333 @@
+#include "tests/support/hidden_effect.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <numbers>
+
+namespace trammel::hidden {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix4d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kTurn = 2 * std::numbers::pi;
+const Vector3d kTrackerStand(4200, -1800, 1300);  // mm
+constexpr double kReferenceTemperature = 20;
+
+VectorXd one(double value) { return VectorXd::Constant(1, value); }
+double either_sign(Random& random) { return whole(random, 0, 1) == 1 ? 1 : -1; }
+double some(Random& random, double size) { return size * either_sign(random) * uniform(random, 0.6, 1.4); }
+
+VectorXd draw_motion(Random& random, double shift_mm, double turn) {
+  VectorXd values(6);
+  for (Index k = 0; k < 3; ++k) values(k) = shift_mm * normal(random);
+  for (Index k = 3; k < 6; ++k) values(k) = turn * normal(random);
+  return values;
+}
+
+Matrix4d motion_of(const VectorXd& values) { return motion(values.head<3>(), values(3), values(4), values(5)); }
+
+const std::vector<std::string> kMotionNames = {"x", "y", "z", "rz", "ry", "rx"};
+
+Effect effect(const HiddenCause& cause, std::vector<std::string> names, VectorXd values,
+              std::function<void(const MeasuringPose&, const VectorXd&, Moment&)> act) {
+  std::vector<bool> grows(names.size(), true);
+  return {cause, std::move(names), std::move(values), std::move(grows), std::move(act)};
+}
+
+Index joint_of(const HiddenCause& cause) { return cause.joint - 1; }
+
+Effect base(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, kMotionNames, draw_motion(random, 0.5, 5e-4),
+                [](const MeasuringPose&, const VectorXd& v, Moment& m) { m.arm.base = m.arm.base * motion_of(v); });
+}
+
+/// One number of the arm's own table, or of its gearboxes.
+Effect arm_parameter(const HiddenCause& cause, const Scene&, Random& random) {
+  const auto& all = arm_parameters();
+  Index at = 0;
+  while (at < static_cast<Index>(all.size()) && all[static_cast<std::size_t>(at)].name != cause.parameter) ++at;
+  const double unit = all[static_cast<std::size_t>(at)].unit;
+  const bool stiffness = cause.cause == "compliance";
+  return effect(cause, {cause.parameter}, one(0.1 * unit * (stiffness ? 1 : either_sign(random))),
+                [at, count = static_cast<Index>(all.size())](const MeasuringPose&, const VectorXd& v, Moment& m) {
+                  VectorXd values = VectorXd::Zero(count);
+                  values(at) = v(0);
+                  m.arm = changed(m.arm, values);
+                });
+}
+
+/// One of the loads is heavier or lighter than the cell file says.
+Effect payload(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const int load = whole(random, 0, scene.loads - 1);
+  return effect(cause, {"mass"}, one(some(random, 4)), [load](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    if (p.load == load) m.arm.load.mass_kg += v(0);
+  });
+}
+
+Effect payload_changed(const HiddenCause& cause, const Scene&, Random& random) {
+  VectorXd values(4);
+  values << some(random, 4), 8 * normal(random), 8 * normal(random), 8 * normal(random);
+  return effect(cause, {"mass", "cx", "cy", "cz"}, values,
+                [first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.index < first) return;
+                  m.arm.load.mass_kg += v(0);
+                  m.arm.load.cog_mm += v.segment<3>(1);
+                });
+}
+
+Effect tool(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const int which = whole(random, 0, scene.tools - 1);
+  return effect(cause, kMotionNames, draw_motion(random, 0.3, 3e-4),
+                [which](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.tool == which) m.arm.tool = motion_of(v) * m.arm.tool;
+                });
+}
+
+Effect tool_changed(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, kMotionNames, draw_motion(random, 0.2, 3e-4),
+                [first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.index >= first) m.arm.tool = motion_of(v) * m.arm.tool;
+                });
+}
+
+/// A ripple of any order, with a weak one of twice the order on top.
+Effect gear_transmission(const HiddenCause& cause, const Scene&, Random& random) {
+  const double phase = uniform(random, 0, kTurn);
+  VectorXd values(3);
+  values << 5e-5 * std::cos(phase), 5e-5 * std::sin(phase), uniform(random, 8, cause.joint <= 3 ? 120 : 70);
+  Effect made = effect(cause, {"sine", "cosine", "order"}, values,
+                       [j = joint_of(cause)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                         const double at = v(2) * p.q(j);
+                         m.q(j) += v(0) * std::sin(at) + v(1) * std::cos(at) +
+                                   0.1 * (v(1) * std::sin(2 * at) + v(0) * std::cos(2 * at));
+                       });
+  made.grows[2] = false;
+  return made;
+}
+
+Effect encoder_eccentricity(const HiddenCause& cause, const Scene&, Random& random) {
+  const double phase = uniform(random, 0, kTurn);
+  VectorXd values(2);
+  values << 2e-4 * std::cos(phase), 2e-4 * std::sin(phase);
+  const double second_phase = uniform(random, 0, kTurn);
+  return effect(cause, {"sine", "cosine"}, values,
+                [j = joint_of(cause), second_phase](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const double q = p.q(j);
+                  m.q(j) += v(0) * std::sin(q) + v(1) * std::cos(q) + 0.03 * v.norm() * std::sin(2 * q + second_phase);
+                });
+}
+
+/// Many orders at once, none of which stands out.
+Effect joint_map(const HiddenCause& cause, const Scene&, Random& random) {
+  constexpr int kLowest = 2;
+  constexpr int kHighest = 9;
+  std::vector<std::pair<double, double>> waves;
+  for (int h = kLowest; h <= kHighest; ++h) waves.emplace_back(uniform(random, 0.7, 1.3), uniform(random, 0, kTurn));
+  return effect(cause, {"size"}, one(4e-5),
+                [j = joint_of(cause), waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  for (std::size_t k = 0; k < waves.size(); ++k) {
+                    const double order = kLowest + static_cast<double>(k);
+                    m.q(j) += v(0) * waves[k].first * std::sin(order * p.q(j) + waves[k].second);
+                  }
+                });
+}
+
+/// Play that the load widens a little.
+Effect backlash(const HiddenCause& cause, const Scene& scene, Random&) {
+  double mean_moment = 1;
+  for (const MeasuringPose& pose : *scene.poses) {
+    mean_moment +=
+        std::abs(load_moments(scene.arm, pose.q)(joint_of(cause))) / static_cast<double>(scene.poses->size());
+  }
+  const double share = scene.load_widens_play ? 0.1 : 0;
+  return effect(cause, {"play"}, one(4e-5),
+                [j = joint_of(cause), mean_moment, share](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const double moment = share > 0 ? std::abs(load_moments(m.arm, p.q)(j)) / mean_moment : 0;
+                  m.q(j) -= p.direction[static_cast<std::size_t>(j)] * v(0) * (1 - share + share * moment);
+                });
+}
+
+Effect wrist_coupling(const HiddenCause& cause, const Scene&, Random& random) {
+  VectorXd values(3);
+  values << some(random, 1e-4), some(random, 1e-4), some(random, 1e-4);
+  return effect(cause, {"k54", "k64", "k65"}, values, [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    m.q(4) += v(0) * (p.q(3) + 0.05 * std::sin(p.q(3)));
+    m.q(5) += v(1) * (p.q(3) + 0.05 * std::sin(p.q(3))) + v(2) * p.q(4);
+  });
+}
+
+Effect link_bending(const HiddenCause& cause, const Scene&, Random&) {
+  return effect(cause, {"flex"}, one(1e-13), [j = joint_of(cause)](const MeasuringPose&, const VectorXd& v, Moment& m) {
+    m.arm.flex[static_cast<std::size_t>(j)] += v(0);
+  });
+}
+
+/// The links grow with their own temperature, which follows the thermometer.
+Effect thermal_growth(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, {"growth"}, one(uniform(random, 3e-6, 1e-5)),
+                [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const double factor = 1 + v(0) * (p.link_temperature_c - kReferenceTemperature);
+                  for (Link& link : m.arm.links) {
+                    link.a *= factor;
+                    link.d *= factor;
+                  }
+                });
+}
+
+/// The stand moves: it is shifted, and turned about its own place.
+Matrix4d stand_moved(const VectorXd& values) {
+  return motion(kTrackerStand, 0, 0, 0) * motion_of(values) * motion(-kTrackerStand, 0, 0, 0);
+}
+
+Effect tracker_moved(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, kMotionNames, draw_motion(random, 0.05, 1.5e-5),
+                [first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.index >= first) m.seen = stand_moved(v) * m.seen;
+                });
+}
+
+/// It creeps, a little faster in the beginning.
+Effect tracker_drift(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const double start = scene.poses->front().time_s;
+  const double whole_time = scene.poses->back().time_s - start;
+  return effect(cause, kMotionNames, draw_motion(random, 0.08, 2e-5),
+                [start, whole_time](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const double share = (p.time_s - start) / whole_time;
+                  m.seen = stand_moved(v * (share + 0.1 * share * (1 - share))) * m.seen;
+                });
+}
+
+Effect joint_slip(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, {"slip"}, one(some(random, 5e-5)),
+                [j = joint_of(cause), first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.index >= first) m.q(j) += v(0);
+                });
+}
+
+Effect time_lag(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(cause, {"lag"}, one(some(random, 3e-3)),
+                [](const MeasuringPose& p, const VectorXd& v, Moment& m) { m.q -= v(0) * p.velocity; });
+}
+
+Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
+  VectorXd values(3);
+  for (Index k = 0; k < 3; ++k) values(k) = 0.1 * normal(random);
+  return effect(cause, {"x", "y", "z"}, values,
+                [first = cause.first](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.index == first) m.shift += v;
+                });
+}
+
+/// A smooth random function of some joints, in three axes of the base: waves of random direction and phase.
+Effect unknown(const HiddenCause& cause, const Scene&, Random& random) {
+  constexpr int kWaves = 40;
+  struct Wave {
+    Joints order = Joints::Zero();
+    Vector3d size = Vector3d::Zero();
+    double phase = 0;
+  };
+  std::vector<Wave> waves(kWaves);
+  const double length = uniform(random, 0.6, 1.0);  // rad
+  for (Wave& wave : waves) {
+    for (const std::string& joint : cause.depends_on) wave.order(joint.at(1) - '1') = normal(random) / length;
+    wave.size = Vector3d(normal(random), normal(random), normal(random)) / std::sqrt(kWaves / 2.0);
+    wave.phase = uniform(random, 0, kTurn);
+  }
+  return effect(cause, {"size"}, one(0.02), [waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    for (const Wave& wave : waves) m.shift += v(0) * wave.size * std::cos(wave.order.dot(p.q) + wave.phase);
+  });
+}
+
+using Maker = Effect (*)(const HiddenCause&, const Scene&, Random&);
+
+const std::map<std::string, Maker>& makers() {
+  static const std::map<std::string, Maker> all = {{"base", base},
+                                                   {"geometry", arm_parameter},
+                                                   {"compliance", arm_parameter},
+                                                   {"payload", payload},
+                                                   {"payload_changed", payload_changed},
+                                                   {"tool", tool},
+                                                   {"tool_changed", tool_changed},
+                                                   {"gear_transmission", gear_transmission},
+                                                   {"encoder_eccentricity", encoder_eccentricity},
+                                                   {"joint_map", joint_map},
+                                                   {"backlash", backlash},
+                                                   {"wrist_coupling", wrist_coupling},
+                                                   {"link_bending", link_bending},
+                                                   {"thermal_growth", thermal_growth},
+                                                   {"tracker_moved", tracker_moved},
+                                                   {"tracker_drift", tracker_drift},
+                                                   {"joint_slip", joint_slip},
+                                                   {"time_lag", time_lag},
+                                                   {"outlier", outlier},
+                                                   {"unknown", unknown}};
+  return all;
+}
+
+/// Parameters of the arm's table that nothing but themselves makes: not the base, not the tool.
+const std::vector<std::string> kOwnGeometry = {"a1", "alpha1", "q2", "a2", "alpha2", "beta2", "q3", "d3",
+                                               "a3", "alpha3", "q4", "d4", "alpha4", "q5",    "d5", "alpha5"};
+
+}  // namespace
+
+std::string to_string(const HiddenCause& cause) {
+  std::string text = cause.cause;
+  if (!cause.parameter.empty()) return text + ":" + cause.parameter;
+  if (cause.joint > 0) text += ":" + std::to_string(cause.joint);
+  if (cause.first >= 0) text += "@" + std::to_string(cause.first + 1);
+  for (const std::string& joint : cause.depends_on) text += " " + joint;
+  return text;
+}
+
+const std::vector<std::string>& hideable_causes() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    for (const auto& [name, maker] : makers()) {
+      if (name != "unknown") list.push_back(name);
+    }
+    return list;
+  }();
+  return names;
+}
+
+HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& random) {
+  HiddenCause cause{name, 0, "", -1, {}};
+  const auto count = static_cast<int>(scene.poses->size());
+  if (name == "gear_transmission" || name == "encoder_eccentricity" || name == "joint_map" || name == "backlash") {
+    cause.joint = whole(random, 1, 6);
+  } else if (name == "joint_slip") {
+    cause.joint = whole(random, 2, 6);
+  } else if (name == "link_bending") {
+    cause.joint = whole(random, 0, 1) == 0 ? 2 : 4;
+  } else if (name == "compliance") {
+    cause.joint = whole(random, 2, 5);
+    cause.parameter = "C" + std::to_string(cause.joint);
+  } else if (name == "geometry") {
+    cause.parameter =
+        kOwnGeometry[static_cast<std::size_t>(whole(random, 0, static_cast<int>(kOwnGeometry.size()) - 1))];
+  }
+  if (name == "tracker_moved" || name == "joint_slip" || name == "tool_changed" || name == "payload_changed") {
+    cause.first = whole(random, count / 4, 3 * count / 4);
+  } else if (name == "outlier") {
+    cause.first = whole(random, 0, count - 1);
+  }
+  return cause;
+}
+
+Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const auto found = makers().find(cause.cause);
+  if (found == makers().end()) {
+    std::fprintf(stderr, "no effect is called %s\n", cause.cause.c_str());
+    std::abort();
+  }
+  return found->second(cause, scene, random);
+}
+
+}  // namespace trammel::hidden

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/support/hidden_poses.h"
+
+namespace trammel::hidden {
+
+/// What was hidden, in the words in which it is to be named.
+struct HiddenCause {
+  std::string cause;                    ///< `gear_transmission`; `unknown` for a function that no cause makes
+  int joint = 0;                        ///< 1-based; 0 where it concerns the whole arm
+  std::string parameter;                ///< `C3`, `a2`
+  int first = -1;                       ///< row from which it acts, or that is out; -1 elsewhere
+  std::vector<std::string> depends_on;  ///< of `unknown`: `q4`
+};
+[[nodiscard]] std::string to_string(const HiddenCause& cause);
+
+/// The arm and its surroundings at one pose, while effects act on them.
+struct Moment {
+  Arm arm;
+  Joints q = Joints::Zero();
+  Eigen::Matrix4d seen = Eigen::Matrix4d::Identity();  ///< motion of all that the tracker sees
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();     ///< mm, of the reading alone
+};
+
+/// One effect: what it does with given numbers. Shapes differ a little from what a calibration would assume.
+struct Effect {
+  HiddenCause cause;
+  std::vector<std::string> names;  ///< of the values
+  Eigen::VectorXd values;
+  std::vector<bool> grows;  ///< which values are the effect's size, zero where there is none
+  std::function<void(const MeasuringPose&, const Eigen::VectorXd&, Moment&)> act;
+};
+
+/// What effects must know of the scene they act in.
+struct Scene {
+  Arm arm;  ///< true, with the first tool and load
+  const std::vector<MeasuringPose>* poses = nullptr;
+  int tools = 1;
+  int loads = 1;
+  bool load_widens_play = true;
+};
+
+/// Every cause that can be hidden.
+[[nodiscard]] const std::vector<std::string>& hideable_causes();
+/// `cause` with its joint, pose and parameter drawn.
+[[nodiscard]] HiddenCause draw_cause(const std::string& cause, const Scene& scene, Random& random);
+/// `cause` with its numbers and shape drawn, of a size as robots show it.
+[[nodiscard]] Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random);
+
+}  // namespace trammel::hidden

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <string>
+#include <vector>
+
+/// A second, small simulation of a robot arm, for tests that hide an effect and ask for it. It shares nothing with the
+/// server: own kinematics, own load, own deflection. Lengths in mm, angles in rad, masses in kg, forces in N, joints
+/// counted from 0.
+namespace trammel::hidden {
+
+constexpr int kJoints = 6;
+using Joints = Eigen::Matrix<double, kJoints, 1>;
+
+/// One row of the arm's table: Tz(d) Rz(theta) Tx(a) Rx(alpha), or with `parallel` Rz(theta) Tx(a) Rx(alpha) Ry(beta).
+struct Link {
+  double theta = 0, d = 0, a = 0, alpha = 0, beta = 0;
+  bool parallel = false;
+};
+
+struct Load {
+  double mass_kg = 0;
+  Eigen::Vector3d cog_mm = Eigen::Vector3d::Zero();  ///< in the flange
+};
+
+/// Everything that decides where the tool stands.
+struct Arm {
+  std::array<Link, kJoints> links;
+  Eigen::Matrix4d base = Eigen::Matrix4d::Identity();  ///< world from base
+  Eigen::Matrix4d tool = Eigen::Matrix4d::Identity();  ///< flange from tool
+  Load load;
+  Joints give = Joints::Zero();           ///< rad/Nmm, of each gearbox
+  std::array<double, kJoints> flex = {};  ///< 1/(N mm2), 1/EI of each link in its middle; 0: rigid
+};
+
+/// The ABB IRB 6640 as its maker draws it, carrying nothing.
+[[nodiscard]] Arm drawn_arm();
+
+/// Tx Ty Tz Rz Ry Rx.
+[[nodiscard]] Eigen::Matrix4d motion(const Eigen::Vector3d& shift_mm, double about_z, double about_y, double about_x);
+
+/// Moment of the load about every joint axis, Nmm, in the loaded posture.
+[[nodiscard]] Joints load_moments(const Arm& arm, const Joints& q);
+/// World from tool, gearboxes and links having given way until moments and deflections agree.
+[[nodiscard]] Eigen::Matrix4d tool_frame(const Arm& arm, const Joints& q);
+
+/// What a calibration could change of the arm, as one vector: `x0`..`alpha0`, `q1`..`alpha6`, `C1`..`C6`.
+struct ArmParameter {
+  std::string name;
+  std::string group;  ///< base, geometry, compliance
+  double unit = 1;    ///< mm, rad or rad/Nmm that it may reasonably be off by
+};
+[[nodiscard]] const std::vector<ArmParameter>& arm_parameters();
+/// `arm` with `values` added to it, in the order of arm_parameters().
+[[nodiscard]] Arm changed(Arm arm, const Eigen::VectorXd& values);
+
+}  // namespace trammel::hidden
