@@ -534,21 +534,9 @@ Result<std::string> free_source(PhysicalModel& model, const std::string& name) {
   }
   Result<ErrorSourcePtr> added = make_error_source(name, *model.cell);
   if (!added) return tl::make_unexpected(added.error());
-  std::size_t place = 0;
-  first = 0;
-  while (place < model.sources.size() && acting_order(model.sources[place]->name()) <= acting_order((*added)->name())) {
-    first += static_cast<Eigen::Index>(model.sources[place++]->parameters().size());
-  }
-  const std::vector<Parameter>& parameters = (*added)->parameters();
-  const Eigen::Index after = model.values.size() - first;
-  Eigen::VectorXd values(model.values.size() + static_cast<Eigen::Index>(parameters.size()));
-  values.head(first) = model.values.head(first);
-  for (std::size_t k = 0; k < parameters.size(); ++k)
-    values(first + static_cast<Eigen::Index>(k)) = parameters[k].prior;
-  values.tail(after) = model.values.tail(after);
-  model.values = values;
-  model.sources.insert(model.sources.begin() + static_cast<std::ptrdiff_t>(place), *added);
-  return (*added)->name();
+  std::string full_name = (*added)->name();
+  add_source(model, std::move(*added));
+  return full_name;
 }
 
 /// First value index of each source.

@@ -79,6 +79,22 @@ Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& pa
   return kinematics.tool_pose_W();
 }
 
+Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source) {
+  std::size_t place = 0;
+  Eigen::Index first = 0;
+  while (place < model.sources.size() && acting_order(model.sources[place]->name()) <= acting_order(source->name())) {
+    first += static_cast<Eigen::Index>(model.sources[place++]->parameters().size());
+  }
+  const std::vector<Parameter>& parameters = source->parameters();
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  const Eigen::VectorXd after = model.values.tail(model.values.size() - first);
+  model.values.conservativeResize(first + count + after.size());
+  for (Eigen::Index k = 0; k < count; ++k) model.values(first + k) = parameters[static_cast<std::size_t>(k)].prior;
+  model.values.tail(after.size()) = after;
+  model.sources.insert(model.sources.begin() + static_cast<std::ptrdiff_t>(place), std::move(source));
+  return first;
+}
+
 Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, const std::vector<std::string>& specs) {
   PhysicalModel model;
   for (const std::string& spec : specs) {

@@ -36,6 +36,9 @@ struct PhysicalModel {
   [[nodiscard]] ArmState nominal_state(const PoseContext& context) const;
 };
 
+/// Puts `source` at its place in the acting order, at its prior values; index of its first value.
+Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source);
+
 /// A model of `cell` with the sources that `specs` name, at their prior values. An unknown base or tool is identity
 /// until it is found.
 [[nodiscard]] Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell,

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+namespace trammel {
+
+/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` times unknown
+/// numbers of unit variance each (the model's own parameters in units of their priors, smooth functions that were found
+/// before). Its covariance is S = 1 + Z Zᵀ; by the matrix inversion lemma S⁻¹ = 1 - U Uᵀ with U = Z L⁻ᵀ, 1 + ZᵀZ = L
+/// Lᵀ.
+class Background {
+ public:
+  explicit Background(Eigen::MatrixXd columns);
+
+  /// S⁻¹ y of every column.
+  [[nodiscard]] Eigen::MatrixXd project(const Eigen::MatrixXd& y) const;
+  /// R x p.
+  [[nodiscard]] const Eigen::MatrixXd& root() const { return root_; }
+  /// R x p: Z.
+  [[nodiscard]] const Eigen::MatrixXd& columns() const { return columns_; }
+  /// p x k: posterior means of the unknown numbers given each column of y; their covariance.
+  [[nodiscard]] Eigen::MatrixXd estimate(const Eigen::MatrixXd& y) const;
+  [[nodiscard]] Eigen::MatrixXd covariance() const;
+
+ private:
+  Eigen::MatrixXd columns_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::MatrixXd root_;
+};
+
+}  // namespace trammel

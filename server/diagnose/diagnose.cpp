@@ -1,0 +1,228 @@
+#include "server/diagnose/diagnose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/hash.h"
+#include "server/base/units.h"
+#include "server/diagnose/dependence.h"
+#include "server/diagnose/findings.h"
+#include "server/diagnose/folds.h"
+#include "server/diagnose/next_poses.h"
+#include "server/diagnose/recovery.h"
+#include "server/diagnose/search.h"
+#include "server/diagnose/separability.h"
+#include "server/diagnose/wording.h"
+#include "server/measurement/repeats.h"
+#include "server/measurement/velocity.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t kRecoveries = 3;
+constexpr int kFewestPoses = 12;
+
+Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
+
+bool reported(const DiagnoseOptions& options, const std::string& stage, double share) {
+  return !options.progress || options.progress(stage, share);
+}
+
+/// The cell's sources, and the tool where nobody knows it.
+std::vector<std::string> sources_of(const Cell& cell) {
+  std::vector<std::string> sources = cell.model.error_sources;
+  const bool unknown = std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
+  const auto has = [&](const char* name) { return std::find(sources.begin(), sources.end(), name) != sources.end(); };
+  if (unknown && has("geometry") && !has("tool")) sources.emplace_back("tool");
+  return sources;
+}
+
+std::vector<std::string> limits_of(const MeasurementBatch& batch, const RepeatStatistics& repeats) {
+  const auto none = [&](const std::function<bool(const Measurement&)>& has) {
+    return std::none_of(batch.measurements.begin(), batch.measurements.end(), has);
+  };
+  std::vector<std::string> limits;
+  if (none([](const Measurement& m) { return m.R_WT.has_value(); }))
+    limits.emplace_back("no orientations: several geometry parameters and all of the tool's rotation stay unseen");
+  if (none([](const Measurement& m) { return m.context.time.has_value(); }))
+    limits.emplace_back("no times: a drift, and what warms up, can only be told by the order of the poses");
+  if (none([](const Measurement& m) { return m.context.temperature.has_value(); }))
+    limits.emplace_back("no temperatures: thermal growth cannot be named");
+  if (none([](const Measurement& m) { return !m.context.direction.empty(); }))
+    limits.emplace_back("no approach directions: backlash cannot be named");
+  if (repeats.degrees_of_freedom == 0)
+    limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
+  return limits;
+}
+
+void fill_unexplained(Diagnosis& diagnosis, const SearchResult& found, const LinearProblem& problem,
+                      const Background& all) {
+  if (found.unnamed.empty()) return;
+  const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
+                                               [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
+  diagnosis.unexplained = {true, {}, 0, strongest.p_value};
+  for (const Unnamed& one : found.unnamed) {
+    for (const std::string& on : one.depends_on) {
+      auto& list = diagnosis.unexplained.depends_on;
+      if (std::find(list.begin(), list.end(), on) == list.end()) list.push_back(on);
+    }
+  }
+  const Index P = problem.nuisance().cols();
+  const VectorXd numbers = all.estimate(problem.residual());
+  const Index count = numbers.size() - P;
+  diagnosis.unexplained.rms = problem.position_rms(all.columns().rightCols(count) * numbers.tail(count));
+}
+
+Verdict verdict_of(const Diagnosis& diagnosis) {
+  if (diagnosis.findings.empty()) return diagnosis.unexplained.present ? Verdict::kUnknown : Verdict::kNothing;
+  const bool doubt = std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                                 [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  return doubt ? Verdict::kAmbiguous : Verdict::kNamed;
+}
+
+/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last the noise.
+std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
+                                        const LinearProblem& after, const std::vector<Finding>& findings) {
+  std::vector<WaterfallStep> steps;
+  Eigen::Matrix3Xd nominal(3, before.poses());
+  for (Index i = 0; i < before.poses(); ++i) {
+    const Measurement& m = before.batch().measurements[static_cast<std::size_t>(i)];
+    nominal.col(i) = m.p_W - found.before.nominal_pose_W(m.context).translation();
+  }
+  steps.push_back({"nominal", figures_of(nominal).rms});
+  steps.push_back({"calibrated", before.position_rms(before.residual())});
+  double square = std::pow(after.position_rms(after.residual()), 2);
+  std::vector<WaterfallStep> tail;
+  for (auto finding = findings.rbegin(); finding != findings.rend(); ++finding) {
+    tail.push_back({to_string(finding->cause), std::sqrt(square)});
+    if (!finding->source.empty()) square += std::pow(finding->effect_rms, 2);
+  }
+  steps.insert(steps.end(), tail.rbegin(), tail.rend());
+  steps.push_back({"noise of one measurement", std::sqrt(3.0) * after.noise()});
+  return steps;
+}
+
+}  // namespace
+
+Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                           const DiagnoseOptions& options) {
+  Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
+  if (!checked) return tl::make_unexpected(checked.error());
+  fill_velocity(*checked);
+  const BatchSplit split = split_batch(*checked, 0, options.seed);
+  const MergedRepeats merged = merge_repeats(split.train, cell->tracker.sigma);
+  if (merged.batch.measurements.size() < static_cast<std::size_t>(kFewestPoses)) {
+    return refused("batch {}: {} poses to diagnose, at least {}", batch.id, merged.batch.measurements.size(),
+                   kFewestPoses);
+  }
+  if (!reported(options, "calibrating", 0)) return tl::make_unexpected(given_up());
+  Result<SearchResult> searched = search_causes(cell, sources_of(*cell), merged.batch, options);
+  if (!searched) return tl::make_unexpected(searched.error());
+  const SearchResult& found = *searched;
+
+  if (!reported(options, "measuring the gain", 0.65)) return tl::make_unexpected(given_up());
+  const std::vector<std::string> candidates = candidate_sources(*cell, found.batch, nullptr);
+  const LinearProblem before(found.before, found.all, found.before_priors, candidates);
+  const LinearProblem after(found.model, found.batch, found.priors, candidates);
+  const MatrixXd columns = background_columns(after, found.unnamed);
+  const Background all(columns);
+
+  Diagnosis diagnosis;
+  diagnosis.poses = static_cast<int>(found.all.measurements.size());
+  diagnosis.noise = after.noise();
+  diagnosis.noise_from = merged.statistics.degrees_of_freedom > 0
+                             ? fmt::format("{} poses measured repeatedly ({:.1f} um an axis) and what is left",
+                                           merged.statistics.groups, 1e6 * merged.statistics.sigma)
+                             : "the tracker's sigma and what is left";
+  diagnosis.before = figures_of(before.positions(before.residual()));
+  diagnosis.after = figures_of(after.positions(after.residual()));
+  diagnosis.findings = findings_of(found, after);
+  fill_unexplained(diagnosis, found, after, all);
+  diagnosis.verdict = verdict_of(diagnosis);
+  for (const Accepted& one : found.accepted) {
+    if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
+  }
+  for (const ErrorSourcePtr& source : found.before.sources) diagnosis.sources_before.push_back(source->name());
+  diagnosis.sources_after = diagnosis.sources_before;
+  for (const Finding& finding : diagnosis.findings) {
+    if (!finding.source.empty() && finding.could_also_be.empty()) diagnosis.sources_after.push_back(finding.source);
+  }
+  if (split.validation.measurements.empty()) {
+    const HeldOut held_out = held_out_of(before, after);
+    diagnosis.held_out_before = held_out.before;
+    diagnosis.held_out_after = held_out.after;
+    diagnosis.held_out_how = fmt::format("{} folds, each predicted from the others", Folds(after).count());
+  } else {
+    const auto errors = [&](const PhysicalModel& model) {
+      Eigen::Matrix3Xd e(3, static_cast<Index>(split.validation.measurements.size()));
+      for (Index i = 0; i < e.cols(); ++i) {
+        const Measurement& m = split.validation.measurements[static_cast<std::size_t>(i)];
+        e.col(i) = model.X_WB.linear().transpose() * (m.p_W - model.pose_W(m.context).translation());
+      }
+      return figures_of(e);
+    };
+    diagnosis.held_out_before = errors(found.before);
+    diagnosis.held_out_after = errors(found.model);
+    diagnosis.held_out_how = fmt::format("{} validation rows", split.validation.measurements.size());
+  }
+
+  if (!reported(options, "asking what could not have been seen", 0.72)) return tl::make_unexpected(given_up());
+  const std::vector<FamilyPtr> families = make_families(after);
+  const MatrixXd null = draw_null(all, std::min(options.draws, 200), options.seed + 1);
+  const Scan seen = scan(families, all, after.residual(), null);
+  Blindness blind = blindness(after, families, all, seen);
+  diagnosis.could_not_have_seen = std::move(blind.unseen);
+  static_cast<void>(candidate_sources(*cell, found.batch, &diagnosis.could_not_have_seen));
+  diagnosis.not_separable = std::move(blind.inseparable);
+
+  const Background first(before.nuisance());
+  for (int joint = 0; joint < cell->robot.size(); ++joint) {
+    if (cell->robot.joint(joint).type != JointType::kRevolute || !make_gear_family(before, joint)) continue;
+    Periodogram lines = periodogram(before, joint, first);
+    lines.limit = strength_for(found.limit, 2);
+    diagnosis.periodograms.push_back(std::move(lines));
+  }
+  diagnosis.waterfall = waterfall_of(found, before, after, diagnosis.findings);
+
+  if (!reported(options, "planning the next poses", 0.8)) return tl::make_unexpected(given_up());
+  diagnosis.next_poses = next_poses_for(found, before, options);
+  if (options.recovery) {
+    if (!reported(options, "hiding effects in the poses", 0.85)) return tl::make_unexpected(given_up());
+    std::vector<std::size_t> places;
+    const auto add = [&](const std::string& cause, int joint) {
+      for (std::size_t f = 0; f < families.size() && places.size() < kRecoveries; ++f) {
+        const Cause one = families[f]->cause(families[f]->typical());
+        if (families[f]->named() && one.cause == cause && (joint < 0 || one.joint == joint)) {
+          if (std::find(places.begin(), places.end(), f) == places.end()) places.push_back(f);
+          break;
+        }
+      }
+    };
+    for (const Finding& finding : diagnosis.findings) add(finding.cause.cause, finding.cause.joint);
+    add("gear_transmission", -1);
+    add("encoder_eccentricity", 1);
+    add("tracker_moved", -1);
+    diagnosis.recovery = recovery_of(after, families, all, null, seen, places);
+  }
+  if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
+  diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);
+  diagnosis.limits = limits_of(found.all, merged.statistics);
+
+  const Matrix3 R_BW = found.before.X_WB.linear().transpose();
+  diagnosis.batch = found.batch;
+  diagnosis.residual_after_B = R_BW * after.positions(after.residual());
+  const LinearProblem same_poses(found.before, found.batch, found.before_priors, {});
+  diagnosis.residual_before_B = R_BW * same_poses.positions(same_poses.residual());
+  diagnosis.batch_hash = batch_hash(batch);
+  diagnosis.cell_hash = sha256_hex(cell->cell_yaml + cell->robot_yaml);
+  diagnosis.seed = options.seed;
+  diagnosis.sentence = sentence_for(diagnosis);
+  return diagnosis;
+}
+
+}  // namespace trammel

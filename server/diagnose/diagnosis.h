@@ -1,0 +1,150 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+/// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
+namespace trammel {
+
+/// One physical cause, named as the contract spells it.
+struct Cause {
+  std::string cause;            ///< `gear_transmission`, `tool`, `outlier`, ...
+  int joint = -1;               ///< 0-based; -1 where it concerns the whole arm
+  std::string parameter;        ///< `C3`, `d6`: where one number of the cause is meant; else empty
+  std::string pose_id;          ///< the pose at which it begins, or that is out; else empty
+  std::optional<double> order;  ///< cycles a joint turn, of gear_transmission
+
+  friend bool operator==(const Cause&, const Cause&) = default;
+};
+/// For people and for lists: `gear_transmission:3`, `geometry:d6`, `tracker_moved`.
+[[nodiscard]] std::string to_string(const Cause& cause);
+
+/// A number found, in the unit people read it in.
+struct Estimate {
+  std::string name;
+  std::string unit;
+  double value = 0;
+  double u95 = 0;  ///< half width of the 95 % interval, selection included
+};
+
+/// A cause that the simulation lacks.
+struct Finding {
+  Cause cause;
+  std::string source;  ///< as a cell file's list of error sources would spell it; empty for an outlier
+  std::vector<Estimate> parameters;
+  double effect_rms = 0;             ///< m, Euclidean, of what it does to the poses measured
+  ErrorFigures held_out_before;      ///< without this cause, the others found in place
+  ErrorFigures held_out_after;       ///< with it
+  double held_out_gain = 0;          ///< m: rms before - after
+  double strength = 0;               ///< lambda: whitened effect that nothing else in the model explains, squared
+  double p_value = 1;                ///< of the best of all candidates, under the null
+  double naming_frequency = 1;       ///< share of bootstrap repetitions that name this cause
+  std::vector<Cause> could_also_be;  ///< explain it as well; empty: named
+  std::string action;                ///< for the shop floor
+};
+
+enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };
+[[nodiscard]] std::string_view to_string(Verdict verdict);
+
+/// What is left and is not noise.
+struct Unexplained {
+  bool present = false;
+  std::vector<std::string> depends_on;  ///< `q4`, `time`, `torque`
+  double rms = 0;                       ///< m
+  double p_value = 1;
+};
+
+/// A cause that this batch could not have shown, or only from some size on.
+struct Unseen {
+  Cause cause;
+  double outside = 0;                ///< share of its effect that the cell's own error sources do not absorb, [0, 1]
+  std::optional<double> detectable;  ///< m rms over the poses: smallest effect that would be noticed; empty: none would
+  std::optional<double> identifiable;  ///< m rms: smallest that would be named
+  std::string needs;                   ///< what would show it: `approach from both sides`, ...; empty: nothing
+};
+
+/// Causes that these poses cannot tell apart.
+struct Inseparable {
+  std::vector<Cause> causes;
+  double correlation = 0;  ///< canonical, after projection
+};
+
+/// One line of a joint's periodogram.
+struct Periodogram {
+  int joint = 0;  ///< 0-based
+  Eigen::VectorXd order;
+  Eigen::VectorXd strength;  ///< lambda at each order, before anything was added
+  double limit = 0;          ///< the 1 % line: what the best order of all joints reaches by chance in 1 of 100 batches
+};
+
+/// A step from the measured error to the repeatability.
+struct WaterfallStep {
+  std::string name;
+  double rms = 0;  ///< m, of what is left after it
+};
+
+struct SuspectedPose {
+  std::string pose_id;
+  int row = 0;
+  double distance = 0;  ///< m, from where the extended model has it
+  std::string reason;
+};
+
+/// Measuring poses that would tell apart what this batch cannot.
+struct NextPoses {
+  std::vector<JointVector> q;    ///< rad
+  std::vector<Cause> separates;  ///< the causes confounded now
+  double stddev_now = 0;         ///< of the confounded combination, relative to the finding's own size
+  double stddev_expected = 0;    ///< with these poses
+  double stddev_random = 0;      ///< with as many random ones
+};
+
+/// How large an effect must be to be found in these poses: measured by hiding it in simulated noise.
+struct Recovery {
+  Cause cause;
+  Eigen::VectorXd effect_rms;  ///< m, sizes hidden
+  Eigen::VectorXd named;       ///< share of repetitions that were named rightly
+};
+
+/// How strongly what is left depends on something, by permutation.
+struct Dependence {
+  std::string on;        ///< `q3`, `torque`, `time`
+  bool of_size = false;  ///< of |residual| rather than of the residual
+  double p_value = 1;    ///< Holm-corrected
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kNothing;
+  std::string sentence;  ///< the verdict for people, graded by the evidence
+  int poses = 0;         ///< repeats merged
+  double noise = 0;      ///< m per axis: of one measurement, from repeats or the tracker
+  std::string noise_from;
+  ErrorFigures before, after;  ///< of all poses used, before and after extension
+  std::optional<ErrorFigures> held_out_before, held_out_after;
+  std::string held_out_how;  ///< `validation rows` or `8 blocks, each predicted from the others`
+  std::vector<Finding> findings;
+  Unexplained unexplained;
+  std::vector<Inseparable> not_separable;
+  std::vector<Unseen> could_not_have_seen;
+  std::vector<SuspectedPose> suspects;  ///< left out of the fit, or listed
+  NextPoses next_poses;
+  std::vector<Dependence> leftover;
+  std::vector<std::string> limits;  ///< what the batch does not record, and what that rules out
+
+  // For the page.
+  std::vector<Periodogram> periodograms;
+  std::vector<WaterfallStep> waterfall;
+  std::vector<Recovery> recovery;
+  MeasurementBatch batch;              ///< as used
+  Eigen::Matrix3Xd residual_before_B;  ///< 3 x poses, m: measured - calibrated
+  Eigen::Matrix3Xd residual_after_B;
+  std::vector<std::string> sources_before, sources_after;  ///< lists of error sources as a cell file spells them
+  std::string batch_hash, cell_hash;
+  std::uint64_t seed = 0;
+};
+
+}  // namespace trammel

@@ -1,0 +1,132 @@
+#include "server/diagnose/findings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/diagnose/effect.h"
+#include "server/diagnose/folds.h"
+#include "server/diagnose/wording.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kInterval95 = 1.959963984540;
+
+/// The joint estimate of everything, about the model's values, in units of priors.
+struct Estimated {
+  VectorXd change;
+  MatrixXd covariance;
+};
+
+Estimate in_units(const Parameter& parameter, double value, double stddev) {
+  return {parameter.name, parameter.unit, parameter.scale * value, parameter.scale * kInterval95 * stddev};
+}
+
+/// Of a sine and a cosine: their common amplitude and what it is uncertain by.
+Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, const Eigen::Matrix2d& covariance) {
+  const double amplitude = value.norm();
+  const Eigen::Vector2d slope = amplitude > 0 ? Eigen::Vector2d(value / amplitude) : Eigen::Vector2d::UnitX();
+  return {name, "urad", 1e6 * amplitude, 1e6 * kInterval95 * std::sqrt(slope.dot(covariance * slope))};
+}
+
+std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::string& source, const Cause& cause,
+                                    const Estimated& estimated) {
+  const std::vector<Index> places = places_of_source(problem.model(), source);
+  std::vector<Estimate> estimates;
+  VectorXd values(static_cast<Index>(places.size()));
+  MatrixXd covariance(values.size(), values.size());
+  const auto& priors = problem.nuisance_parameters();
+  for (Index i = 0; i < values.size(); ++i) {
+    const Index k = places[static_cast<std::size_t>(i)];
+    const double scale = priors[static_cast<std::size_t>(k)].prior_scale;
+    values(i) = problem.model().values(k) + scale * estimated.change(k);
+    for (Index j = 0; j < values.size(); ++j) {
+      const Index other = places[static_cast<std::size_t>(j)];
+      covariance(i, j) = scale * priors[static_cast<std::size_t>(other)].prior_scale * estimated.covariance(k, other);
+    }
+  }
+  if (cause.cause == "gear_transmission") {
+    estimates.push_back({"order", "", values(0), kInterval95 * std::sqrt(covariance(0, 0))});
+    estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
+  } else if (cause.cause == "encoder_eccentricity") {
+    estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
+  }
+  for (Index i = 0; i < values.size(); ++i) {
+    const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
+    if (parameter.name.starts_with("order")) continue;
+    if (cause.cause == "joint_map") break;  // a hundred harmonics tell people nothing
+    estimates.push_back(in_units(parameter, values(i), std::sqrt(covariance(i, i))));
+  }
+  return estimates;
+}
+
+MatrixXd without_columns(const MatrixXd& columns, const std::vector<Index>& left_out) {
+  std::vector<Index> kept;
+  for (Index k = 0; k < columns.cols(); ++k) {
+    if (std::find(left_out.begin(), left_out.end(), k) == left_out.end()) kept.push_back(k);
+  }
+  return columns(Eigen::all, kept);
+}
+
+Finding outlier(const Accepted& one) {
+  Finding finding;
+  finding.cause = one.cause;
+  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), 0}};
+  finding.effect_rms = one.pose.distance;
+  finding.strength = one.best.strength;
+  finding.p_value = one.p_value;
+  finding.action = action_for(one.cause, false);
+  return finding;
+}
+
+}  // namespace
+
+std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem) {
+  const MatrixXd columns = background_columns(problem, found.unnamed);
+  const Background all(columns);
+  const Estimated estimated{all.estimate(problem.residual()), all.covariance()};
+  const Folds folds(problem);
+  const VectorXd held_out = folds.held_out_residual(problem.residual(), columns);
+  std::vector<Finding> findings;
+  for (const Accepted& one : found.accepted) {
+    if (one.source.empty()) {
+      findings.push_back(outlier(one));
+      continue;
+    }
+    Finding finding;
+    finding.cause = one.cause;
+    finding.source = one.source;
+    finding.parameters = parameters_of(problem, one.source, one.cause, estimated);
+    if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
+    const std::vector<Index> places = places_of_source(problem.model(), one.source);
+    const VectorXd effect = effect_of_source(problem, one.source);
+    const Background rest(without_columns(columns, places));
+    finding.effect_rms = problem.position_rms(effect);
+    finding.strength = effect.dot(rest.project(effect).col(0));
+    finding.p_value = one.p_value;
+    finding.naming_frequency = one.naming_frequency;
+    finding.could_also_be = one.could_also_be;
+    finding.held_out_after = figures_of(problem.positions(held_out));
+    finding.held_out_before =
+        figures_of(problem.positions(folds.held_out_residual(problem.residual() + effect, rest.columns())));
+    finding.held_out_gain = finding.held_out_before.rms - finding.held_out_after.rms;
+    finding.action = action_for(one.cause, !one.could_also_be.empty());
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {
+  const auto of = [](const LinearProblem& problem, const MatrixXd& columns) {
+    return figures_of(problem.positions(Folds(problem).held_out_residual(problem.residual(), columns)));
+  };
+  return {of(before, before.nuisance()), of(after, after.nuisance())};
+}
+
+}  // namespace trammel

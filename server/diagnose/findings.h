@@ -1,0 +1,17 @@
+#pragma once
+
+#include "server/diagnose/search.h"
+
+namespace trammel {
+
+/// The findings of a search with their numbers: parameters with their intervals by generalised least squares beside
+/// everything else that was found, effects, strengths and what each gains on poses held out.
+[[nodiscard]] std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem);
+
+/// Errors of poses held out (blocks of a cross-validation), before and after.
+struct HeldOut {
+  ErrorFigures before, after;
+};
+[[nodiscard]] HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after);
+
+}  // namespace trammel

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "server/calibrate/calibrate.h"
+
+namespace trammel {
+
+/// A candidate's effect on the poses: one column a parameter, in units of its prior.
+struct Effect {
+  std::string source;                 ///< as a cell file spells it
+  std::vector<Parameter> parameters;  ///< one a column
+  Eigen::MatrixXd columns;            ///< R x m, whitened
+};
+
+/// A batch seen from a calibrated model, to first order. A pose has 3 rows, or 6 with its orientation; every row is
+/// divided by the standard deviation of its noise, so that white noise has unit variance.
+class LinearProblem {
+ public:
+  /// The noise is the measurement's own and, on top, what is left beyond it whatever its reason (a robust estimate): as
+  /// long as something large is unexplained, nothing small is claimed. `further` names sources whose effect is wanted
+  /// too; those that this cell or batch cannot have are left out.
+  LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch, const std::vector<Parameter>& priors,
+                const std::vector<std::string>& further);
+
+  [[nodiscard]] Eigen::Index poses() const { return static_cast<Eigen::Index>(batch_->measurements.size()); }
+  [[nodiscard]] Eigen::Index rows() const { return residual_.size(); }
+  [[nodiscard]] Eigen::Index first_row(Eigen::Index pose) const { return first_row_[static_cast<std::size_t>(pose)]; }
+  [[nodiscard]] Eigen::Index row_count(Eigen::Index pose) const { return first_row(pose + 1) - first_row(pose); }
+
+  [[nodiscard]] const PhysicalModel& model() const { return model_; }
+  [[nodiscard]] const MeasurementBatch& batch() const { return *batch_; }
+  /// R: measured - model, whitened.
+  [[nodiscard]] const Eigen::VectorXd& residual() const { return residual_; }
+  /// R x P: what the model's own parameters do, whitened, a column per prior scale.
+  [[nodiscard]] const Eigen::MatrixXd& nuisance() const { return nuisance_; }
+  [[nodiscard]] const std::vector<Parameter>& nuisance_parameters() const { return priors_; }
+  /// The wanted sources, in the order of `further`.
+  [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
+  /// R x n: what one radian (metre) of each joint does, whitened.
+  [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
+  /// R: 1 / standard deviation of each row, SI.
+  [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
+  /// m per axis: noise of a typical position, whatever its reason.
+  [[nodiscard]] double noise() const { return noise_; }
+
+  /// 3 x poses, m: the positions of a whitened vector.
+  [[nodiscard]] Eigen::Matrix3Xd positions(const Eigen::VectorXd& whitened) const;
+  /// m: rms over the poses of the position part of a whitened vector.
+  [[nodiscard]] double position_rms(const Eigen::VectorXd& whitened) const;
+
+ private:
+  void fill(const PhysicalModel& extended, const std::vector<Eigen::Index>& places, Eigen::Index joints);
+  void whiten();
+
+  PhysicalModel model_;
+  const MeasurementBatch* batch_;
+  std::vector<Parameter> priors_;
+  std::vector<Eigen::Index> first_row_;
+  Eigen::VectorXd residual_, weight_;
+  Eigen::MatrixXd nuisance_, by_joint_;
+  std::vector<Effect> effects_;
+  double noise_ = 0;
+};
+
+}  // namespace trammel

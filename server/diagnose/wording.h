@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "server/diagnose/diagnosis.h"
+
+namespace trammel {
+
+/// What people on the shop floor do about a cause.
+[[nodiscard]] std::string action_for(const Cause& cause, bool ambiguous);
+/// What a batch would need to show a cause that this one cannot show.
+[[nodiscard]] std::string what_it_needs(const Cause& cause);
+/// The verdict for people.
+[[nodiscard]] std::string sentence_for(const Diagnosis& diagnosis);
+
+}  // namespace trammel
