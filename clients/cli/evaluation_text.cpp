@@ -1,6 +1,7 @@
 #include "clients/cli/evaluation_text.h"
 
 #include "server/base/units.h"
+#include "server/report/figures_json.h"
 
 namespace trammel::cli {
 
@@ -14,19 +15,6 @@ std::string figures_line(const char* level, const ErrorFigures& figures) {
 }
 
 }  // namespace
-
-ordered_json figures_json(const ErrorFigures& figures) {
-  ordered_json axes;
-  for (int k = 0; k < 3; ++k) {
-    axes[std::string(1, "xyz"[k])] = {{"mean_mm", to_mm(figures.axis_mean(k))},
-                                      {"std_mm", to_mm(figures.axis_stddev(k))}};
-  }
-  return {{"rms_mm", to_mm(figures.rms)},
-          {"mean_mm", to_mm(figures.mean)},
-          {"p997_mm", to_mm(figures.p997)},
-          {"max_mm", to_mm(figures.max)},
-          {"axis", axes}};
-}
 
 std::string evaluation_table(const Evaluation& evaluation) {
   return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +

@@ -10,8 +10,6 @@ namespace trammel::cli {
 
 /// `nominal`, `calibrated` and `compensated`, a line each, mm.
 [[nodiscard]] std::string evaluation_table(const Evaluation& evaluation);
-/// rms, mean, 99.7 %, maximum and axes, mm.
-[[nodiscard]] nlohmann::ordered_json figures_json(const ErrorFigures& figures);
 /// The keys of `evaluate --json`.
 [[nodiscard]] nlohmann::ordered_json evaluation_json(const Evaluation& evaluation);
 

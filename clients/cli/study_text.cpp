@@ -4,6 +4,7 @@
 
 #include "clients/cli/evaluation_text.h"
 #include "server/base/units.h"
+#include "server/report/figures_json.h"
 
 namespace trammel::cli {
 

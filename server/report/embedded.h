@@ -5,7 +5,8 @@
 /// Files that are part of the program, see embed.cmake.
 namespace trammel::embedded {
 
-extern const std::string_view chart_js;         ///< Chart.js 3, minified; MIT licence, its notice inside
-extern const std::string_view model_page_html;  ///< the page of a model, with `{{...}}` where its content goes
+extern const std::string_view chart_js;             ///< Chart.js 3, minified; MIT licence, its notice inside
+extern const std::string_view model_page_html;      ///< the page of a model, with `{{...}}` where its content goes
+extern const std::string_view diagnosis_page_html;  ///< the same of a diagnosis
 
 }  // namespace trammel::embedded

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "server/diagnose/diagnosis.h"
+
+namespace trammel {
+
+/// A diagnosis for programs, with the keys of DESIGN section 4 and more. mm; joints of `next_poses` in degrees (rails
+/// mm), joints counted from 1; `joint` is null where a cause concerns the whole arm.
+[[nodiscard]] nlohmann::ordered_json diagnosis_json(const Diagnosis& diagnosis);
+
+}  // namespace trammel

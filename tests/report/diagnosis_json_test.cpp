@@ -1,0 +1,41 @@
+#include "server/report/diagnosis_json.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/report/diagnosis_fixture.h"
+
+namespace trammel {
+namespace {
+
+TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
+  const auto json = diagnosis_json(test::made_up_diagnosis(test::cell_7()));
+  for (const char* key : {"verdict", "poses", "noise_mm", "before", "after", "held_out", "findings", "unexplained",
+                          "not_separable", "could_not_have_seen", "suspect_poses", "next_poses"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  for (const char* key : {"cause", "joint", "parameters", "effect_rms_mm", "held_out_gain_mm", "strength", "p_value",
+                          "could_also_be", "action"}) {
+    EXPECT_TRUE(json["findings"][0].contains(key)) << key;
+  }
+  EXPECT_EQ(json["verdict"], "ambiguous");
+  EXPECT_TRUE(json["held_out"]["before"].contains("rms_mm"));
+  EXPECT_TRUE(json["unexplained"]["present"].get<bool>());
+}
+
+TEST(DiagnosisJson, CountsJointsFromOneAndSpeaksInMillimetresAndDegrees) {
+  const Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  const auto json = diagnosis_json(diagnosis);
+  EXPECT_EQ(json["findings"][0]["joint"], 3);
+  EXPECT_TRUE(json["findings"][1]["joint"].is_null());
+  EXPECT_EQ(json["findings"][1]["could_also_be"][0]["parameter"], "d6");
+  EXPECT_DOUBLE_EQ(json["findings"][0]["parameters"]["order"]["u95"], 0.04);
+  EXPECT_DOUBLE_EQ(json["findings"][0]["effect_rms_mm"], 0.058);
+  EXPECT_DOUBLE_EQ(json["noise_mm"], 0.013);
+  EXPECT_EQ(json["not_separable"][0].size(), 2u);
+  EXPECT_EQ(json["next_poses"].size(), 10u);
+  EXPECT_NEAR(json["next_poses"][0][0], to_deg(diagnosis.next_poses.q[0](0)), 1e-9);
+  EXPECT_TRUE(json["could_not_have_seen"][1]["smallest_mm"].is_null());
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,153 @@
+#include "server/report/diagnosis_page.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/report/diagnosis_charts.h"
+#include "tests/report/diagnosis_fixture.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+constexpr const char* kBrowser = "/usr/bin/chromium";
+
+/// Runs in the page: says of each canvas how many of its pixels have a colour that is none of text and grid, what went
+/// wrong, and how far the page is wider than its window.
+constexpr const char* kLookAtIt = R"(<script>
+window.addEventListener("load", () => {
+  const coloured = canvas => {
+    const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      const [r, g, b, a] = pixels.slice(i, i + 4);
+      if (a > 100 && Math.max(r, g, b) - Math.min(r, g, b) > 45) ++count;
+    }
+    return count;
+  };
+  const seen = [...document.querySelectorAll("canvas")].map(c => `${c.id} ${coloured(c)}`);
+  seen.push(`page-too-wide ${document.documentElement.scrollWidth - document.documentElement.clientWidth}`);
+  seen.push(`errors ${window.wentWrong}`);
+  const text = document.createElement("pre");
+  text.id = "seen";
+  text.textContent = seen.join("\n") + "\n";
+  document.body.append(text);
+});
+</script>)";
+constexpr const char* kListen = R"(<script>window.wentWrong = 0; window.onerror = () => ++window.wentWrong;</script>)";
+
+bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
+
+class DiagnosisPage : public testing::Test {
+ protected:
+  DiagnosisPage() : cell_(test::cell_7()), diagnosis_(test::made_up_diagnosis(cell_)) {}
+
+  /// What a browser of that width finds on the page: a number a name.
+  std::map<std::string, int> seen_by_a_browser(int width) const {
+    const test::TemporaryFolder folder;
+    std::string page = diagnosis_page(diagnosis_, *cell_);
+    page.replace(page.find("<head>"), 6, std::string("<head>") + kListen);
+    page.replace(page.rfind("</body>"), 7, std::string(kLookAtIt) + "</body>");
+    const std::string file = folder.write("page.html", page);
+    const test::Finished browser =
+        test::run({kBrowser, "--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000",
+                   fmt::format("--window-size={},900", width), "--user-data-dir=" + folder.file("profile"),
+                   "--dump-dom", "file://" + file});
+    const std::string opening = "<pre id=\"seen\">";
+    const std::size_t from = browser.out.find(opening);
+    EXPECT_NE(from, std::string::npos) << browser.err;
+    std::map<std::string, int> seen;
+    if (from == std::string::npos) return seen;
+    std::istringstream text(browser.out.substr(from + opening.size()));
+    std::string name;
+    for (int number = 0; text >> name >> number;) seen[name] = number;
+    return seen;
+  }
+
+  std::shared_ptr<const Cell> cell_;
+  Diagnosis diagnosis_;
+};
+
+TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  for (const std::string& part :
+       {diagnosis_.batch_hash, diagnosis_.cell_hash, std::string("these poses do not tell which"),
+        std::string("48.503"), std::string("0.040"), std::string("geometry d6"), std::string("p28"),
+        std::string("repeat it and its neighbours"), std::string("both approach directions")}) {
+    EXPECT_TRUE(has(page, part)) << part;
+  }
+}
+
+TEST_F(DiagnosisPage, OpensWithoutANetworkAndKeepsNamesFromFilesText) {
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_TRUE(has(page, "Chart.js v"));
+  EXPECT_FALSE(has(page, "<link"));
+  EXPECT_FALSE(has(page, " src="));
+  EXPECT_FALSE(has(page, "made-up <1>"));
+  EXPECT_TRUE(has(page, "made-up &lt;1&gt;"));
+}
+
+TEST_F(DiagnosisPage, FoldsAGearsResidualIntoOneOscillation) {
+  const auto fold = diagnosis_charts(diagnosis_, *cell_).at("folds").at(0);
+  double rising = 0, falling = 0;  // means of the two halves of a cycle
+  for (std::size_t i = 0; i < fold.at("phase_deg").size(); ++i) {
+    const double phase = fold.at("phase_deg")[i].get<double>() + to_deg(0.4);
+    (std::fmod(phase, 360.0) < 180 ? rising : falling) += fold.at("before_um")[i].get<double>();
+  }
+  EXPECT_GT(rising, 1000);
+  EXPECT_LT(falling, -1000);
+}
+
+TEST_F(DiagnosisPage, ThinsAPeriodogramWithoutLosingItsPeak) {
+  const auto joint_3 = diagnosis_charts(diagnosis_, *cell_).at("periodograms").at(2);
+  EXPECT_LE(joint_3.at("order").size(), 500u);
+  const auto strength = joint_3.at("strength").get<std::vector<double>>();
+  EXPECT_NEAR(*std::max_element(strength.begin(), strength.end()), diagnosis_.periodograms[2].strength.maxCoeff(),
+              0.01);
+}
+
+TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {
+  for (Measurement& m : diagnosis_.batch.measurements) {
+    m.context.time.reset();
+    m.context.temperature.reset();
+    m.context.direction.clear();
+  }
+  const auto charts = diagnosis_charts(diagnosis_, *cell_);
+  EXPECT_FALSE(charts.contains("temperature"));
+  EXPECT_FALSE(charts.contains("direction"));
+  EXPECT_FALSE(charts.at("time").at("recorded").get<bool>());
+}
+
+TEST_F(DiagnosisPage, HasNoEmptyPlotInARealBrowserHoweverWide) {
+  if (!std::filesystem::exists(kBrowser)) GTEST_SKIP() << kBrowser << " is not installed";
+  for (const int width : {1280, 520}) {
+    std::map<std::string, int> seen = seen_by_a_browser(width);
+    EXPECT_EQ(seen["errors"], 0) << width;
+    EXPECT_LE(seen["page-too-wide"], 0) << width;
+    EXPECT_EQ(seen.size(), 2 + 1 + 6 + 1 + 5 + 4 + 1u) << width;  // the two above, then the plots
+    seen.erase("errors");
+    seen.erase("page-too-wide");
+    for (const auto& [canvas, pixels] : seen) EXPECT_GT(pixels, 100) << canvas << " at " << width;
+  }
+}
+
+TEST_F(DiagnosisPage, WithoutAnyFindingStillOpens) {
+  Diagnosis empty;
+  empty.sentence = "Nothing beyond the noise.";
+  empty.batch.id = "empty";
+  empty.sources_before = empty.sources_after = {"base"};
+  const std::string page = diagnosis_page(empty, *cell_);
+  EXPECT_TRUE(has(page, "Nothing beyond the noise."));
+  EXPECT_TRUE(has(page, "None: every pose fits the others."));
+  if (!std::filesystem::exists(kBrowser)) GTEST_SKIP() << kBrowser << " is not installed";
+  diagnosis_ = empty;
+  EXPECT_EQ(seen_by_a_browser(1000)["errors"], 0);
+}
+
+}  // namespace
+}  // namespace trammel
