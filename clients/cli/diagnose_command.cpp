@@ -1,0 +1,153 @@
+#include <CLI/CLI.hpp>
+#include <chrono>
+
+#include "clients/cli/commands.h"
+#include "clients/cli/diagnose_text.h"
+#include "clients/cli/options.h"
+#include "clients/cli/output.h"
+#include "server/base/text_file.h"
+#include "server/diagnose/diagnose.h"
+#include "server/measurement/batch_file.h"
+#include "server/report/diagnosis_json.h"
+#include "server/report/diagnosis_page.h"
+#include "server/robot/cell_sources_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
+
+struct DiagnoseArguments {
+  std::string cell, batch, report, next_poses, json, model, cell_out;
+  std::uint64_t seed = 1;
+  bool apply = false;
+  ServiceOptions service;
+};
+
+std::int64_t unix_time() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+/// Where results go, for tell().
+void say(const std::string& text, const DiagnoseArguments& arguments) {
+  tell(text, {arguments.json, arguments.report, arguments.next_poses, arguments.cell_out});
+}
+
+Status write_if_asked(const std::string& path, const std::string& text) {
+  return path.empty() ? Status() : write_output(path, text);
+}
+
+Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                std::uint64_t seed) {
+  ProgressLine progress;
+  DiagnoseOptions options;
+  options.seed = seed;
+  options.progress = [&](const std::string& stage, double share) {
+    progress.show(stage, share);
+    return true;
+  };
+  return diagnose(cell, batch, options);
+}
+
+Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                const Diagnosis& diagnosis, std::uint64_t seed) {
+  ProgressLine progress;
+  TrainOptions options;
+  options.seed = seed;
+  options.trained_at = unix_time();
+  options.progress = [&](const std::string& stage, double share) {
+    progress.show(stage, share);
+    return true;
+  };
+  return extend(cell, batch, diagnosis, options);
+}
+
+/// The extended list into the cell file, and the model where it is wanted; the cell's text is made before anything is
+/// written.
+Status write_extension(const Extension& extension, const Cell& cell, const DiagnoseArguments& arguments) {
+  const Result<std::string> text = with_error_sources(cell.cell_yaml, extension.lasting, arguments.cell);
+  if (!text) return tl::make_unexpected(text.error());
+  if (!arguments.model.empty()) {
+    if (const Status written = write_output(arguments.model, serialize(extension.after)); !written) return written;
+  }
+  const std::string& path = arguments.cell_out.empty() ? arguments.cell : arguments.cell_out;
+  if (const Status written = write_output(path, *text); !written) return written;
+  std::string said = fmt::format("{}: error_sources: [{}]\n", path, fmt::join(extension.lasting, ", "));
+  if (extension.lasting.size() < extension.sources.size()) {
+    said += "  (what began at a pose of this batch is in the model, not in the cell file)\n";
+  }
+  if (!arguments.model.empty()) {
+    said += fmt::format("model {} in {}\n", extension.after.provenance().id, arguments.model);
+  }
+  say(said, arguments);
+  return {};
+}
+
+/// Never silently worse: what does not lower the error on poses held out is not written.
+Status apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, const Diagnosis& diagnosis,
+             const DiagnoseArguments& arguments, ordered_json& json) {
+  const Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
+  if (!extension) return tl::make_unexpected(extension.error());
+  json["applied"] = extension_json(*extension);
+  say(extension_text(*extension), arguments);
+  if (extension->better) return write_extension(*extension, *cell, arguments);
+  return refused(
+      "cell {}: the extended model is not better on the poses held out ({:.4f} mm rms, before {:.4f} mm); "
+      "nothing was written",
+      cell->name, json["applied"]["after"]["rms_mm"].get<double>(), json["applied"]["before"]["rms_mm"].get<double>());
+}
+
+/// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
+Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
+  Result<MeasurementBatch> batch = read_batch(arguments.batch);
+  if (!batch || !arguments.apply) return batch;
+  return with_held_out(std::move(*batch), kHeldOutShare, arguments.seed);
+}
+
+Status diagnose_files(const DiagnoseArguments& arguments) {
+  Result<Cell> read = read_cell(arguments.cell);
+  if (!read) return tl::make_unexpected(read.error());
+  const auto cell = std::make_shared<const Cell>(std::move(*read));
+  const Result<MeasurementBatch> batch = batch_to_diagnose(arguments);
+  if (!batch) return tl::make_unexpected(batch.error());
+  const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
+  if (!diagnosis) return tl::make_unexpected(diagnosis.error());
+  ordered_json json = diagnosis_json(*diagnosis);
+  say(diagnosis_text(json), arguments);
+  Status done = write_if_asked(arguments.next_poses, next_poses_csv(json));
+  if (done && !arguments.report.empty()) done = write_output(arguments.report, diagnosis_page(*diagnosis, *cell));
+  if (!done) return done;
+  const Status applied = arguments.apply ? apply(cell, *batch, *diagnosis, arguments, json) : Status();
+  if (const Status written = write_json(arguments.json, json); !written) return written;
+  return applied;
+}
+
+}  // namespace
+
+void add_diagnose_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<DiagnoseArguments>();
+  CLI::App* command = app.add_subcommand(
+      "diagnose", "Tell which physical cause the model lacks, how sure that is, and what to measure next");
+  command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
+  command
+      ->add_option("--next-poses", arguments->next_poses,
+                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot")
+      ->type_name("FILE");
+  command->add_option("--seed", arguments->seed, "Seed of the bootstrap and of the rows held out")
+      ->capture_default_str();
+  CLI::Option* apply_flag = command->add_flag(
+      "--apply", arguments->apply,
+      "Add what was found to the cell's error sources and train; nothing is written unless poses held out gain by it");
+  command->add_option("--model", arguments->model, "With --apply: extended model to write")->needs(apply_flag);
+  command->add_option("--cell-out", arguments->cell_out, "With --apply: cell file to write instead of --cell itself")
+      ->needs(apply_flag);
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return diagnose_files(*arguments); }; });
+}
+
+}  // namespace trammel::cli

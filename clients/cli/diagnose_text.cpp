@@ -1,0 +1,205 @@
+#include "clients/cli/diagnose_text.h"
+
+#include "server/base/units.h"
+#include "server/measurement/csv_table.h"
+#include "server/report/figures_json.h"
+#include "server/report/html.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kMicrometres = 1000;  // per mm
+
+/// `gear_transmission of joint 3`, `outlier at pose p28`.
+std::string cause_text(const ordered_json& cause) {
+  std::string text = cause.at("cause");
+  if (cause.contains("parameter")) text += fmt::format(" {}", cause.at("parameter").get<std::string>());
+  if (!cause.at("joint").is_null()) text += fmt::format(" of joint {}", cause.at("joint").get<int>());
+  if (cause.contains("pose_id")) text += fmt::format(" at pose {}", cause.at("pose_id").get<std::string>());
+  return text;
+}
+
+std::string causes_text(const ordered_json& causes) {
+  std::string text;
+  for (const ordered_json& cause : causes) text += (text.empty() ? "" : ", ") + cause_text(cause);
+  return text;
+}
+
+std::string words_text(const ordered_json& words, const char* between) {
+  std::string text;
+  for (const ordered_json& word : words) text += (text.empty() ? "" : between) + word.get<std::string>();
+  return text;
+}
+
+std::string micrometres(const ordered_json& millimetres) {
+  return millimetres.is_null() ? "-" : fmt::format("{:.3g} um", kMicrometres * millimetres.get<double>());
+}
+
+std::string parameters_line(const ordered_json& parameters) {
+  std::string text;
+  for (const auto& [name, estimate] : parameters.items()) {
+    const ShownValue shown = show_with_uncertainty(estimate.at("value"), estimate.at("u95"));
+    const std::string unit = estimate.at("unit");
+    text += fmt::format("{}{} = {} ± {}{}{}", text.empty() ? "" : ", ", name, shown.value, shown.expanded,
+                        unit.empty() ? "" : " ", unit);
+  }
+  return text;
+}
+
+std::string finding_lines(const ordered_json& finding) {
+  std::string text =
+      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10.2g}{:>10.4f}{:>10.4f}\n", cause_text(finding),
+                  kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
+                  finding.at("p_value").get<double>(), finding.at("held_out").at("before").at("rms_mm").get<double>(),
+                  finding.at("held_out").at("after").at("rms_mm").get<double>());
+  if (!finding.at("parameters").empty()) text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
+  if (!finding.at("could_also_be").empty()) {
+    text += fmt::format("      could also be: {}\n", causes_text(finding.at("could_also_be")));
+  }
+  if (const auto action = finding.at("action").get<std::string>(); !action.empty()) {
+    text += fmt::format("      {}\n", action);
+  }
+  return text;
+}
+
+std::string findings_table(const ordered_json& findings) {
+  if (findings.empty()) return "";
+  std::string text =
+      fmt::format("\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
+                  "strength", "p", "held out", "", "cause", "um rms", "lambda", "", "before mm", "after mm");
+  for (const ordered_json& finding : findings) text += finding_lines(finding);
+  return text;
+}
+
+std::string figures_line(const char* name, const ordered_json& figures) {
+  if (figures.is_null()) return "";
+  return fmt::format("  {:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, figures.at("rms_mm").get<double>(),
+                     figures.at("mean_mm").get<double>(), figures.at("p997_mm").get<double>(),
+                     figures.at("max_mm").get<double>());
+}
+
+std::string figures_table(const ordered_json& diagnosis) {
+  const ordered_json& held_out = diagnosis.at("held_out");
+  std::string text = fmt::format("\n  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+                     figures_line("before", diagnosis.at("before")) + figures_line("after", diagnosis.at("after")) +
+                     figures_line("held out, before", held_out.at("before")) +
+                     figures_line("held out, after", held_out.at("after"));
+  if (!held_out.at("before").is_null()) {
+    text += fmt::format("  (held out: {})\n", held_out.at("how").get<std::string>());
+  }
+  return text;
+}
+
+std::string unexplained_text(const ordered_json& unexplained) {
+  if (!unexplained.at("present").get<bool>()) return "";
+  return fmt::format("\nUnexplained: {} rms that depend on {} (p {:.2g})\n", micrometres(unexplained.at("rms_mm")),
+                     words_text(unexplained.at("depends_on"), ", "), unexplained.at("p_value").get<double>());
+}
+
+std::string suspects_text(const ordered_json& suspects) {
+  if (suspects.empty()) return "";
+  std::string text = "\nPoses that do not fit the others:\n";
+  for (const ordered_json& pose : suspects) {
+    text += fmt::format("  pose {} (row {}): {} off; {}\n", pose.at("pose_id").get<std::string>(),
+                        pose.at("row").get<int>(), micrometres(pose.at("distance_mm")),
+                        pose.at("reason").get<std::string>());
+  }
+  return text;
+}
+
+/// Causes that needed something else to show: a line for all joints of which the same is to be said.
+std::string unseen_lines(const ordered_json& unseen) {
+  std::vector<std::pair<std::string, std::string>> lines;  // cause and what it needs, joints
+  for (const ordered_json& one : unseen) {
+    if (!one.at("smallest_mm").is_null() || one.at("needs").get<std::string>().empty()) continue;
+    const std::string what =
+        fmt::format("{}: needs {}", one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
+    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
+    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == what; });
+    if (known == lines.end()) {
+      lines.emplace_back(what, joint);
+    } else {
+      known->second += joint;
+    }
+  }
+  std::string text;
+  for (const auto& [what, joints] : lines) {
+    text += fmt::format("  would not have shown: {}{}\n", what, joints.empty() ? "" : " (joints" + joints + ")");
+  }
+  return text;
+}
+
+std::string limits_text(const ordered_json& diagnosis) {
+  std::string text;
+  for (const ordered_json& limit : diagnosis.at("limits")) text += fmt::format("  {}\n", limit.get<std::string>());
+  for (const ordered_json& group : diagnosis.at("not_separable")) {
+    text += fmt::format("  not told apart by these poses: {}\n", words_text(group, ", "));
+  }
+  text += unseen_lines(diagnosis.at("could_not_have_seen"));
+  return text.empty() ? "" : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
+}
+
+std::string next_poses_text(const ordered_json& diagnosis) {
+  if (diagnosis.at("next_poses").empty()) return "";
+  const ordered_json& worth = diagnosis.at("next_poses_for");
+  std::string text = fmt::format("\nNext poses, to tell apart {} (uncertainty {:.3g} now, {:.3g} with them):\n",
+                                 causes_text(worth.at("separate")), worth.at("stddev_now").get<double>(),
+                                 worth.at("stddev_expected").get<double>());
+  for (const ordered_json& pose : diagnosis.at("next_poses")) {
+    text += " ";
+    for (const ordered_json& value : pose) text += fmt::format("{:>10.2f}", value.get<double>());
+    text += "\n";
+  }
+  return text;
+}
+
+std::string extended_line(const char* name, const CompensatedModel& model) {
+  return figures_line(name, figures_json(model.parts().validation->compensated));
+}
+
+}  // namespace
+
+std::string diagnosis_text(const ordered_json& diagnosis) {
+  return fmt::format("{}: {}\n{} poses, one measurement {} per axis ({})\n", diagnosis.at("verdict").get<std::string>(),
+                     diagnosis.at("sentence").get<std::string>(), diagnosis.at("poses").get<int>(),
+                     micrometres(diagnosis.at("noise_mm")), diagnosis.at("noise_from").get<std::string>()) +
+         findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
+         unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
+         limits_text(diagnosis) + next_poses_text(diagnosis);
+}
+
+std::string next_poses_csv(const ordered_json& diagnosis) {
+  std::string text = "pose_id";
+  for (const ordered_json& column : diagnosis.at("next_poses_for").at("columns")) {
+    text += "," + column.get<std::string>();
+  }
+  text += "\n";
+  int number = 0;
+  for (const ordered_json& pose : diagnosis.at("next_poses")) {
+    text += fmt::format("n{}", ++number);
+    for (const ordered_json& value : pose) text += "," + csv_number(value.get<double>());
+    text += "\n";
+  }
+  return text;
+}
+
+std::string extension_text(const Extension& extension) {
+  const int poses = extension.after.parts().validation->poses;
+  return fmt::format("\nWith bias, on {} poses held out from diagnosis and training:\n", poses) +
+         fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+         extended_line("before", extension.before) + extended_line("extended", extension.after);
+}
+
+ordered_json extension_json(const Extension& extension) {
+  return {{"better", extension.better},
+          {"error_sources", extension.sources},
+          {"of_the_cell", extension.lasting},
+          {"held_out_poses", extension.after.parts().validation->poses},
+          {"before", figures_json(extension.before.parts().validation->compensated)},
+          {"after", figures_json(extension.after.parts().validation->compensated)}};
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,77 @@
+#include "server/trainer/extend.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+namespace trammel {
+
+namespace {
+
+constexpr std::array<std::string_view, 5> kOfOneBatch = {"tracker_moved", "tracker_drift", "joint_slip", "tool_changed",
+                                                         "payload_changed"};
+
+bool contains(const std::vector<std::string>& list, const std::string& word) {
+  return std::find(list.begin(), list.end(), word) != list.end();
+}
+
+/// One of two trainings: its progress is half of the whole.
+Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                 const std::vector<std::string>& sources, double done, TrainOptions options) {
+  options.level = fmt::format("{}", fmt::join(sources, ","));
+  if (const auto whole = options.progress) {
+    options.progress = [whole, done](const std::string& stage, double share) { return whole(stage, done + share / 2); };
+  }
+  return train(cell, batch, options);
+}
+
+}  // namespace
+
+Status check_can_extend(const Diagnosis& diagnosis) {
+  if (diagnosis.sources_after != diagnosis.sources_before) return {};
+  return refused("batch {}: no cause was named that the model could be extended by ({}): {}", diagnosis.batch.id,
+                 to_string(diagnosis.verdict), diagnosis.sentence);
+}
+
+std::vector<std::string> lasting_sources(const std::vector<std::string>& sources) {
+  std::vector<std::string> lasting;
+  std::copy_if(sources.begin(), sources.end(), std::back_inserter(lasting), [](const std::string& source) {
+    const std::string cause = source.substr(0, source.find_first_of(":@"));
+    return std::find(kOfOneBatch.begin(), kOfOneBatch.end(), cause) == kOfOneBatch.end();
+  });
+  return lasting;
+}
+
+std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& diagnosis) {
+  std::vector<std::string> sources = cell.model.error_sources;
+  for (const std::string& source : diagnosis.sources_after) {
+    if (!contains(diagnosis.sources_before, source) && !contains(sources, source)) sources.push_back(source);
+  }
+  return sources;
+}
+
+MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed) {
+  std::set<int> held_out;
+  for (const Measurement& m : split_batch(batch, share, seed).validation.measurements) held_out.insert(m.row);
+  for (Measurement& m : batch.measurements) {
+    m.set = held_out.contains(m.row) ? MeasurementSet::kValidation : MeasurementSet::kTrain;
+  }
+  return batch;
+}
+
+Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                         const Diagnosis& diagnosis, TrainOptions options) {
+  if (const Status allowed = check_can_extend(diagnosis); !allowed) return tl::make_unexpected(allowed.error());
+  const bool judged = std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                                  [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
+  if (!judged) return refused("batch {}: no rows are held out to judge an extended model by", batch.id);
+  const std::vector<std::string> sources = extended_sources(*cell, diagnosis);
+  auto before = trained(cell, batch, cell->model.error_sources, 0, options);
+  if (!before) return tl::make_unexpected(before.error());
+  auto after = trained(cell, batch, sources, 0.5, options);
+  if (!after) return tl::make_unexpected(after.error());
+  const bool better = after->parts().validation->compensated.rms < before->parts().validation->compensated.rms;
+  return Extension{sources, lasting_sources(sources), std::move(*before), std::move(*after), better};
+}
+
+}  // namespace trammel

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/diagnose/diagnosis.h"
+#include "server/trainer/train.h"
+
+namespace trammel {
+
+/// What extending a cell's error sources by what a diagnosis found is worth: the same training without and with them.
+struct Extension {
+  std::vector<std::string> sources;  ///< all that the extended model was trained with
+  std::vector<std::string> lasting;  ///< of them, those that belong into the cell file
+  CompensatedModel before, after;    ///< both with figures on the same poses held out
+  bool better = false;               ///< the held-out rms is smaller
+};
+
+/// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why not.
+[[nodiscard]] Status check_can_extend(const Diagnosis& diagnosis);
+
+/// The sources that hold beyond the batch: without those that begin at one of its poses, and without what the tracker
+/// did meanwhile.
+[[nodiscard]] std::vector<std::string> lasting_sources(const std::vector<std::string>& sources);
+
+/// The cell's own list as its owner spells it, and what the diagnosis adds to it.
+[[nodiscard]] std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& diagnosis);
+
+/// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for validation.
+[[nodiscard]] MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed);
+
+/// Trains on the training rows of `batch` with the cell's error sources and with those of the diagnosis. Refuses what
+/// check_can_extend() and train() refuse, and a batch without rows held out: nothing could be judged.
+[[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                       const Diagnosis& diagnosis, TrainOptions options);
+
+}  // namespace trammel

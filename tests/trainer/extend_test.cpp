@@ -1,0 +1,71 @@
+#include "server/trainer/extend.h"
+
+#include <gtest/gtest.h>
+
+#include "server/plan/plan.h"
+#include "server/simulate/simulate.h"
+#include "tests/support/demand.h"
+#include "tests/support/small_cell.h"
+
+namespace trammel {
+namespace {
+
+/// A cell that knows of its base only; the robot's joint 3 oscillates besides.
+class Extend : public testing::Test {
+ protected:
+  Extend() : cell_(test::small_cell("cell-1")) {
+    VirtualRobot robot{test::demand(make_physical_model(cell_, {"base", kGear})), 20e-6, 60e-6, {}};
+    robot.truth.values(0) = 1e-3;                                // x0
+    robot.truth.values.tail<2>() = Eigen::Vector2d(1e-4, 2e-4);  // of the oscillation
+    const Eigen::MatrixXd q = test::demand(plan_poses(*cell_, {120, 1}));
+    batch_ = with_held_out(test::demand(simulate(robot, q, {})), 0.25, 1);
+    diagnosis_.sources_before = {"base"};
+    diagnosis_.batch.id = "b1";
+  }
+
+  static constexpr const char* kGear = "gear_transmission:3@2";
+  std::shared_ptr<const Cell> cell_;
+  MeasurementBatch batch_;
+  Diagnosis diagnosis_;
+};
+
+TEST_F(Extend, ByTheTrueCauseLowersTheErrorOnPosesHeldOut) {
+  diagnosis_.sources_after = {"base", kGear};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_TRUE(extension.better);
+  EXPECT_EQ(extension.after.parts().validation->poses, 30);
+  EXPECT_LT(extension.after.parts().validation->compensated.rms, 0.05e-3);
+  EXPECT_GT(extension.before.parts().validation->compensated.rms, 0.15e-3);
+}
+
+TEST_F(Extend, ByAnotherCauseIsNotCalledBetterThanItIs) {
+  diagnosis_.sources_after = {"base", "encoder_eccentricity:6"};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_EQ(extension.better,
+            extension.after.parts().validation->compensated.rms < extension.before.parts().validation->compensated.rms);
+  EXPECT_GT(extension.after.parts().validation->compensated.rms, 0.15e-3);
+}
+
+TEST_F(Extend, IsRefusedWhereNothingWasNamed) {
+  diagnosis_.verdict = Verdict::kUnknown;
+  diagnosis_.sentence = "Something depends on joint 4.";
+  diagnosis_.sources_after = diagnosis_.sources_before;
+  const auto extension = extend(cell_, batch_, diagnosis_, {});
+  ASSERT_FALSE(extension);
+  EXPECT_NE(extension.error().message.find("unknown"), std::string::npos) << extension.error().message;
+}
+
+TEST_F(Extend, IsRefusedWithoutPosesToJudgeItBy) {
+  diagnosis_.sources_after = {"base", kGear};
+  for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kTrain;
+  EXPECT_FALSE(extend(cell_, batch_, diagnosis_, {}));
+}
+
+TEST(LastingSources, AreThoseThatBelongToTheRobotAndNotToTheBatch) {
+  EXPECT_EQ(
+      lasting_sources({"base", "tracker_moved@12", "gear_transmission:3@48.5", "joint_slip:2@40", "tracker_drift"}),
+      (std::vector<std::string>{"base", "gear_transmission:3@48.5"}));
+}
+
+}  // namespace
+}  // namespace trammel
