@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/hidden_world.h"
@@ -39,13 +40,17 @@ struct HiddenTruth {
   std::vector<HiddenCause> causes;  ///< one an effect
   std::vector<double> lambdas;      ///< one an effect, as reached
   std::vector<double> absorbed;     ///< share of each effect (of its square) that the rest can make
+  /// First and last row from which each effect may be said to begin: what lies between makes too little difference to
+  /// be noticed. Both -1 where it has no beginning.
+  std::vector<std::pair<int, int>> begins;
 };
 
 struct HiddenCase {
   std::string batch_csv, cell_yaml, robot_yaml;
   HiddenTruth truth;
-  World world;  ///< for oracles
-  std::uint64_t noise_seed = 0;
+  World world;         ///< for oracles
+  std::string ranges;  ///< of its joints
+  Frames measured;     ///< with noise
 };
 
 [[nodiscard]] HiddenCase hide(const HiddenSpec& spec);

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "server/base/result.h"
+#include "server/diagnose/diagnose.h"
+#include "tests/support/diagnosis_judge.h"
+
+/// One effect hidden, one diagnosis asked for, from the three files alone, and what came of it.
+namespace trammel::test {
+
+struct Trial {
+  std::string row;  ///< of the table it counts for
+  hidden::HiddenSpec spec;
+  bool compare_with_oracle = false;  ///< of what the extended model does on the poses set aside
+  bool compare_next_poses = false;   ///< with random ones
+};
+
+struct TrialResult {
+  Trial trial;
+  std::string truth;  ///< `backlash:2`
+  std::string error;  ///< why there is no diagnosis; else empty
+  Judgement judgement;
+  double seconds = 0;
+  /// Of the lambda asked for, what the closest imitator with as few parameters cannot make; empty where not computed.
+  std::optional<double> beside_rival;
+  std::string rival;
+  double held_out_before_mm = 0, held_out_after_mm = 0;
+  std::optional<double> oracle_mm;
+  /// Standard deviation of what is confounded with ten random poses over that with the ten suggested.
+  std::optional<double> next_poses_claimed, next_poses_ratio;
+};
+
+[[nodiscard]] Result<Diagnosis> diagnose_files(const hidden::HiddenCase& hidden, const DiagnoseOptions& options);
+[[nodiscard]] TrialResult run_trial(const Trial& trial, const DiagnoseOptions& options);
+/// The whole verdict, for people.
+[[nodiscard]] std::string told(const Diagnosis& diagnosis);
+
+}  // namespace trammel::test
