@@ -82,7 +82,9 @@ void understand(Draft& draft) {
   if (contains(null_kinds(), kind)) {
     draft.truth.question = Question::kNothing;
     if (kind == "null_structured") draft.names = {"unknown"};
-    if (kind == "null_permuted") draft.names = draw_mixture(1, draft.random);
+    while (kind == "null_permuted" && (draft.names.empty() || draft.names[0] == "outlier")) {
+      draft.names = draw_mixture(1, draft.random);  // an outlier at another pose is one as well
+    }
     draft.permuted = kind == "null_permuted";
   } else if (contains(unknown_kinds(), kind)) {
     draft.truth.question = Question::kUnknown;

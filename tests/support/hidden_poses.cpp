@@ -16,8 +16,8 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSecondsAPose = 20;
 constexpr double kSecondsAPathPoint = 0.4;
-constexpr double kLinkLag = 400;  // s, that the links follow the thermometer by
-constexpr int kTurnsOfAKind = 8;  // how often a tool or a load is put on again
+constexpr double kLinkLag = 1.0 / 40;  // of the time measured, that the links follow the thermometer by
+constexpr int kTurnsOfAKind = 8;       // how often a tool or a load is put on again
 
 using Ranges = std::array<std::pair<double, double>, kJoints>;
 
@@ -97,7 +97,7 @@ void set_temperatures(std::vector<MeasuringPose>& poses, bool constant, Random& 
   const double swing = uniform(random, 1.2, 2.5);
   const double swings = uniform(random, 1.6, 2.6);
   const double phase = uniform(random, 0, kTurn);
-  const double lag = std::min(kLinkLag, whole_time / 15);
+  const double lag = kLinkLag * whole_time;
   double links = 0;
   double before = start;
   for (std::size_t i = 0; i < poses.size(); ++i) {

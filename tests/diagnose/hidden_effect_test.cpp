@@ -1,0 +1,151 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/demand.h"
+#include "tests/support/diagnosis_trial.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+
+// An effect is hidden by a simulation that shares nothing with the server's; the diagnosis sees a batch, a cell and a
+// robot file and must find it, or say that it cannot. A bounded part of what diagnose_benchmark does at length.
+
+namespace trammel {
+namespace {
+
+using hidden::HiddenSpec;
+using test::Judgement;
+
+DiagnoseOptions quick() {
+  DiagnoseOptions options;
+  options.draws = 200;
+  options.next_poses = 0;
+  options.recovery = false;
+  return options;
+}
+
+/// What is said of a case; the whole verdict goes with every failure.
+struct Answer {
+  Judgement judgement;
+  Diagnosis diagnosis;
+  std::string shown;
+};
+
+Answer answer_to(const HiddenSpec& spec, const DiagnoseOptions& options = quick()) {
+  const hidden::HiddenCase hidden = hidden::hide(spec);
+  Answer answer;
+  answer.diagnosis = test::demand(test::diagnose_files(hidden, options));
+  answer.judgement = test::judge(answer.diagnosis, hidden);
+  answer.shown = to_json(hidden.truth, hidden.world) + test::told(answer.diagnosis);
+  return answer;
+}
+
+std::string test_name(const testing::TestParamInfo<const char*>& info) {
+  std::string name = info.param;
+  std::erase(name, '_');
+  std::replace(name.begin(), name.end(), '+', 'x');
+  return name;
+}
+
+class HiddenEffect : public testing::TestWithParam<const char*> {};
+
+TEST_P(HiddenEffect, IsNamedAndNothingElseIs) {
+  const Answer answer = answer_to({.kind = GetParam(), .seed = 3, .lambda = 150, .poses = 160});
+  EXPECT_TRUE(answer.judgement.exact) << answer.shown;
+}
+
+INSTANTIATE_TEST_SUITE_P(Causes, HiddenEffect,
+                         testing::Values("gear_transmission", "encoder_eccentricity", "joint_map", "backlash",
+                                         "wrist_coupling", "thermal_growth", "tracker_moved", "joint_slip",
+                                         "tool_changed", "payload", "tool", "time_lag", "outlier", "geometry",
+                                         "compliance", "backlash+outlier"),
+                         test_name);
+
+class HiddenNothing : public testing::TestWithParam<const char*> {};
+
+TEST_P(HiddenNothing, GetsNoName) {
+  for (const std::uint64_t seed : {1u, 2u}) {
+    const Answer answer = answer_to({.kind = GetParam(), .seed = seed, .lambda = 30, .poses = 140});
+    EXPECT_TRUE(answer.diagnosis.findings.empty()) << answer.shown;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Nulls, HiddenNothing, testing::Values("null_white", "null_structured", "null_permuted"),
+                         test_name);
+
+class HiddenUnknown : public testing::TestWithParam<const char*> {};
+
+TEST_P(HiddenUnknown, IsCalledUnknownWithTheJointsItDependsOn) {
+  const Answer answer = answer_to({.kind = GetParam(), .seed = 1, .lambda = 200, .poses = 160});
+  EXPECT_TRUE(answer.judgement.unknown_rightly) << answer.shown;
+  EXPECT_TRUE(answer.diagnosis.findings.empty()) << answer.shown;
+}
+
+INSTANTIATE_TEST_SUITE_P(Unknowns, HiddenUnknown, testing::Values("unknown_q4", "unknown_q2q3"), test_name);
+
+class HiddenUndecidable : public testing::TestWithParam<const char*> {};
+
+TEST_P(HiddenUndecidable, IsAmongWhatCannotBeToldAndIsNotNamedAlone) {
+  const Answer answer = answer_to({.kind = GetParam(), .seed = 2, .lambda = 150, .poses = 140});
+  EXPECT_TRUE(answer.judgement.set_holds_truth) << answer.shown;
+  EXPECT_FALSE(answer.judgement.over_confident) << answer.shown;
+}
+
+INSTANTIATE_TEST_SUITE_P(Undecidables, HiddenUndecidable,
+                         testing::Values("backlash_one_side", "payload_alone", "tool_or_link", "tool_absorbed",
+                                         "joint1_or_tracker", "constant_warmth"),
+                         test_name);
+
+TEST(HiddenEffectOnPositions, IsNamedWithoutOrientations) {
+  const Answer answer =
+      answer_to({.kind = "gear_transmission", .seed = 4, .lambda = 150, .poses = 160, .orientation = false});
+  EXPECT_TRUE(answer.judgement.exact) << answer.shown;
+}
+
+TEST(HiddenEffectInASmallRange, IsNamedOrLeftOpenButNotMistaken) {
+  const Answer answer =
+      answer_to({.kind = "encoder_eccentricity", .seed = 2, .lambda = 100, .poses = 160, .ranges = "6dim-l"});
+  EXPECT_EQ(answer.judgement.wrong, 0) << answer.shown;
+}
+
+TEST(HiddenHole28, IsTheOnlyPoseThatDoesNotBelong) {
+  const Answer answer = answer_to({.kind = "replica_p28", .seed = 1});
+  ASSERT_EQ(answer.diagnosis.findings.size(), 1u) << answer.shown;
+  EXPECT_EQ(answer.diagnosis.findings[0].cause.cause, "outlier");
+  EXPECT_EQ(answer.diagnosis.findings[0].cause.pose_id, "p28");
+  EXPECT_EQ(answer.diagnosis.findings[0].action, "single pose, cause not separable: repeat it and its neighbours");
+}
+
+TEST(HiddenEffectExtended, PredictsPosesHeldOutAsWellAsWhoKnowsTheTruth) {
+  test::Trial trial{"test", {.kind = "backlash", .seed = 6, .lambda = 300, .poses = 240, .validation_share = 0.4}};
+  trial.compare_with_oracle = true;
+  const test::TrialResult result = run_trial(trial, quick());
+  ASSERT_EQ(result.error, "");
+  EXPECT_LT(result.held_out_after_mm, 1.05 * result.oracle_mm.value()) << result.judgement.said;
+  EXPECT_LT(result.held_out_after_mm, result.held_out_before_mm);
+}
+
+TEST(HiddenByOneProcess, IsFoundByAnother) {
+  const test::TemporaryFolder folder;
+  const std::string binary = TRAMMEL_BINARY_DIR;
+  const test::Finished hide = test::run({binary + "/tests/trammel_hide", "--kind", "gear_transmission", "--seed", "12",
+                                         "--lambda", "150", "--poses", "160", "-o", folder.path().string()});
+  ASSERT_EQ(hide.exit_code, 0) << hide.err;
+  const test::Finished diagnose =
+      test::run({binary + "/clients/trammel", "diagnose", "--cell", folder.file("cell.yaml"), "--batch",
+                 folder.file("batch.csv"), "--json", folder.file("diagnosis.json")},
+                std::chrono::seconds(120));
+  ASSERT_EQ(diagnose.exit_code, 0) << diagnose.err;
+  const auto truth = nlohmann::json::parse(test::read_file(folder.file("truth.json")))["causes"][0];
+  const auto said = nlohmann::json::parse(test::read_file(folder.file("diagnosis.json")));
+  EXPECT_EQ(said["verdict"], "named");
+  ASSERT_EQ(said["findings"].size(), 1u) << said.dump(1);
+  EXPECT_EQ(said["findings"][0]["cause"], truth["cause"]);
+  EXPECT_EQ(said["findings"][0]["joint"], truth["joint"]);
+  EXPECT_NEAR(said["findings"][0]["parameters"]["order"]["value"].get<double>(), truth["values"]["order"].get<double>(),
+              0.1);
+}
+
+}  // namespace
+}  // namespace trammel
