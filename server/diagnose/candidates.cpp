@@ -10,6 +10,7 @@ namespace {
 
 using Eigen::Index;
 
+constexpr double kBendingFirst = 4;    // nat: links that bend where nobody has asked yet whether the joints do
 constexpr double kLeastWarming = 0.5;  // K between the coldest and the warmest pose
 
 bool any(const MeasurementBatch& batch, const std::function<bool(const PoseContext&)>& has) {
@@ -104,6 +105,11 @@ bool has_single_parameters(const std::string& cause) {
   return cause == "geometry" || cause == "compliance" || cause == "payload" || cause == "wrist_coupling";
 }
 
+bool has_effect(const LinearProblem& problem, const std::string& source) {
+  return std::any_of(problem.effects().begin(), problem.effects().end(),
+                     [&](const Effect& effect) { return effect.source == source; });
+}
+
 std::vector<Index> all_columns(const Effect& effect) {
   std::vector<Index> all(effect.parameters.size());
   std::iota(all.begin(), all.end(), Index{0});
@@ -142,7 +148,8 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
       add(make_step_family(problem, effect, cause, effect.source.substr(0, at)));
       continue;
     }
-    add(make_fixed_family(problem, effect, cause, all_columns(effect)));
+    const double surprise = cause.cause == "link_bending" && has_effect(problem, "compliance") ? kBendingFirst : 0;
+    add(make_fixed_family(problem, effect, cause, all_columns(effect), surprise));
     if (!has_single_parameters(cause.cause) || effect.parameters.size() < 2) continue;
     for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
       Cause single = cause;

@@ -28,6 +28,16 @@ struct View {
   const Eigen::VectorXd* keep = nullptr;
 };
 
+/// What a column g that is multiplied by a function of the pose, g(row) f(pose), needs of a scan: pose by pose instead
+/// of row by row.
+struct Shares {
+  Eigen::MatrixXd along;   ///< N x k: g's rows of each pose times those of the projected data
+  Eigen::MatrixXd root;    ///< N x p: the same with the background's root
+  Eigen::VectorXd square;  ///< N: g's own
+};
+[[nodiscard]] Shares shares_of(const LinearProblem& problem, const View& view, const Eigen::VectorXd& g,
+                               const Eigen::MatrixXd& projected);
+
 /// nat: of `freedom` numbers of equal prior variance, chosen by the data, that explain `strength`.
 [[nodiscard]] double log_evidence(double strength, double freedom);
 /// The strength at which log_evidence() is `evidence`.
@@ -49,6 +59,8 @@ class Family {
   [[nodiscard]] virtual std::vector<std::string> depends_on() const { return {}; }
   /// False where it says nothing of other poses.
   [[nodiscard]] virtual bool predicts() const { return true; }
+  /// nat: how much less it is to be expected than other causes.
+  [[nodiscard]] virtual double surprise() const { return 0; }
   /// The best member for each column of `projected` (R x k: S⁻¹ y).
   [[nodiscard]] virtual std::vector<Best> scan(const View& view, const Eigen::MatrixXd& projected) const = 0;
   /// R x m: in units of priors (of the fitted size, where that is known).
@@ -61,7 +73,7 @@ using FamilyPtr = std::unique_ptr<Family>;
 
 /// A cause whose effect is a fixed set of columns; `chosen` of the effect's.
 [[nodiscard]] FamilyPtr make_fixed_family(const LinearProblem& problem, const Effect& effect, Cause cause,
-                                          const std::vector<Eigen::Index>& chosen);
+                                          const std::vector<Eigen::Index>& chosen, double surprise = 0);
 /// A gear: a sine and a cosine of one joint's angle, of any order. Null where the joint hardly moves.
 [[nodiscard]] FamilyPtr make_gear_family(const LinearProblem& problem, int joint);
 /// A cause that begins at a pose; `effect` is that of one that began before the first. `spec` without its @pose.

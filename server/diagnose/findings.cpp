@@ -102,10 +102,11 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     Finding finding;
     finding.cause = one.cause;
     finding.source = one.source;
-    finding.parameters = parameters_of(problem, one.source, one.cause, estimated);
+    const std::string name = name_in_model(problem.model(), one.source);
+    finding.parameters = parameters_of(problem, name, one.cause, estimated);
     if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
-    const std::vector<Index> places = places_of_source(problem.model(), one.source);
-    const VectorXd effect = effect_of_source(problem, one.source);
+    const std::vector<Index> places = places_of_source(problem.model(), name);
+    const VectorXd effect = effect_of_source(problem, name);
     const Background rest(without_columns(columns, places));
     finding.effect_rms = problem.position_rms(effect);
     finding.strength = effect.dot(rest.project(effect).col(0));

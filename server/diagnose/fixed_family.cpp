@@ -23,12 +23,29 @@ double strength_for(double evidence, double freedom) {
   return high;
 }
 
+Shares shares_of(const LinearProblem& problem, const View& view, const VectorXd& g, const MatrixXd& projected) {
+  const Index N = problem.poses();
+  const MatrixXd& U = view.background.root();
+  Shares shares{MatrixXd::Zero(N, projected.cols()), MatrixXd::Zero(N, U.cols()), VectorXd::Zero(N)};
+  for (Index i = 0; i < N; ++i) {
+    const Index row = problem.first_row(i);
+    const Index count = problem.row_count(i);
+    if (view.keep && (*view.keep)(row) == 0) continue;
+    const auto own = g.segment(row, count).transpose();
+    shares.along.row(i).noalias() = own * projected.middleRows(row, count);
+    shares.root.row(i).noalias() = own * U.middleRows(row, count);
+    shares.square(i) = own.squaredNorm();
+  }
+  return shares;
+}
+
 namespace {
 
 class FixedFamily final : public Family {
  public:
-  FixedFamily(Cause cause, std::string source, MatrixXd columns)
-      : cause_(std::move(cause)), source_(std::move(source)), columns_(std::move(columns)) {}
+  FixedFamily(Cause cause, std::string source, MatrixXd columns, double surprise)
+      : cause_(std::move(cause)), source_(std::move(source)), columns_(std::move(columns)), surprise_(surprise) {}
+  double surprise() const override { return surprise_; }
 
   Cause cause(const Best&) const override { return cause_; }
   std::string source(const Best&) const override { return source_; }
@@ -59,12 +76,14 @@ class FixedFamily final : public Family {
   Cause cause_;
   std::string source_;
   MatrixXd columns_;
+  double surprise_;
 };
 
 }  // namespace
 
-FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause cause, const std::vector<Index>& chosen) {
-  return std::make_unique<FixedFamily>(std::move(cause), effect.source, effect.columns(Eigen::all, chosen));
+FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause cause, const std::vector<Index>& chosen,
+                            double surprise) {
+  return std::make_unique<FixedFamily>(std::move(cause), effect.source, effect.columns(Eigen::all, chosen), surprise);
 }
 
 }  // namespace trammel

@@ -11,6 +11,7 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::MatrixXf;
 using Eigen::VectorXd;
 
 constexpr double kAmplitude = 1e-4;      // rad, prior
@@ -20,13 +21,6 @@ constexpr double kStep = 0.2;            // of what two orders differ by that th
 constexpr double kFineSteps = 5;         // to a coarse one, about the best
 constexpr double kSmallestSpan = 0.035;  // rad
 constexpr Index kOrdersAtATime = 96;
-
-/// One joint's share of every pose: everything that the scan needs, pose by pose instead of row by row.
-struct Shares {
-  MatrixXd along;   // N x k: column of the joint times the projected data
-  MatrixXd root;    // N x p: the same with the background's root
-  VectorXd square;  // N: the column's own
-};
 
 class GearFamily final : public Family {
  public:
@@ -61,7 +55,7 @@ class GearFamily final : public Family {
   }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
-    const Shares shares = shares_of(view, projected);
+    const Shares shares = shares_of(problem_, view, kAmplitude * problem_.by_joint().col(joint_), projected);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     for (Index first = 0; first < orders_; first += kOrdersAtATime) {
       scan_orders(shares, kLowestOrder + step_ * static_cast<double>(first), step_,
@@ -79,7 +73,7 @@ class GearFamily final : public Family {
 
   Periodogram all_orders(const Background& background) const {
     const MatrixXd projected = background.project(problem_.residual());
-    const Shares shares = shares_of({background}, projected);
+    const Shares shares = shares_of(problem_, {background}, kAmplitude * problem_.by_joint().col(joint_), projected);
     Periodogram periodogram{joint_, VectorXd(orders_), VectorXd(orders_), 0};
     for (Index k = 0; k < orders_; ++k) {
       std::vector<Best> best(1);
@@ -91,22 +85,6 @@ class GearFamily final : public Family {
   }
 
  private:
-  Shares shares_of(const View& view, const MatrixXd& projected) const {
-    const Index N = problem_.poses();
-    const MatrixXd& U = view.background.root();
-    Shares shares{MatrixXd::Zero(N, projected.cols()), MatrixXd::Zero(N, U.cols()), VectorXd::Zero(N)};
-    for (Index i = 0; i < N; ++i) {
-      const Index row = problem_.first_row(i);
-      const Index count = problem_.row_count(i);
-      if (view.keep && (*view.keep)(row) == 0) continue;
-      const VectorXd turn = kAmplitude * problem_.by_joint().col(joint_).segment(row, count);
-      shares.along.row(i) = turn.transpose() * projected.middleRows(row, count);
-      shares.root.row(i) = turn.transpose() * U.middleRows(row, count);
-      shares.square(i) = turn.squaredNorm();
-    }
-    return shares;
-  }
-
   /// `count` orders from `from`, `step` apart; improves `best` where one is stronger.
   void scan_orders(const Shares& shares, double from, double step, Index count, std::vector<Best>& best) const {
     MatrixXd sine(q_.size(), count), cosine(q_.size(), count);
@@ -121,8 +99,10 @@ class GearFamily final : public Family {
       c = c * turn_cosine - s * turn_sine;
       s = next;
     }
-    const MatrixXd sine_along = sine.transpose() * shares.along;
-    const MatrixXd cosine_along = cosine.transpose() * shares.along;
+    // Single precision is enough for a projection that noise of one sigma is in.
+    const MatrixXf along = shares.along.cast<float>();
+    const MatrixXf sine_along = sine.cast<float>().transpose() * along;
+    const MatrixXf cosine_along = cosine.cast<float>().transpose() * along;
     const MatrixXd sine_root = sine.transpose() * shares.root;
     const MatrixXd cosine_root = cosine.transpose() * shares.root;
     for (Index k = 0; k < count; ++k) {
@@ -133,8 +113,8 @@ class GearFamily final : public Family {
           sine.col(k).cwiseProduct(cosine.col(k)).dot(shares.square) - sine_root.row(k).dot(cosine_root.row(k));
       const double determinant = ss * cc - sc * sc;
       if (!(determinant > 0)) continue;
-      const ArrayXd a = sine_along.row(k);
-      const ArrayXd b = cosine_along.row(k);
+      const ArrayXd a = sine_along.row(k).cast<double>();
+      const ArrayXd b = cosine_along.row(k).cast<double>();
       const ArrayXd strength = (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant;
       for (Index d = 0; d < strength.size(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];

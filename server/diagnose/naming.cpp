@@ -16,13 +16,16 @@ constexpr double kRivalFrequency = 0.03;
 constexpr double kMargin = 3;           // nat: odds of 20 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
 constexpr double kAsGood = 6;           // of strength
+constexpr double kAtOnce = 0.05;        // of the poses
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
-/// The same cause, told by one number or by all; or a more general description of one joint's angle error.
 bool no_rival(const Cause& named, const Cause& other) {
-  if (named.cause == other.cause) return named.joint == other.joint || named.joint < 0 || other.joint < 0;
-  const bool angle = named.cause == "gear_transmission" || named.cause == "encoder_eccentricity";
-  return angle && other.cause == "joint_map" && named.joint == other.joint;
+  return is_description_of(other, named) || is_whole_of(named, other);
+}
+
+/// A step so near to the first pose that it stands for something that always acted.
+bool begins_at_once(const Cause& cause, const Best& best, double poses) {
+  return !cause.pose_id.empty() && best.at < kAtOnce * poses;
 }
 
 VectorXd fitted(const Background& background, const MatrixXd& columns, const VectorXd& data) {
@@ -51,8 +54,27 @@ std::vector<std::size_t> winners(const std::vector<FamilyPtr>& families, const B
 
 }  // namespace
 
+bool is_whole_of(const Cause& whole, const Cause& step) {
+  if (step.cause == "tracker_moved") return whole.cause == "base";
+  if (step.cause == "tool_changed") return whole.cause == "tool";
+  if (step.cause == "payload_changed") return whole.cause == "payload";
+  return step.cause == "joint_slip" && whole.cause == "geometry" &&
+         (whole.parameter.empty() || whole.parameter == fmt::format("q{}", step.joint + 1));
+}
+
+bool is_description_of(const Cause& general, const Cause& special) {
+  if (general.cause == special.cause) return general.joint == special.joint || general.joint < 0 || special.joint < 0;
+  if (special.cause == "geometry" && general.cause == "joint_map")
+    return special.parameter == fmt::format("q{}", general.joint + 1);
+  // Joints give way before links do; only beside the joints' compliance is bending a cause of its own.
+  if (special.cause == "compliance" && general.cause == "link_bending") return true;
+  const bool angle = special.cause == "gear_transmission" || special.cause == "encoder_eccentricity";
+  return angle && general.cause == "joint_map" && special.joint == general.joint;
+}
+
 Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& background, const MatrixXd& null,
-                     const VectorXd& data, const Scan& seen, std::size_t place) {
+                     const VectorXd& data, const Scan& seen, std::size_t place, Index poses) {
+  const auto batch_poses = static_cast<double>(poses);
   const Best& best = seen.best[place];
   const Cause cause = families[place]->cause(best);
   const VectorXd effect = fitted(background, families[place]->columns(best), data);
@@ -72,7 +94,7 @@ Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& b
   for (std::size_t f = 0; f < families.size(); ++f) {
     if (!families[f]->named() || !families[f]->predicts() || seen.best[f].evidence <= 0) continue;
     const Cause other = families[f]->cause(seen.best[f]);
-    if (f == place || no_rival(cause, other)) continue;
+    if (f == place || no_rival(cause, other) || begins_at_once(other, seen.best[f], batch_poses)) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);

@@ -4,6 +4,13 @@
 
 namespace trammel {
 
+/// Whether `whole` is `step` from the first pose on: a base that is elsewhere for a tracker that moved, and so on. A
+/// step near the first pose looks like it, and is the less likely of the two.
+[[nodiscard]] bool is_whole_of(const Cause& whole, const Cause& step);
+
+/// Whether `general` is only a more general description of `special`, not another cause.
+[[nodiscard]] bool is_description_of(const Cause& general, const Cause& special);
+
 /// How sure the name of a cause is.
 struct Naming {
   double frequency = 1;              ///< share of repetitions of the batch, the effect as fitted, that name it
@@ -14,6 +21,6 @@ struct Naming {
 /// by what other named causes explain of the data and of that effect.
 [[nodiscard]] Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& background,
                                    const Eigen::MatrixXd& null, const Eigen::VectorXd& data, const Scan& seen,
-                                   std::size_t place);
+                                   std::size_t place, Eigen::Index poses);
 
 }  // namespace trammel

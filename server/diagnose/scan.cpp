@@ -72,10 +72,10 @@ Scan scan(const std::vector<FamilyPtr>& families, const Background& background, 
     std::vector<double> sorted = chance;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
     const double median = sorted.empty() ? 0 : sorted[sorted.size() / 2];
-    result.penalty.push_back(median);
+    result.penalty.push_back(median + family->surprise());
     for (std::size_t d = 0; d < chance.size(); ++d) {
       double& highest = result.null_score(static_cast<Index>(d));
-      highest = std::max(highest, chance[d] - median);
+      highest = std::max(highest, chance[d] - result.penalty.back());
     }
   }
   std::sort(result.null_score.begin(), result.null_score.end());

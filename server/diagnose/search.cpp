@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr int kMostSteps = 40;         // forward and backward
 constexpr double kMostOutliers = 0.1;  // of the poses
+constexpr double kStepMargin = 5;      // nat
 constexpr int kPathLength = 3;         // named causes that together may beat one anonymous function
 
 Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
@@ -53,7 +54,10 @@ class Search {
     const auto open = [&](std::size_t f) { return !is_closed(*families[f], seen.best[f]); };
     const auto best = seen.strongest(open);
     if (!best || seen.score(*best) < seen.limit) return false;
-    const auto named = seen.strongest([&](std::size_t f) { return open(f) && families[f]->named(); });
+    if (best)
+      fprintf(stderr, "best %s score %.1f limit %.1f\n", to_string(families[*best]->cause(seen.best[*best])).c_str(),
+    auto named = seen.strongest([&](std::size_t f) { return open(f) && families[f]->named(); });
+    if (named) named = whole_instead_of_step(families, seen, *named, open);
     if (!families[*best]->named()) {
       const bool path =
           named && named_path_score(families, seen, columns, problem.residual(), open) >= seen.score(*best);
@@ -96,6 +100,16 @@ class Search {
       return one.cause == cause.cause && one.joint == cause.joint && one.parameter == cause.parameter &&
              one.pose_id == cause.pose_id && (!one.order || !cause.order || std::abs(*one.order - *cause.order) < 0.5);
     });
+  }
+
+  /// A step that a cause acting from the first pose on explains nearly as well is that cause.
+  static std::size_t whole_instead_of_step(const std::vector<FamilyPtr>& families, const Scan& seen, std::size_t step,
+                                           const std::function<bool(std::size_t)>& open) {
+    const auto whole = seen.strongest([&](std::size_t f) {
+      return open(f) && families[f]->named() &&
+             is_whole_of(families[f]->cause(seen.best[f]), families[step]->cause(seen.best[step]));
+    });
+    return whole && seen.score(*whole) > seen.score(step) - kStepMargin ? *whole : step;
   }
 
   /// nat: what the best few named causes, taken one after the other, explain together.
@@ -146,7 +160,7 @@ class Search {
     Accepted one{
         family.cause(best), family.source(best), best, seen.penalty[place], seen.p_value(seen.score(place)), 1, {}, {}};
     if (!family.predicts()) return take_outlier(problem, std::move(one));
-    const Naming naming = name_or_doubt(families, background, null, problem.residual(), seen, place);
+    const Naming naming = name_or_doubt(families, background, null, problem.residual(), seen, place, problem.poses());
     one.naming_frequency = naming.frequency;
     one.could_also_be = naming.could_also_be;
     const std::vector<std::string> sources = result_.sources;
@@ -186,15 +200,16 @@ class Search {
   }
 
   double remaining_score(const LinearProblem& problem, const MatrixXd& columns, const Accepted& one) const {
+    const std::string name = name_in_model(problem.model(), one.source);
     std::vector<Index> own, others;
     Index next = 0;
     for (const ErrorSourcePtr& source : problem.model().sources) {
       for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next)
-        (source->name() == one.source ? own : others).push_back(next);
+        (source->name() == name ? own : others).push_back(next);
     }
     for (; next < columns.cols(); ++next) others.push_back(next);
     const Background rest(columns(Eigen::all, others));
-    const VectorXd effect = effect_of_source(problem, one.source);
+    const VectorXd effect = effect_of_source(problem, name);
     const VectorXd projected = rest.project(problem.residual() + effect);
     const MatrixXd C = columns(Eigen::all, own);
     const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/diagnose/candidates.h"
+#include "server/diagnose/naming.h"
 #include "server/diagnose/wording.h"
 
 namespace trammel {
@@ -18,27 +19,33 @@ constexpr double kPower = 1.2816;        // standard deviations: nine of ten
 constexpr double kAbsorbedShare = 0.05;  // of an effect's length is left: nothing to go by
 constexpr double kSameEffect = 0.95;     // canonical correlation
 constexpr double kMarginStrength = 20;   // between a cause and its imitator, for one to be told from the other
+constexpr Index kMostSingles = 8;
 constexpr double kLeastAlignment = 0.9;  // of an effect with one parameter, to say that it is that one
 
-/// One direction of a family's effect, the one that stands out most; and how much of it does.
-struct Direction {
-  VectorXd effect;     // R, whitened, per prior
-  VectorXd projected;  // S⁻¹ effect
-  double strength = 0;
-  double share = 0;
+/// A family's effect, on average over the sizes that its priors allow.
+struct Average {
+  MatrixXd columns;      // R x m, whitened, per prior
+  MatrixXd information;  // m x m, beside the background
+  double strength = 0;   // what stands out of it
+  double share = 0;      // of its length
+  double rms = 0;        // m
 };
 
-Direction clearest(const MatrixXd& columns, const Background& background) {
-  const MatrixXd information = columns.transpose() * background.project(columns);
-  const MatrixXd whole = columns.transpose() * columns + 1e-12 * MatrixXd::Identity(columns.cols(), columns.cols());
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (information + information.transpose()), whole);
-  const Index last = columns.cols() - 1;
-  Direction direction;
-  direction.effect = columns * eigen.eigenvectors().col(last).normalized();
-  direction.projected = background.project(direction.effect);
-  direction.strength = direction.effect.dot(direction.projected);
-  direction.share = std::sqrt(std::max(0.0, direction.strength) / std::max(1e-300, direction.effect.squaredNorm()));
-  return direction;
+Average average_of(const LinearProblem& problem, const MatrixXd& columns, const Background& background) {
+  Average average{columns, columns.transpose() * background.project(columns), 0, 0, 0};
+  average.strength = std::max(0.0, average.information.trace());
+  average.share = std::sqrt(average.strength / std::max(1e-300, columns.squaredNorm()));
+  for (Index k = 0; k < columns.cols(); ++k)
+    average.rms = std::hypot(average.rms, problem.position_rms(columns.col(k)));
+  return average;
+}
+
+/// How much of one family's effect, on average, another makes as well: a correlation.
+double imitation(const Average& own, const Average& other, const Background& background) {
+  const MatrixXd shared = other.columns.transpose() * background.project(own.columns);
+  const MatrixXd information =
+      other.information + MatrixXd::Identity(other.information.rows(), other.information.cols());
+  return std::sqrt(std::clamp((shared.transpose() * information.llt().solve(shared)).trace() / own.strength, 0.0, 1.0));
 }
 
 /// The model's own parameter that an effect is most like, if any.
@@ -66,7 +73,23 @@ std::optional<Cause> absorbing(const LinearProblem& problem, const VectorXd& eff
   return std::nullopt;
 }
 
-bool is_group(const Cause& cause) { return cause.parameter.empty(); }
+/// Single numbers of a cause that the model's own parameters take over whole.
+void add_absorbed(const LinearProblem& problem, const Background& background, const MatrixXd& columns,
+                  const Cause& cause, std::vector<Inseparable>& inseparable) {
+  if (columns.cols() > kMostSingles) return;
+  for (Index k = 0; k < columns.cols(); ++k) {
+    const VectorXd column = columns.col(k);
+    const double whole = std::max(1e-300, column.squaredNorm());
+    const double left = column.dot(background.project(column).col(0)) / whole;
+    if (left > kAbsorbedShare * kAbsorbedShare) continue;
+    const std::optional<Cause> absorber = absorbing(problem, column);
+    if (!absorber) continue;
+    const std::vector<Cause> pair = {cause, *absorber};
+    const bool known = std::any_of(inseparable.begin(), inseparable.end(),
+                                   [&](const Inseparable& other) { return other.causes == pair; });
+    if (!known) inseparable.push_back({pair, std::sqrt(1 - std::clamp(left, 0.0, 1.0))});
+  }
+}
 
 }  // namespace
 
@@ -74,57 +97,41 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
                     const Scan& seen) {
   Blindness result;
   std::vector<std::size_t> places;
-  std::vector<Direction> directions;
+  std::vector<Average> averages;
   for (std::size_t f = 0; f < families.size(); ++f) {
-    if (!families[f]->named() || !families[f]->predicts()) continue;
+    const Cause cause = families[f]->cause(families[f]->typical());
+    if (!families[f]->named() || !families[f]->predicts() || !cause.parameter.empty()) continue;
     const MatrixXd columns = families[f]->columns(families[f]->typical());
     if (columns.squaredNorm() == 0) continue;
-    // What single numbers of a cause are absorbed by, one by one.
-    const Cause cause = families[f]->cause(families[f]->typical());
-    for (Index k = 0; k < columns.cols() && columns.cols() <= 6; ++k) {
-      const VectorXd column = columns.col(k);
-      const double left = column.dot(background.project(column).col(0));
-      if (left > kAbsorbedShare * kAbsorbedShare * column.squaredNorm()) continue;
-      if (const std::optional<Cause> absorber = absorbing(problem, column)) {
-        const Inseparable pair{{cause, *absorber}, 1 - left / std::max(1e-300, column.squaredNorm())};
-        if (std::none_of(result.inseparable.begin(), result.inseparable.end(),
-                         [&](const Inseparable& other) { return other.causes == pair.causes; }))
-          result.inseparable.push_back(pair);
-      }
-    }
+    add_absorbed(problem, background, columns, cause, result.inseparable);
     places.push_back(f);
-    directions.push_back(clearest(columns, background));
+    averages.push_back(average_of(problem, columns, background));
   }
-
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const Direction& own = directions[i];
+    const Average& own = averages[i];
     const Cause cause = families[places[i]]->cause(families[places[i]]->typical());
-    if (!is_group(cause)) continue;
     Unseen unseen{cause, own.share, {}, {}, ""};
-    if (own.strength >= 1 && own.share > kAbsorbedShare) {
-      double imitated = 0;
-      for (std::size_t j = 0; j < places.size(); ++j) {
-        const Cause other = families[places[j]]->cause(families[places[j]]->typical());
-        if (i == j || other.cause == cause.cause || directions[j].strength < 1) continue;
-        const double overlap = own.effect.dot(directions[j].projected);
-        const double correlation = std::abs(overlap) / std::sqrt(own.strength * directions[j].strength);
-        imitated = std::max(imitated, correlation);
-        if (correlation > kSameEffect && j > i && is_group(other))
-          result.inseparable.push_back({{cause, other}, correlation});
-      }
-      const double line = strength_for(seen.limit + seen.penalty[places[i]],
-                                       seen.best[places[i]].freedom > 0 ? seen.best[places[i]].freedom : 1);
-      const double needed = std::pow(std::sqrt(line) + kPower, 2);
-      const double rms = problem.position_rms(own.effect);
-      unseen.detectable = rms * std::sqrt(needed / own.strength);
-      const double distinct = 1 - imitated * imitated;
-      if (imitated < kSameEffect)
-        unseen.identifiable = rms * std::sqrt(std::max(needed, kMarginStrength / distinct) / own.strength);
-      else
-        unseen.needs = what_it_needs(cause);
-    } else {
+    if (own.strength < 1 || own.share < kAbsorbedShare) {
       unseen.needs = what_it_needs(cause);
+      result.unseen.push_back(std::move(unseen));
+      continue;
     }
+    double imitated = 0;
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      const Cause other = families[places[j]]->cause(families[places[j]]->typical());
+      if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
+      const double correlation = imitation(own, averages[j], background);
+      imitated = std::max(imitated, correlation);
+      if (correlation > kSameEffect) result.inseparable.push_back({{cause, other}, correlation});
+    }
+    const int freedom = std::max(1, seen.best[places[i]].freedom);
+    const double needed = std::pow(std::sqrt(strength_for(seen.limit + seen.penalty[places[i]], freedom)) + kPower, 2);
+    const auto size_for = [&](double strength) { return own.rms * std::sqrt(strength / own.strength); };
+    unseen.detectable = size_for(needed);
+    if (imitated < kSameEffect)
+      unseen.identifiable = size_for(std::max(needed, kMarginStrength / (1 - imitated * imitated)));
+    else
+      unseen.needs = what_it_needs(cause);
     result.unseen.push_back(std::move(unseen));
   }
   return result;

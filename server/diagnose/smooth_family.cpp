@@ -12,21 +12,29 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kBox = 1.2;                       // half width of the box that the basis lives in; data lie in [-1, 1]
-constexpr double kSmallestSpan = 0.035;            // rad
+constexpr double kBox = 1.2;             // half width of the box that the basis lives in; data lie in [-1, 1]
+constexpr double kSmallestSpan = 0.035;  // rad
+constexpr Index kFunctionsOfOne = 16;
+constexpr Index kFunctionsOfEach = 7;              // of two
 constexpr int kSizes = 17;                         // a quarter of a decade apart
 constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
 
-/// A Gaussian process with a squared exponential kernel of unit variance as a weighted sum of sines in a box (Solin and
-/// Särkkä 2020): column k has its standard deviation sqrt(S(omega_k)) multiplied in. N x count.
-MatrixXd basis(const VectorXd& x, Index count, double length_scale) {
-  MatrixXd columns(x.size(), count);
+/// Angular frequency of a sine of the box.
+double frequency(Index k) { return kPi * static_cast<double>(k + 1) / (2 * kBox); }
+
+/// N x count: sines in a box. Weighed by deviations() their random sums are a Gaussian process with a squared
+/// exponential kernel of unit variance (Solin and Särkkä 2020).
+MatrixXd sines(const VectorXd& x, Index count) {
+  MatrixXd functions(x.size(), count);
+  for (Index k = 0; k < count; ++k) functions.col(k) = (frequency(k) * (x.array() + kBox)).sin() / std::sqrt(kBox);
+  return functions;
+}
+VectorXd deviations(Index count, double length_scale) {
+  VectorXd spectrum(count);
   for (Index k = 0; k < count; ++k) {
-    const double omega = kPi * static_cast<double>(k + 1) / (2 * kBox);
-    const double spectrum = std::sqrt(2 * kPi) * length_scale * std::exp(-0.5 * std::pow(length_scale * omega, 2));
-    columns.col(k) = std::sqrt(spectrum / kBox) * (omega * (x.array() + kBox)).sin();
+    spectrum(k) = std::sqrt(2 * kPi) * length_scale * std::exp(-0.5 * std::pow(length_scale * frequency(k), 2));
   }
-  return columns;
+  return spectrum.cwiseSqrt();
 }
 
 /// [-1, 1] over the poses; empty where it hardly changes.
@@ -44,59 +52,88 @@ VectorXd angles(const LinearProblem& problem, int joint) {
   return q;
 }
 
-/// A random smooth function: columns for each of a few length scales, of unit size.
+/// A random smooth function of the pose, times one or more columns g: numbers are wanted for every g and every
+/// function. Its length scale and its size are chosen by the data.
 class SmoothFamily : public Family {
  public:
+  explicit SmoothFamily(const LinearProblem& problem) : problem_(problem) {}
+
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const final {
-    std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
-    for (std::size_t scale = 0; scale < members_.size(); ++scale) {
-      const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * members_[scale]) : members_[scale];
-      const MatrixXd shared = view.background.root().transpose() * C;
-      const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C - shared.transpose() * shared);
-      const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
-      const MatrixXd square =
-          (eigen.eigenvectors().transpose() * (C.transpose() * projected)).array().square().matrix();
-      double size = smallest_;
-      for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
-        const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
-        const double cost = (1 + size * size * seen.array()).log().sum();
-        const double freedom = (gain.array() * seen.array()).sum();
-        const VectorXd strength = square.transpose() * gain;
-        for (Index d = 0; d < projected.cols(); ++d) {
-          Best& one = best[static_cast<std::size_t>(d)];
-          const double evidence = 0.5 * (strength(d) - cost);
-          if (evidence > one.evidence)
-            one = {evidence, strength(d), static_cast<int>(std::ceil(freedom)), static_cast<double>(scale), size};
-        }
-      }
+    const auto count = static_cast<Index>(g_.size()) * functions_.cols();
+    const Index each = functions_.cols();
+    MatrixXd information = MatrixXd::Zero(count, count);
+    MatrixXd along(count, projected.cols());
+    MatrixXd root(count, view.background.root().cols());
+    for (std::size_t s = 0; s < g_.size(); ++s) {
+      const Index first = static_cast<Index>(s) * each;
+      const Shares shares = shares_of(problem_, view, g_[s], projected);
+      along.middleRows(first, each).noalias() = functions_.transpose() * shares.along;
+      root.middleRows(first, each).noalias() = functions_.transpose() * shares.root;
+      information.block(first, first, each, each).noalias() =
+          functions_.transpose() * shares.square.asDiagonal() * functions_;
     }
+    information.noalias() -= root * root.transpose();
+    std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
+    for (std::size_t scale = 0; scale < deviations_.size(); ++scale) choose(information, along, scale, best);
     return best;
   }
-  MatrixXd columns(const Best& best) const final { return best.size * members_[static_cast<std::size_t>(best.at)]; }
-  Best typical() const final { return {0, 0, 1, static_cast<double>(members_.size() - 1), typical_}; }
+
+  MatrixXd columns(const Best& best) const final {
+    const VectorXd& deviation = deviations_[static_cast<std::size_t>(best.at)];
+    const Index each = functions_.cols();
+    MatrixXd all(problem_.rows(), static_cast<Index>(g_.size()) * each);
+    for (Index i = 0; i < problem_.poses(); ++i) {
+      const Index row = problem_.first_row(i);
+      for (std::size_t s = 0; s < g_.size(); ++s) {
+        all.block(row, static_cast<Index>(s) * each, problem_.row_count(i), each) =
+            best.size * g_[s].segment(row, problem_.row_count(i)) *
+            functions_.row(i).cwiseProduct(deviation.transpose());
+      }
+    }
+    return all;
+  }
+  Best typical() const final { return {0, 0, 1, static_cast<double>(deviations_.size() - 1), typical_}; }
 
  protected:
-  std::vector<MatrixXd> members_;
+  const LinearProblem& problem_;
+  std::vector<VectorXd> g_;           // R each
+  MatrixXd functions_;                // N x k
+  std::vector<VectorXd> deviations_;  // k each, one for every length scale
   double smallest_ = 1e-6;
   double typical_ = 1e-4;
+
+ private:
+  void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
+    const VectorXd deviation = deviations_[scale].replicate(static_cast<Index>(g_.size()), 1);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information * deviation.asDiagonal());
+    const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
+    const MatrixXd square =
+        (eigen.eigenvectors().transpose() * (deviation.asDiagonal() * along)).array().square().matrix();
+    double size = smallest_;
+    for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
+      const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
+      const double cost = (1 + size * size * seen.array()).log().sum();
+      const double freedom = (gain.array() * seen.array()).sum();
+      const VectorXd strength = square.transpose() * gain;
+      for (Index d = 0; d < strength.size(); ++d) {
+        Best& one = best[static_cast<std::size_t>(d)];
+        const double evidence = 0.5 * (strength(d) - cost);
+        if (evidence > one.evidence)
+          one = {evidence, strength(d), static_cast<int>(std::ceil(freedom)), static_cast<double>(scale), size};
+      }
+    }
+  }
 };
 
 class JointMapFamily final : public SmoothFamily {
  public:
-  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& x, double span) : joint_(joint) {
+  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& x, double span)
+      : SmoothFamily(problem), joint_(joint) {
     const Index most = std::clamp<Index>(problem.poses() / 5, 6, 96);
     harmonics_ = std::clamp(static_cast<int>(static_cast<double>(most) * kPi / (kBox * span) + 1), 4, 48);
-    for (const double length_scale : {0.04, 0.1, 0.25, 0.5}) {
-      const auto needed = static_cast<Index>(std::ceil(4 * kBox / (kPi * length_scale) * 2));
-      const MatrixXd functions = basis(x, std::min(most, needed), length_scale);
-      MatrixXd columns(problem.rows(), functions.cols());
-      for (Index i = 0; i < problem.poses(); ++i) {
-        const Index row = problem.first_row(i);
-        const Index count = problem.row_count(i);
-        columns.middleRows(row, count) = problem.by_joint().col(joint).segment(row, count) * functions.row(i);
-      }
-      members_.push_back(std::move(columns));
-    }
+    g_.emplace_back(problem.by_joint().col(joint));
+    functions_ = sines(x, most);
+    for (const double length_scale : {0.04, 0.1, 0.25, 0.5}) deviations_.push_back(deviations(most, length_scale));
     smallest_ = 1e-7;
     typical_ = 5e-5;
   }
@@ -111,19 +148,22 @@ class JointMapFamily final : public SmoothFamily {
 class AnonymousFamily final : public SmoothFamily {
  public:
   AnonymousFamily(const LinearProblem& problem, std::vector<std::string> on, const std::vector<VectorXd>& x)
-      : on_(std::move(on)) {
+      : SmoothFamily(problem), on_(std::move(on)) {
+    const Index count = x.size() == 1 ? kFunctionsOfOne : kFunctionsOfEach;
+    functions_ = sines(x[0], count);
+    if (x.size() == 2) functions_ = products(functions_, sines(x[1], count));
     for (const double length_scale : {0.2, 0.45, 1.0}) {
-      MatrixXd functions = basis(x[0], x.size() == 1 ? 16 : 7, length_scale);
-      if (x.size() == 2) functions = products(functions, basis(x[1], 7, length_scale));
-      MatrixXd columns = MatrixXd::Zero(problem.rows(), 3 * functions.cols());
+      MatrixXd deviation = deviations(count, length_scale).transpose();
+      if (x.size() == 2) deviation = products(deviation, deviation);
+      deviations_.emplace_back(deviation.transpose());
+    }
+    for (Index axis = 0; axis < 3; ++axis) {
+      VectorXd g = VectorXd::Zero(problem.rows());
       for (Index i = 0; i < problem.poses(); ++i) {
-        const Index row = problem.first_row(i);
-        for (Index axis = 0; axis < 3; ++axis) {
-          columns.row(row + axis).segment(axis * functions.cols(), functions.cols()) =
-              problem.weight()(row + axis) * functions.row(i);
-        }
+        const Index row = problem.first_row(i) + axis;
+        g(row) = problem.weight()(row);
       }
-      members_.push_back(std::move(columns));
+      g_.push_back(std::move(g));
     }
   }
   bool named() const override { return false; }

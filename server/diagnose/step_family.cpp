@@ -95,24 +95,32 @@ class OutlierFamily final : public Family {
       const Index row = problem_.first_row(i);
       const Index count = problem_.row_count(i);
       if (view.keep && (*view.keep)(row) == 0) continue;
-      const auto U = view.background.root().middleRows(row, count);
-      const MatrixXd information =
-          (1 + 1 / (kPriorSigmas * kPriorSigmas)) * MatrixXd::Identity(count, count) - U * U.transpose();
-      const Eigen::LLT<MatrixXd> factor(information);
-      if (factor.info() != Eigen::Success) continue;
-      const MatrixXd whitened = factor.matrixL().solve(projected.middleRows(row, count));
-      for (Index d = 0; d < projected.cols(); ++d) {
-        Best& one = best[static_cast<std::size_t>(d)];
-        const double strength = whitened.col(d).squaredNorm();
-        if (strength > one.strength) one = {0, strength, static_cast<int>(count), static_cast<double>(i), 1};
-      }
+      consider(view, projected, i, row, 3, best);
+      if (count > 3) consider(view, projected, i, row, count, best);
     }
-    for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
     return best;
   }
 
  private:
   static constexpr double kPriorSigmas = 100;
+
+  /// `count` rows of a pose: its position, or all of it.
+  static void consider(const View& view, const MatrixXd& projected, Index pose, Index row, Index count,
+                       std::vector<Best>& best) {
+    const auto U = view.background.root().middleRows(row, count);
+    const MatrixXd information =
+        (1 + 1 / (kPriorSigmas * kPriorSigmas)) * MatrixXd::Identity(count, count) - U * U.transpose();
+    const Eigen::LLT<MatrixXd> factor(information);
+    if (factor.info() != Eigen::Success) return;
+    const MatrixXd whitened = factor.matrixL().solve(projected.middleRows(row, count));
+    for (Index d = 0; d < projected.cols(); ++d) {
+      Best& one = best[static_cast<std::size_t>(d)];
+      const double strength = whitened.col(d).squaredNorm();
+      const double evidence = log_evidence(strength, static_cast<double>(count));
+      if (evidence > one.evidence) one = {evidence, strength, static_cast<int>(count), static_cast<double>(pose), 1};
+    }
+  }
+
   const LinearProblem& problem_;
 };
 
