@@ -28,4 +28,7 @@ class Background {
   Eigen::MatrixXd root_;
 };
 
+/// Background::estimate() alone, without the background's root.
+[[nodiscard]] Eigen::MatrixXd estimate_numbers(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& y);
+
 }  // namespace trammel

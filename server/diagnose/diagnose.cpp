@@ -173,9 +173,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
 
   if (!reported(options, "asking what could not have been seen", 0.72)) return tl::make_unexpected(given_up());
   const std::vector<FamilyPtr> families = make_families(after);
-  const MatrixXd null = draw_null(all, std::min(options.draws, 200), options.seed + 1);
-  const Scan seen = scan(families, all, after.residual(), null);
-  Blindness blind = blindness(after, families, all, seen);
+  Blindness blind = blindness(after, families, all, found.chance);
   diagnosis.could_not_have_seen = std::move(blind.unseen);
   static_cast<void>(candidate_sources(*cell, found.batch, &diagnosis.could_not_have_seen));
   diagnosis.not_separable = std::move(blind.inseparable);
@@ -184,7 +182,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   for (int joint = 0; joint < cell->robot.size(); ++joint) {
     if (cell->robot.joint(joint).type != JointType::kRevolute || !make_gear_family(before, joint)) continue;
     Periodogram lines = periodogram(before, joint, first);
-    lines.limit = strength_for(found.limit, 2);
+    lines.limit = strength_for(found.chance.limit, 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
   diagnosis.waterfall = waterfall_of(found, before, after, diagnosis.findings);
@@ -207,7 +205,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     add("gear_transmission", -1);
     add("encoder_eccentricity", 1);
     add("tracker_moved", -1);
-    diagnosis.recovery = recovery_of(after, families, all, null, seen, places);
+    diagnosis.recovery = recovery_of(after, families, all, found.chance, places, options.seed + 2);
   }
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
   diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);

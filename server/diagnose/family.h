@@ -59,6 +59,8 @@ class Family {
   [[nodiscard]] virtual std::vector<std::string> depends_on() const { return {}; }
   /// False where it says nothing of other poses.
   [[nodiscard]] virtual bool predicts() const { return true; }
+  /// What it is called among the others: the same on every background.
+  [[nodiscard]] std::string label() const;
   /// nat: how much less it is to be expected than other causes.
   [[nodiscard]] virtual double surprise() const { return 0; }
   /// The best member for each column of `projected` (R x k: S⁻¹ y).

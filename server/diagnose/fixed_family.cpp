@@ -23,6 +23,12 @@ double strength_for(double evidence, double freedom) {
   return high;
 }
 
+std::string Family::label() const {
+  std::string text = to_string(cause(typical()));
+  for (const std::string& on : depends_on()) text += " " + on;
+  return text;
+}
+
 Shares shares_of(const LinearProblem& problem, const View& view, const VectorXd& g, const MatrixXd& projected) {
   const Index N = problem.poses();
   const MatrixXd& U = view.background.root();
@@ -50,6 +56,7 @@ class FixedFamily final : public Family {
   Cause cause(const Best&) const override { return cause_; }
   std::string source(const Best&) const override { return source_; }
   MatrixXd columns(const Best&) const override { return columns_; }
+  Best typical() const override { return {0, 0, static_cast<int>(columns_.cols()), 0, 1}; }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;

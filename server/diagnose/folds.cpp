@@ -14,8 +14,7 @@ constexpr Index kFolds = 8;
 constexpr Index kRunsPerFold = 5;
 
 VectorXd predicted(const MatrixXd& columns, const VectorXd& data, const VectorXd& keep) {
-  const Background background(keep.asDiagonal() * columns);
-  return columns * background.estimate(keep.cwiseProduct(data));
+  return columns * estimate_numbers(keep.asDiagonal() * columns, keep.cwiseProduct(data));
 }
 
 MatrixXd beside(const MatrixXd& a, const MatrixXd& b) {
@@ -44,31 +43,21 @@ VectorXd Folds::held_out_residual(const VectorXd& data, const MatrixXd& columns)
 }
 
 Folds::Gain Folds::gain_of_selection(const VectorXd& data, const MatrixXd& columns,
-                                     const std::vector<FamilyPtr>& families, const std::vector<double>& penalty,
+                                     const std::vector<FamilyPtr>& families, const Chance& chance,
                                      const std::function<bool(std::size_t)>& admitted) const {
   Gain gain;
   for (const VectorXd& keep : keep_) {
     const VectorXd held = 1 - keep.array();
     const Background background(keep.asDiagonal() * columns);
-    const MatrixXd projected = background.project(keep.cwiseProduct(data));
-    const View view{background, &keep};
-    const Family* chosen = nullptr;
-    Best best;
-    double highest = 0;
-    for (std::size_t f = 0; f < families.size(); ++f) {
-      if (!admitted(f)) continue;
-      const Best one = families[f]->scan(view, projected).front();
-      if (one.evidence - penalty[f] <= highest) continue;
-      highest = one.evidence - penalty[f];
-      best = one;
-      chosen = families[f].get();
-    }
+    const Scan seen = scan(families, {background, &keep}, data, chance, admitted);
+    const auto chosen = seen.strongest([](std::size_t) { return true; });
     const double before = held.cwiseProduct(data - predicted(columns, data, keep)).squaredNorm();
     gain.before += before;
     gain.after +=
-        chosen == nullptr
-            ? before
-            : held.cwiseProduct(data - predicted(beside(columns, chosen->columns(best)), data, keep)).squaredNorm();
+        chosen ? held.cwiseProduct(
+                         data - predicted(beside(columns, families[*chosen]->columns(seen.best[*chosen])), data, keep))
+                     .squaredNorm()
+               : before;
   }
   return gain;
 }

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "server/diagnose/family.h"
+#include "server/diagnose/scan.h"
 
 namespace trammel {
 
@@ -26,7 +26,7 @@ class Folds {
     double before = 0, after = 0;
   };
   [[nodiscard]] Gain gain_of_selection(const Eigen::VectorXd& data, const Eigen::MatrixXd& columns,
-                                       const std::vector<FamilyPtr>& families, const std::vector<double>& penalty,
+                                       const std::vector<FamilyPtr>& families, const Chance& chance,
                                        const std::function<bool(std::size_t)>& admitted) const;
 
  private:

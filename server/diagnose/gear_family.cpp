@@ -3,6 +3,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/family.h"
+#include "server/diagnose/product.h"
 
 namespace trammel {
 
@@ -11,7 +12,6 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 using Eigen::VectorXd;
 
 constexpr double kAmplitude = 1e-4;      // rad, prior
@@ -99,22 +99,20 @@ class GearFamily final : public Family {
       c = c * turn_cosine - s * turn_sine;
       s = next;
     }
-    // Single precision is enough for a projection that noise of one sigma is in.
-    const MatrixXf along = shares.along.cast<float>();
-    const MatrixXf sine_along = sine.cast<float>().transpose() * along;
-    const MatrixXf cosine_along = cosine.cast<float>().transpose() * along;
-    const MatrixXd sine_root = sine.transpose() * shares.root;
-    const MatrixXd cosine_root = cosine.transpose() * shares.root;
+    const MatrixXd sine_along = transposed_product(shares.along, sine);
+    const MatrixXd cosine_along = transposed_product(shares.along, cosine);
+    const MatrixXd sine_root = transposed_product(shares.root, sine);
+    const MatrixXd cosine_root = transposed_product(shares.root, cosine);
     for (Index k = 0; k < count; ++k) {
       // 1: the prior's share.
-      const double ss = 1 + sine.col(k).cwiseAbs2().dot(shares.square) - sine_root.row(k).squaredNorm();
-      const double cc = 1 + cosine.col(k).cwiseAbs2().dot(shares.square) - cosine_root.row(k).squaredNorm();
+      const double ss = 1 + sine.col(k).cwiseAbs2().dot(shares.square) - sine_root.col(k).squaredNorm();
+      const double cc = 1 + cosine.col(k).cwiseAbs2().dot(shares.square) - cosine_root.col(k).squaredNorm();
       const double sc =
-          sine.col(k).cwiseProduct(cosine.col(k)).dot(shares.square) - sine_root.row(k).dot(cosine_root.row(k));
+          sine.col(k).cwiseProduct(cosine.col(k)).dot(shares.square) - sine_root.col(k).dot(cosine_root.col(k));
       const double determinant = ss * cc - sc * sc;
       if (!(determinant > 0)) continue;
-      const ArrayXd a = sine_along.row(k).cast<double>();
-      const ArrayXd b = cosine_along.row(k).cast<double>();
+      const auto a = sine_along.col(k).array();
+      const auto b = cosine_along.col(k).array();
       const ArrayXd strength = (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant;
       for (Index d = 0; d < strength.size(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];

@@ -16,6 +16,7 @@ constexpr double kRivalFrequency = 0.03;
 constexpr double kMargin = 3;           // nat: odds of 20 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
 constexpr double kAsGood = 6;           // of strength
+constexpr double kContender = 0.15;     // of the best score
 constexpr double kAtOnce = 0.05;        // of the poses
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
@@ -24,32 +25,14 @@ bool no_rival(const Cause& named, const Cause& other) {
 }
 
 /// A step so near to the first pose that it stands for something that always acted.
-bool begins_at_once(const Cause& cause, const Best& best, double poses) {
-  return !cause.pose_id.empty() && best.at < kAtOnce * poses;
+bool begins_at_once(const Cause& cause, const Best& best, Index poses) {
+  return !cause.pose_id.empty() && best.at < kAtOnce * static_cast<double>(poses);
 }
 
 VectorXd fitted(const Background& background, const MatrixXd& columns, const VectorXd& data) {
   const MatrixXd information =
       columns.transpose() * background.project(columns) + MatrixXd::Identity(columns.cols(), columns.cols());
   return columns * information.llt().solve(columns.transpose() * background.project(data));
-}
-
-/// Which family wins in each repetition.
-std::vector<std::size_t> winners(const std::vector<FamilyPtr>& families, const Background& background,
-                                 const MatrixXd& repeated, const Scan& seen) {
-  const MatrixXd projected = background.project(repeated);
-  std::vector<std::size_t> winner(static_cast<std::size_t>(repeated.cols()), 0);
-  std::vector<double> highest(winner.size(), 0);
-  for (std::size_t f = 0; f < families.size(); ++f) {
-    const std::vector<Best> best = families[f]->scan({background}, projected);
-    for (std::size_t d = 0; d < best.size(); ++d) {
-      const double score = best[d].evidence - seen.penalty[f];
-      if (score <= highest[d]) continue;
-      highest[d] = score;
-      winner[d] = f;
-    }
-  }
-  return winner;
 }
 
 }  // namespace
@@ -72,16 +55,18 @@ bool is_description_of(const Cause& general, const Cause& special) {
   return angle && general.cause == "joint_map" && special.joint == general.joint;
 }
 
-Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& background, const MatrixXd& null,
-                     const VectorXd& data, const Scan& seen, std::size_t place, Index poses) {
-  const auto batch_poses = static_cast<double>(poses);
+Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
+                     const Scan& seen, const Chance& chance, std::size_t place, std::uint64_t seed) {
   const Best& best = seen.best[place];
   const Cause cause = families[place]->cause(best);
-  const VectorXd effect = fitted(background, families[place]->columns(best), data);
-  const MatrixXd repeated = null.leftCols(std::min(kRepetitions, null.cols())).colwise() + effect;
-  const std::vector<std::size_t> winner = winners(families, background, repeated, seen);
+  const VectorXd effect = fitted(background, families[place]->columns(best), problem.residual());
+  // What explains nothing of the data cannot win their repetitions.
+  const auto contends = [&](std::size_t f) { return seen.score[f] > kContender * seen.score[place]; };
+  const Winners repeated =
+      winners(families, background, draw_null(background, kRepetitions, seed).colwise() + effect, chance, contends);
   const auto share_of = [&](std::size_t f) {
-    return static_cast<double>(std::count(winner.begin(), winner.end(), f)) / static_cast<double>(winner.size());
+    return static_cast<double>(std::count(repeated.family.begin(), repeated.family.end(), static_cast<int>(f))) /
+           static_cast<double>(repeated.family.size());
   };
   const MatrixXd projected = background.project(effect);
   const double whole = effect.dot(projected.col(0));
@@ -92,14 +77,14 @@ Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& b
       naming.frequency += share_of(f);
   }
   for (std::size_t f = 0; f < families.size(); ++f) {
-    if (!families[f]->named() || !families[f]->predicts() || seen.best[f].evidence <= 0) continue;
+    if (!families[f]->named() || !families[f]->predicts() || !contends(f)) continue;
     const Cause other = families[f]->cause(seen.best[f]);
-    if (f == place || no_rival(cause, other) || begins_at_once(other, seen.best[f], batch_poses)) continue;
+    if (f == place || no_rival(cause, other) || begins_at_once(other, seen.best[f], problem.poses())) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);
     const bool as_good = same_effect && lacks < std::max(kAsGood, kShapeError * best.strength);
-    const bool as_likely = seen.score(place) - seen.score(f) < kMargin;
+    const bool as_likely = seen.score[place] - seen.score[f] < kMargin;
     const bool wins = naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency;
     if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
   }

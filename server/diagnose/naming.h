@@ -19,8 +19,8 @@ struct Naming {
 
 /// Doubts the family at `place` in `seen`: by repeating the batch in simulation with the effect as it was fitted, and
 /// by what other named causes explain of the data and of that effect.
-[[nodiscard]] Naming name_or_doubt(const std::vector<FamilyPtr>& families, const Background& background,
-                                   const Eigen::MatrixXd& null, const Eigen::VectorXd& data, const Scan& seen,
-                                   std::size_t place, Eigen::Index poses);
+[[nodiscard]] Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                                   const Background& background, const Scan& seen, const Chance& chance,
+                                   std::size_t place, std::uint64_t seed);
 
 }  // namespace trammel

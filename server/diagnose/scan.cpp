@@ -40,7 +40,12 @@ Tail tail_of(const VectorXd& ascending) {
 
 }  // namespace
 
-double Scan::p_value(double score) const {
+double Chance::penalty_of(const Family& family) const {
+  const auto known = penalty.find(family.label());
+  return known == penalty.end() ? family.surprise() : known->second;
+}
+
+double Chance::p_value(double score) const {
   const Tail tail = tail_of(null_score);
   if (score > tail.threshold) return kTail * std::exp(-(score - tail.threshold) / tail.scale);
   const auto above = std::count_if(null_score.begin(), null_score.end(), [&](double s) { return s >= score; });
@@ -57,31 +62,59 @@ MatrixXd draw_null(const Background& background, Index draws, std::uint64_t seed
   return white + background.columns() * numbers;
 }
 
-Scan scan(const std::vector<FamilyPtr>& families, const Background& background, const VectorXd& data,
-          const MatrixXd& null) {
+Chance chance_of(const std::vector<FamilyPtr>& families, const Background& background, Index draws,
+                 std::uint64_t seed) {
+  Chance chance;
   const View view{background};
-  const MatrixXd projected = background.project(data);
-  const MatrixXd projected_null = background.project(null);
-  Scan result;
-  result.null_score = VectorXd::Zero(null.cols());
-  std::vector<double> chance(static_cast<std::size_t>(null.cols()));
+  const MatrixXd projected = background.project(draw_null(background, draws, seed));
+  chance.null_score = VectorXd::Zero(draws);
   for (const FamilyPtr& family : families) {
-    result.best.push_back(family->scan(view, projected).front());
-    const std::vector<Best> drawn = family->scan(view, projected_null);
-    std::transform(drawn.begin(), drawn.end(), chance.begin(), [](const Best& one) { return one.evidence; });
-    std::vector<double> sorted = chance;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    const double median = sorted.empty() ? 0 : sorted[sorted.size() / 2];
-    result.penalty.push_back(median + family->surprise());
-    for (std::size_t d = 0; d < chance.size(); ++d) {
-      double& highest = result.null_score(static_cast<Index>(d));
-      highest = std::max(highest, chance[d] - result.penalty.back());
+    const std::vector<Best> drawn = family->scan(view, projected);
+    std::vector<double> evidence(drawn.size());
+    std::transform(drawn.begin(), drawn.end(), evidence.begin(), [](const Best& one) { return one.evidence; });
+    const auto middle = evidence.begin() + static_cast<std::ptrdiff_t>(evidence.size() / 2);
+    std::nth_element(evidence.begin(), middle, evidence.end());
+    const double penalty = *middle + family->surprise();
+    chance.penalty[family->label()] = penalty;
+    for (std::size_t d = 0; d < drawn.size(); ++d) {
+      double& highest = chance.null_score(static_cast<Index>(d));
+      highest = std::max(highest, drawn[d].evidence - penalty);
     }
   }
-  std::sort(result.null_score.begin(), result.null_score.end());
-  const Tail tail = tail_of(result.null_score);
-  result.limit = tail.threshold + tail.scale * std::log(kTail / kChance);
+  std::sort(chance.null_score.begin(), chance.null_score.end());
+  const Tail tail = tail_of(chance.null_score);
+  chance.limit = tail.threshold + tail.scale * std::log(kTail / kChance);
+  return chance;
+}
+
+Scan scan(const std::vector<FamilyPtr>& families, const View& view, const VectorXd& data, const Chance& chance,
+          const std::function<bool(std::size_t)>& admitted) {
+  const MatrixXd projected =
+      view.background.project(view.keep == nullptr ? data : VectorXd(view.keep->cwiseProduct(data)));
+  Scan result;
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    result.best.push_back(admitted && !admitted(f) ? Best{} : families[f]->scan(view, projected).front());
+    result.score.push_back(result.best.back().evidence - chance.penalty_of(*families[f]));
+  }
   return result;
+}
+
+Winners winners(const std::vector<FamilyPtr>& families, const Background& background, const MatrixXd& data,
+                const Chance& chance, const std::function<bool(std::size_t)>& admitted) {
+  const MatrixXd projected = background.project(data);
+  Winners winners{std::vector<int>(static_cast<std::size_t>(data.cols()), -1), {}};
+  winners.score.assign(winners.family.size(), 0);
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    if (admitted && !admitted(f)) continue;
+    const std::vector<Best> best = families[f]->scan({background}, projected);
+    for (std::size_t d = 0; d < best.size(); ++d) {
+      const double score = best[d].evidence - chance.penalty_of(*families[f]);
+      if (score <= winners.score[d]) continue;
+      winners.score[d] = score;
+      winners.family[d] = static_cast<int>(f);
+    }
+  }
+  return winners;
 }
 
 }  // namespace trammel

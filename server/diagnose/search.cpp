@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr int kMostSteps = 40;         // forward and backward
 constexpr double kMostOutliers = 0.1;  // of the poses
+constexpr double kContender = 0.3;     // of the best score, to be among those that folds choose from
 constexpr double kStepMargin = 5;      // nat
 constexpr int kPathLength = 3;         // named causes that together may beat one anonymous function
 
@@ -48,22 +49,23 @@ class Search {
     const std::vector<FamilyPtr> families = make_families(problem);
     const MatrixXd columns = background_columns(problem, result_.unnamed);
     const Background background(columns);
-    const MatrixXd null = draw_null(background, options_.draws, options_.seed);
-    const Scan seen = scan(families, background, problem.residual(), null);
-    result_.limit = seen.limit;
+    if (chance_.null_score.size() == 0) renew_chance(families, background);
+    Scan seen = scan(families, {background}, problem.residual(), chance_);
     const auto open = [&](std::size_t f) { return !is_closed(*families[f], seen.best[f]); };
-    const auto best = seen.strongest(open);
-    if (!best || seen.score(*best) < seen.limit) return false;
-    if (best)
-      fprintf(stderr, "best %s score %.1f limit %.1f\n", to_string(families[*best]->cause(seen.best[*best])).c_str(),
+    auto best = seen.strongest(open);
+    if (best && is_close(seen.score[*best]) && renewed_for_ != result_.sources) {
+      renew_chance(families, background);
+      seen = scan(families, {background}, problem.residual(), chance_);
+      best = seen.strongest(open);
+    }
+    if (!best || seen.score[*best] < chance_.limit) return false;
     auto named = seen.strongest([&](std::size_t f) { return open(f) && families[f]->named(); });
     if (named) named = whole_instead_of_step(families, seen, *named, open);
     if (!families[*best]->named()) {
-      const bool path =
-          named && named_path_score(families, seen, columns, problem.residual(), open) >= seen.score(*best);
+      const bool path = named && named_path_score(families, columns, problem.residual(), open) >= seen.score[*best];
       if (!path) return take_unnamed(problem, *families[*best], seen, *best);
     }
-    return take_named(problem, families, background, columns, null, seen, *named, open);
+    return take_named(problem, families, background, columns, seen, *named, open);
   }
 
   /// Drops what does not pass any more beside all the rest.
@@ -73,7 +75,7 @@ class Search {
     for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
       if (result_.accepted[k].source.empty()) continue;
       const double score = remaining_score(problem, columns, result_.accepted[k]);
-      if (score >= result_.limit) continue;
+      if (score >= chance_.limit) continue;
       closed_.push_back(result_.accepted[k].cause);
       std::erase(result_.sources, result_.accepted[k].source);
       result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
@@ -83,7 +85,10 @@ class Search {
     return prune_unnamed(problem);
   }
 
-  SearchResult take() { return std::move(result_); }
+  SearchResult take() {
+    result_.chance = std::move(chance_);
+    return std::move(result_);
+  }
 
  private:
   Status calibrate_now() {
@@ -93,6 +98,13 @@ class Search {
     result_.priors = priors_of(*calibration);
     return {};
   }
+
+  void renew_chance(const std::vector<FamilyPtr>& families, const Background& background) {
+    chance_ = chance_of(families, background, options_.draws, options_.seed);
+    renewed_for_ = result_.sources;
+  }
+  /// So near to the line that it must be known for the present background.
+  bool is_close(double score) const { return score > 0.6 * chance_.limit && score < 1.6 * chance_.limit; }
 
   bool is_closed(const Family& family, const Best& best) const {
     const Cause cause = family.cause(best);
@@ -109,12 +121,12 @@ class Search {
       return open(f) && families[f]->named() &&
              is_whole_of(families[f]->cause(seen.best[f]), families[step]->cause(seen.best[step]));
     });
-    return whole && seen.score(*whole) > seen.score(step) - kStepMargin ? *whole : step;
+    return whole && seen.score[*whole] > seen.score[step] - kStepMargin ? *whole : step;
   }
 
   /// nat: what the best few named causes, taken one after the other, explain together.
-  double named_path_score(const std::vector<FamilyPtr>& families, const Scan& seen, MatrixXd columns,
-                          const VectorXd& data, const std::function<bool(std::size_t)>& open) const {
+  double named_path_score(const std::vector<FamilyPtr>& families, MatrixXd columns, const VectorXd& data,
+                          const std::function<bool(std::size_t)>& open) const {
     double total = 0;
     for (int k = 0; k < kPathLength; ++k) {
       const Background background(columns);
@@ -124,11 +136,12 @@ class Search {
       for (std::size_t f = 0; f < families.size(); ++f) {
         if (!families[f]->named() || !open(f)) continue;
         const Best best = families[f]->scan({background}, projected).front();
-        if (best.evidence - seen.penalty[f] <= highest) continue;
-        highest = best.evidence - seen.penalty[f];
+        const double score = best.evidence - chance_.penalty_of(*families[f]);
+        if (score <= highest) continue;
+        highest = score;
         chosen = families[f]->columns(best);
       }
-      if (highest < seen.limit) break;
+      if (highest < chance_.limit) break;
       total += highest;
       columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
       columns.rightCols(chosen.cols()) = chosen;
@@ -139,28 +152,37 @@ class Search {
   Result<bool> take_unnamed(const LinearProblem& problem, const Family& family, const Scan& seen, std::size_t place) {
     result_.unnamed.push_back({family.depends_on(),
                                problem.weight().cwiseInverse().asDiagonal() * family.columns(seen.best[place]),
-                               seen.score(place), seen.p_value(seen.score(place))});
+                               seen.score[place], chance_.p_value(seen.score[place])});
     return true;
   }
 
   Result<bool> take_named(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
-                          const Background& background, const MatrixXd& columns, const MatrixXd& null, const Scan& seen,
-                          std::size_t place, const std::function<bool(std::size_t)>& open) {
+                          const Background& background, const MatrixXd& columns, const Scan& seen, std::size_t place,
+                          const std::function<bool(std::size_t)>& open) {
     const Family& family = *families[place];
     const Best& best = seen.best[place];
     if (family.predicts()) {
-      const auto gain = Folds(problem).gain_of_selection(
-          problem.residual(), columns, families, seen.penalty,
-          [&](std::size_t f) { return families[f]->named() && families[f]->predicts() && open(f); });
+      // What scores little on all poses is not chosen in a fold that has most of them.
+      const auto contends = [&](std::size_t f) {
+        return families[f]->named() && families[f]->predicts() && open(f) &&
+               seen.score[f] > kContender * seen.score[place];
+      };
+      const auto gain = Folds(problem).gain_of_selection(problem.residual(), columns, families, chance_, contends);
       if (!(gain.after < gain.before)) {
         closed_.push_back(family.cause(best));
         return true;
       }
     }
-    Accepted one{
-        family.cause(best), family.source(best), best, seen.penalty[place], seen.p_value(seen.score(place)), 1, {}, {}};
+    Accepted one{family.cause(best),
+                 family.source(best),
+                 best,
+                 chance_.penalty_of(family),
+                 chance_.p_value(seen.score[place]),
+                 1,
+                 {},
+                 {}};
     if (!family.predicts()) return take_outlier(problem, std::move(one));
-    const Naming naming = name_or_doubt(families, background, null, problem.residual(), seen, place, problem.poses());
+    const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
     one.naming_frequency = naming.frequency;
     one.could_also_be = naming.could_also_be;
     const std::vector<std::string> sources = result_.sources;
@@ -181,7 +203,8 @@ class Search {
     const auto outliers = std::count_if(result_.accepted.begin(), result_.accepted.end(),
                                         [](const Accepted& a) { return a.source.empty(); });
     if (static_cast<double>(outliers) >= kMostOutliers * static_cast<double>(result_.all.measurements.size())) {
-      return false;
+      closed_.push_back(one.cause);
+      return true;
     }
     const Measurement& m = result_.batch.measurements[pose];
     const Index row = problem.first_row(static_cast<Index>(pose));
@@ -229,7 +252,7 @@ class Search {
       const Eigen::LLT<MatrixXd> factor(information);
       const double log_det = 2 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
       const double evidence = 0.5 * (right.dot(factor.solve(right)) - log_det);
-      if (evidence >= result_.limit) continue;
+      if (evidence >= chance_.limit) continue;
       result_.unnamed = std::move(others);
       return true;
     }
@@ -239,7 +262,9 @@ class Search {
   std::shared_ptr<const Cell> cell_;
   const DiagnoseOptions& options_;
   SearchResult result_;
-  std::vector<Cause> closed_;  // were tried and did not hold
+  Chance chance_;
+  std::vector<std::string> renewed_for_;  // the sources that chance_ was found with
+  std::vector<Cause> closed_;             // were tried and did not hold
 };
 
 }  // namespace

@@ -43,7 +43,7 @@ struct SearchResult {
   MeasurementBatch batch;  ///< without outliers
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
-  double limit = 0;  ///< nat, of the last scan
+  Chance chance;
 };
 
 /// Forward selection, one cause at a time, each on what the model found so far leaves over: the best candidate is

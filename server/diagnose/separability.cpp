@@ -94,7 +94,7 @@ void add_absorbed(const LinearProblem& problem, const Background& background, co
 }  // namespace
 
 Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
-                    const Scan& seen) {
+                    const Chance& chance) {
   Blindness result;
   std::vector<std::size_t> places;
   std::vector<Average> averages;
@@ -124,8 +124,9 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
       imitated = std::max(imitated, correlation);
       if (correlation > kSameEffect) result.inseparable.push_back({{cause, other}, correlation});
     }
-    const int freedom = std::max(1, seen.best[places[i]].freedom);
-    const double needed = std::pow(std::sqrt(strength_for(seen.limit + seen.penalty[places[i]], freedom)) + kPower, 2);
+    const int freedom = std::max(1, families[places[i]]->typical().freedom);
+    const double needed =
+        std::pow(std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) + kPower, 2);
     const auto size_for = [&](double strength) { return own.rms * std::sqrt(strength / own.strength); };
     unseen.detectable = size_for(needed);
     if (imitated < kSameEffect)

@@ -16,6 +16,6 @@ struct Blindness {
 /// `limit` (nat) in nine of ten batches, and the smallest that is told from its closest imitator. Effects that the
 /// model's own parameters, or another cause, take over are listed as inseparable.
 [[nodiscard]] Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
-                                  const Background& background, const Scan& seen);
+                                  const Background& background, const Chance& chance);
 
 }  // namespace trammel

@@ -3,6 +3,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/family.h"
+#include "server/diagnose/product.h"
 
 namespace trammel {
 
@@ -15,7 +16,11 @@ using Eigen::VectorXd;
 constexpr double kBox = 1.2;             // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr double kSmallestSpan = 0.035;  // rad
 constexpr Index kFunctionsOfOne = 16;
-constexpr Index kFunctionsOfEach = 7;              // of two
+constexpr Index kFunctionsOfEach = 7;                          // of two
+constexpr double kMapLengthScales[] = {0.04, 0.1, 0.25, 0.5};  // half ranges
+constexpr double kNegligible = 3.7;  // length scales a radian, where the spectrum has fallen to a thousandth
+constexpr int kFewestHarmonics = 4;
+constexpr int kMostHarmonics = 48;
 constexpr int kSizes = 17;                         // a quarter of a decade apart
 constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
 
@@ -67,12 +72,13 @@ class SmoothFamily : public Family {
     for (std::size_t s = 0; s < g_.size(); ++s) {
       const Index first = static_cast<Index>(s) * each;
       const Shares shares = shares_of(problem_, view, g_[s], projected);
-      along.middleRows(first, each).noalias() = functions_.transpose() * shares.along;
-      root.middleRows(first, each).noalias() = functions_.transpose() * shares.root;
+      along.middleRows(first, each) = transposed_product(functions_, shares.along);
+      root.middleRows(first, each) = transposed_product(functions_, shares.root);
       information.block(first, first, each, each).noalias() =
           functions_.transpose() * shares.square.asDiagonal() * functions_;
     }
-    information.noalias() -= root * root.transpose();
+    const MatrixXd across = root.transpose();
+    information -= transposed_product(across, across);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     for (std::size_t scale = 0; scale < deviations_.size(); ++scale) choose(information, along, scale, best);
     return best;
@@ -108,7 +114,7 @@ class SmoothFamily : public Family {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information * deviation.asDiagonal());
     const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
     const MatrixXd square =
-        (eigen.eigenvectors().transpose() * (deviation.asDiagonal() * along)).array().square().matrix();
+        transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along).array().square().matrix();
     double size = smallest_;
     for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
       const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
@@ -130,19 +136,27 @@ class JointMapFamily final : public SmoothFamily {
   JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& x, double span)
       : SmoothFamily(problem), joint_(joint) {
     const Index most = std::clamp<Index>(problem.poses() / 5, 6, 96);
-    harmonics_ = std::clamp(static_cast<int>(static_cast<double>(most) * kPi / (kBox * span) + 1), 4, 48);
+    span_ = span;
     g_.emplace_back(problem.by_joint().col(joint));
     functions_ = sines(x, most);
-    for (const double length_scale : {0.04, 0.1, 0.25, 0.5}) deviations_.push_back(deviations(most, length_scale));
+    for (const double length_scale : kMapLengthScales) deviations_.push_back(deviations(most, length_scale));
     smallest_ = 1e-7;
     typical_ = 5e-5;
   }
   Cause cause(const Best&) const override { return {"joint_map", joint_, "", "", {}}; }
-  std::string source(const Best&) const override { return fmt::format("joint_map:{}@{}", joint_ + 1, harmonics_); }
+  std::string source(const Best& best) const override {
+    return fmt::format("joint_map:{}@{}", joint_ + 1, harmonics(kMapLengthScales[static_cast<std::size_t>(best.at)]));
+  }
 
  private:
+  /// As many as a function of that length scale (in half ranges) is made of.
+  int harmonics(double length_scale) const {
+    return std::clamp(static_cast<int>(std::ceil(kNegligible / length_scale / (span_ / 2))), kFewestHarmonics,
+                      kMostHarmonics);
+  }
+
   int joint_;
-  int harmonics_;
+  double span_ = 0;  // rad
 };
 
 class AnonymousFamily final : public SmoothFamily {
