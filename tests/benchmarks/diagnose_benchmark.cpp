@@ -78,13 +78,13 @@ class Plan {
   void add(const Trial& trial) {
     if (wanted(trial.row, trial.spec.kind)) trials_.push_back(trial);
   }
-  void add(const std::string& row, const std::string& kind, double lambda, int count) {
-    for (int seed = 1; seed <= count; ++seed) add({row, spec_of(kind, seed, lambda, settings_)});
+  void add(const std::string& row, const std::string& kind, double lambda, int count, int first_seed = 1) {
+    for (int seed = first_seed; seed < first_seed + count; ++seed) add({row, spec_of(kind, seed, lambda, settings_)});
   }
   void decidable() {
     for (const std::string& kind : hidden::decidable_kinds()) {
       add("named60", kind, 60, settings_.trials);
-      add("named120", kind, 120, settings_.trials);
+      add("named120", kind, 120, settings_.trials, 1001);
     }
   }
   void nulls() {

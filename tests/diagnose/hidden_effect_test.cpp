@@ -94,7 +94,7 @@ TEST_P(HiddenUndecidable, IsAmongWhatCannotBeToldAndIsNotNamedAlone) {
 
 INSTANTIATE_TEST_SUITE_P(Undecidables, HiddenUndecidable,
                          testing::Values("backlash_one_side", "payload_alone", "tool_or_link", "tool_absorbed",
-                                         "joint1_or_tracker", "constant_warmth"),
+                                         "joint1_or_tracker", "joint6_or_tool", "constant_warmth"),
                          test_name);
 
 TEST(HiddenEffectOnPositions, IsNamedWithoutOrientations) {

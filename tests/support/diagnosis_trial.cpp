@@ -41,16 +41,24 @@ std::vector<hidden::MeasuringPose> as_poses(const std::vector<JointVector>& join
   return poses;
 }
 
+/// Whether the hidden simulation can make it without being told more.
+bool can_be_made(const HiddenCause& cause) {
+  if (cause.cause == "geometry" || cause.cause == "compliance") {
+    const auto& all = hidden::arm_parameters();
+    return std::any_of(all.begin(), all.end(), [&](const auto& known) { return known.name == cause.parameter; });
+  }
+  return cause.cause != "gear_transmission" && cause.cause != "joint_map" && cause.cause != "outlier";
+}
+
 /// What is named besides the truth, the first of it.
-std::optional<Cause> confounded_with(const Diagnosis& diagnosis, const HiddenCause& truth) {
+std::optional<HiddenCause> confounded_with(const Diagnosis& diagnosis, const HiddenCause& truth, int poses) {
   for (const Finding& finding : diagnosis.findings) {
     std::vector<Cause> all = finding.could_also_be;
     all.push_back(finding.cause);
     for (const Cause& cause : all) {
-      const bool is_truth = cause.cause == truth.cause && (truth.joint == 0 || cause.joint + 1 == truth.joint);
-      const bool can_be_made = cause.cause != "gear_transmission" && cause.cause != "joint_map" &&
-                               cause.cause != "outlier" && (cause.cause != "geometry" || !cause.parameter.empty());
-      if (!is_truth && can_be_made) return cause;
+      const HiddenCause other = as_hidden(cause, poses);
+      const bool is_truth = other.cause == truth.cause && (truth.joint == 0 || other.joint == truth.joint);
+      if (!is_truth && can_be_made(other)) return other;
     }
   }
   return std::nullopt;
@@ -60,18 +68,17 @@ void compare_next_poses(const Diagnosis& diagnosis, const HiddenCase& hidden, Tr
   const NextPoses& next = diagnosis.next_poses;
   if (next.q.empty() || hidden.truth.causes.size() != 1) return;
   if (next.stddev_expected > 0) result.next_poses_claimed = next.stddev_random / next.stddev_expected;
-  const auto other = confounded_with(diagnosis, hidden.truth.causes.front());
-  if (!other) return;
   const auto count = static_cast<int>(hidden.world.poses.size());
-  const HiddenCause rival = as_hidden(*other, count);
-  const double suggested = relative_stddev(hidden, rival, as_poses(next.q, count));
+  const auto rival = confounded_with(diagnosis, hidden.truth.causes.front(), count);
+  if (!rival) return;
+  const double suggested = relative_stddev(hidden, *rival, as_poses(next.q, count));
   hidden::Random random(hidden.world.poses.size() + 17);
   double sum = 0;
   for (int draw = 0; draw < kRandomDraws; ++draw) {
     std::vector<hidden::MeasuringPose> poses =
         hidden::draw_poses({.count = static_cast<int>(next.q.size()), .ranges = hidden.ranges}, random);
     for (hidden::MeasuringPose& pose : poses) pose.index += count;
-    sum += relative_stddev(hidden, rival, poses) / kRandomDraws;
+    sum += relative_stddev(hidden, *rival, poses) / kRandomDraws;
   }
   result.next_poses_ratio = sum / suggested;
 }

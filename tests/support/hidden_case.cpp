@@ -92,7 +92,7 @@ void understand(Draft& draft) {
   } else if (contains(undecidable_kinds(), kind)) {
     draft.truth.question = Question::kAbstain;
     draft.names = {kind};
-    draft.size_given = kind != "tool_or_link" && kind != "joint1_or_tracker";
+    draft.size_given = !kind.ends_with("_or_link") && !kind.ends_with("_or_tracker") && !kind.ends_with("_or_tool");
   } else if (contains(replica_kinds(), kind)) {
     draft.names = {kind};
     draft.size_given = true;
@@ -187,6 +187,14 @@ Effect joint1_or_tracker(const Scene& scene, Random& random) {
   return made;
 }
 
+/// Joint 6 loses its zero, or the tool turns about joint 6's axis.
+Effect joint6_or_tool(const Scene& scene, Random& random) {
+  const auto count = static_cast<int>(scene.poses->size());
+  const int first = whole(random, count / 4, 3 * count / 4);
+  if (whole(random, 0, 1) == 1) return draw_effect({"joint_slip", 6, "", first, {}}, scene, random);
+  return one_parameter({"tool_changed", 0, "", first, {}}, 3, 1e-4, scene, random);
+}
+
 /// Off in all that a last link can be off in.
 Effect tool_absorbed(const Scene& scene, Random& random) {
   Effect made = draw_effect({"tool", 0, "", -1, {}}, scene, random);
@@ -230,6 +238,7 @@ Effect draw_named(const std::string& name, const Draft& draft, const Scene& scen
   if (name == "tool_or_link") return tool_or_link(scene, random);
   if (name == "tool_absorbed") return tool_absorbed(scene, random);
   if (name == "joint1_or_tracker") return joint1_or_tracker(scene, random);
+  if (name == "joint6_or_tool") return joint6_or_tool(scene, random);
   if (name == "replica_ripple_1dim") return ripple(3, scene, random);
   if (name == "replica_ripple_6dim") return ripple(whole(random, 1, 3), scene, random);
   if (name == "replica_tool") return other_tool(scene, random);
@@ -399,7 +408,8 @@ const std::vector<std::string>& unknown_kinds() {
 
 const std::vector<std::string>& undecidable_kinds() {
   static const std::vector<std::string> kinds = {"backlash_one_side", "payload_alone",     "tool_or_link",
-                                                 "tool_absorbed",     "joint1_or_tracker", "constant_warmth"};
+                                                 "tool_absorbed",     "joint1_or_tracker", "joint6_or_tool",
+                                                 "constant_warmth"};
   return kinds;
 }
 

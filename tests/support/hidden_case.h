@@ -21,8 +21,9 @@ enum class Question {
 struct HiddenSpec {
   /// A cause (`backlash`), several (`backlash+outlier`, `mixture2`, `mixture3`), a null (`null_white`,
   /// `null_structured`, `null_permuted`), an unknown (`unknown_q4`, `unknown_q2q3`), what cannot be decided
-  /// (`backlash_one_side`, `payload_alone`, `tool_or_link`, `tool_absorbed`, `joint1_or_tracker`, `constant_warmth`) or
-  /// a replica of the source's studies (`replica_ripple_1dim`, `replica_ripple_6dim`, `replica_tool`, `replica_p28`).
+  /// (`backlash_one_side`, `payload_alone`, `tool_or_link`, `tool_absorbed`, `joint1_or_tracker`, `joint6_or_tool`,
+  /// `constant_warmth`) or a replica of the source's studies (`replica_ripple_1dim`, `replica_ripple_6dim`,
+  /// `replica_tool`, `replica_p28`).
   std::string kind = "gear_transmission";
   std::uint64_t seed = 1;
   /// Squared length of each effect over sigma, outside what the cell's error sources and the other effects hidden can

@@ -124,19 +124,48 @@ Effect encoder_eccentricity(const HiddenCause& cause, const Scene&, Random& rand
                 });
 }
 
-/// Many orders at once, none of which stands out.
-Effect joint_map(const HiddenCause& cause, const Scene&, Random& random) {
-  constexpr int kLowest = 2;
-  constexpr int kHighest = 9;
-  std::vector<std::pair<double, double>> waves;
-  for (int h = kLowest; h <= kHighest; ++h) waves.emplace_back(uniform(random, 0.7, 1.3), uniform(random, 0, kTurn));
-  return effect(cause, {"size"}, one(4e-5),
-                [j = joint_of(cause), waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  for (std::size_t k = 0; k < waves.size(); ++k) {
-                    const double order = kLowest + static_cast<double>(k);
-                    m.q(j) += v(0) * waves[k].first * std::sin(order * p.q(j) + waves[k].second);
-                  }
-                });
+struct Waves {
+  static constexpr int kLowest = 2;
+  std::vector<std::pair<double, double>> size_and_phase;  ///< of orders from kLowest on
+  [[nodiscard]] double at(double q) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < size_and_phase.size(); ++k) {
+      sum += size_and_phase[k].first * std::sin((kLowest + static_cast<double>(k)) * q + size_and_phase[k].second);
+    }
+    return sum;
+  }
+};
+
+/// Share of the variance of `values` over `q` that the best single order explains.
+double best_single_order(const VectorXd& q, const VectorXd& values) {
+  const VectorXd varying = values.array() - values.mean();
+  double best = 0;
+  for (double order = 0.5; order < 20; order += 0.1) {
+    Eigen::MatrixX3d columns(q.size(), 3);
+    columns << (order * q).array().sin(), (order * q).array().cos(), VectorXd::Ones(q.size()).array();
+    const VectorXd left = varying - columns * columns.householderQr().solve(varying);
+    best = std::max(best, 1 - left.squaredNorm() / varying.squaredNorm());
+  }
+  return best;
+}
+
+/// Many orders at once, none of which stands out at these poses.
+Effect joint_map(const HiddenCause& cause, const Scene& scene, Random& random) {
+  constexpr int kHighest = 12;
+  constexpr double kStandsOut = 0.5;
+  const Index j = joint_of(cause);
+  VectorXd q(static_cast<Index>(scene.poses->size()));
+  for (Index i = 0; i < q.size(); ++i) q(i) = (*scene.poses)[static_cast<std::size_t>(i)].q(j);
+  Waves waves;
+  do {
+    waves.size_and_phase.clear();
+    for (int h = Waves::kLowest; h <= kHighest; ++h) {
+      waves.size_and_phase.emplace_back(uniform(random, 0.7, 1.3), uniform(random, 0, kTurn));
+    }
+  } while (best_single_order(q, q.unaryExpr([&](double at) { return waves.at(at); })) > kStandsOut);
+  return effect(cause, {"size"}, one(4e-5), [j, waves](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    m.q(j) += v(0) * waves.at(p.q(j));
+  });
 }
 
 /// Play that the load widens a little.
@@ -303,7 +332,7 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
   if (name == "gear_transmission" || name == "encoder_eccentricity" || name == "joint_map" || name == "backlash") {
     cause.joint = whole(random, 1, 6);
   } else if (name == "joint_slip") {
-    cause.joint = whole(random, 2, 6);
+    cause.joint = whole(random, 2, 5);  // of joint 6 it looks like a tool that turned
   } else if (name == "link_bending") {
     cause.joint = whole(random, 0, 1) == 0 ? 2 : 4;
   } else if (name == "compliance") {

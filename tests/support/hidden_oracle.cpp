@@ -49,7 +49,7 @@ std::vector<HiddenCause> steady_causes(const World& world) {
     causes.push_back({"encoder_eccentricity", joint, "", -1, {}});
     causes.push_back({"backlash", joint, "", -1, {}});
   }
-  for (const int joint : {1, 2, 4}) causes.push_back({"link_bending", joint, "", -1, {}});
+  for (const int joint : {1, 2, 3, 4, 6}) causes.push_back({"link_bending", joint, "", -1, {}});
   if (world.loads.size() > 1) causes.push_back({"payload", 0, "", -1, {}});
   return causes;
 }
