@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+#include "server/diagnose/diagnosis.h"
+
+namespace trammel {
+
+enum class TriageVerdict {
+  kClean,      ///< as the model expects it
+  kExplained,  ///< not, and `cause` says why
+  kPoisoned    ///< not, and nothing known explains it
+};
+/// `clean`, `explained`, `poisoned`.
+[[nodiscard]] std::string_view to_string(TriageVerdict verdict);
+
+/// What a new batch says against a model, before anything is learned from it.
+struct Triage {
+  TriageVerdict verdict = TriageVerdict::kClean;
+  bool learn = true;  ///< false: keep the batch apart until somebody who knows has looked at it
+  /// Of kExplained: `tracker_moved`, `tool_changed`, `payload_changed`, `joint_slip`, `outlier`, or `drift`, which is
+  /// the arm itself; with the pose at which it began where that is not the first.
+  Cause cause;
+  bool tracker_elsewhere = false;       ///< besides `cause`, the tracker or the base stands elsewhere
+  std::vector<Cause> could_also_be;     ///< explain it as well
+  std::vector<std::string> outliers;    ///< pose ids that nothing makes fit the others
+  double misfit = 0, misfit_after = 0;  ///< rms residual over its expected deviation: of all poses; explained, without
+                                        ///< the outliers
+  double effect_rms = 0;                ///< m, Euclidean, of what the cause does to the poses
+  std::string sentence;                 ///< for people
+};
+
+/// Holds `batch` (checked against the model's cell) against `model` and tells apart: a tracker or base that stands
+/// elsewhere, another tool, another payload, a joint that lost its zero, single bad poses, an arm that has changed,
+/// each from the beginning of the batch or from one of its poses on. With fewer than 8 poses nothing is said: clean.
+[[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch);
+
+}  // namespace trammel
