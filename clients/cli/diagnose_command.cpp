@@ -1,11 +1,11 @@
 #include <CLI/CLI.hpp>
-#include <chrono>
 
 #include "clients/cli/commands.h"
+#include "clients/cli/diagnose_service.h"
 #include "clients/cli/diagnose_text.h"
 #include "clients/cli/options.h"
 #include "clients/cli/output.h"
-#include "server/base/text_file.h"
+#include "server/base/unix_time.h"
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/batch_file.h"
 #include "server/report/diagnosis_json.h"
@@ -19,22 +19,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
-
-struct DiagnoseArguments {
-  std::string cell, batch, report, next_poses, json, model, cell_out;
-  std::uint64_t seed = 1;
-  bool apply = false;
-  ServiceOptions service;
-};
-
-std::int64_t unix_time() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-/// Where results go, for tell().
-void say(const std::string& text, const DiagnoseArguments& arguments) {
-  tell(text, {arguments.json, arguments.report, arguments.next_poses, arguments.cell_out});
-}
 
 Status write_if_asked(const std::string& path, const std::string& text) {
   return path.empty() ? Status() : write_output(path, text);
@@ -57,7 +41,7 @@ Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const M
   ProgressLine progress;
   TrainOptions options;
   options.seed = seed;
-  options.trained_at = unix_time();
+  options.trained_at = unix_now();
   options.progress = [&](const std::string& stage, double share) {
     progress.show(stage, share);
     return true;
@@ -108,6 +92,7 @@ Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
+  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
   Result<Cell> read = read_cell(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
@@ -127,12 +112,18 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
 
 }  // namespace
 
+void say(const std::string& text, const DiagnoseArguments& arguments) {
+  tell(text, {arguments.json, arguments.report, arguments.next_poses, arguments.cell_out});
+}
+
 void add_diagnose_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<DiagnoseArguments>();
   CLI::App* command = app.add_subcommand(
       "diagnose", "Tell which physical cause the model lacks, how sure that is, and what to measure next");
-  command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
+  command->add_option(
+      "--batch", arguments->batch,
+      "Measurements (CSV: deg, mm); with --service also the id of a batch that it has, else the newest");
   command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
   command
       ->add_option("--next-poses", arguments->next_poses,
@@ -147,7 +138,12 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   command->add_option("--cell-out", arguments->cell_out, "With --apply: cell file to write instead of --cell itself")
       ->needs(apply_flag);
   add_json_option(*command, arguments->json);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return diagnose_files(*arguments); }; });
+  add_service_options(*command, arguments->service);
+  command->callback([arguments, &chosen] {
+    chosen = [arguments] {
+      return arguments->service.service ? diagnose_at_service(*arguments) : diagnose_files(*arguments);
+    };
+  });
 }
 
 }  // namespace trammel::cli

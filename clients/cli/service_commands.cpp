@@ -17,7 +17,7 @@ struct ServiceArguments {
   std::string cell, batch, batch_id, level, bias, model, output, json;
   std::vector<std::string> batch_ids;
   std::int64_t job = 0;
-  bool watch = false;
+  bool watch = false, release = false;
   double limit_s = 3600;
   ServiceOptions service;
 };
@@ -74,6 +74,23 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"uptime_s", server.uptime_s}, {"queued_jobs", server.queued_jobs}};
 }
 
+std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches) {
+  std::string text;
+  for (const client::QuarantinedBatch& one : batches) {
+    text +=
+        fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell, one.poses, one.reason);
+  }
+  return text;
+}
+
+ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches) {
+  ordered_json list = ordered_json::array();
+  for (const client::QuarantinedBatch& one : batches) {
+    list.push_back({{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
+  }
+  return list;
+}
+
 /// Follows a job to its end; a failed one is an error.
 Status follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
   const Result<client::JobStatus> end = [&] {
@@ -115,6 +132,13 @@ Status submit(client::Session& session, const ServiceArguments& arguments) {
 Status retrain(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
+  if (arguments.release && arguments.batch_ids.empty()) {
+    return failure(ErrorCode::kUsage, "--release needs --batch: which one is good");
+  }
+  for (const std::string& id : arguments.batch_ids) {
+    if (!arguments.release) break;
+    if (const Status released = session.release(*cell, id); !released) return released;
+  }
   const Result<std::int64_t> job = session.train(*cell, arguments.batch_ids, arguments.level, arguments.bias);
   if (!job) return tl::make_unexpected(job.error());
   return started(session, *job, arguments);
@@ -125,14 +149,17 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   if (!servers) return tl::make_unexpected(servers.error());
   const Result<std::vector<client::ModelInfo>> models = session.model_status();
   if (!models) return tl::make_unexpected(models.error());
+  const Result<std::vector<client::QuarantinedBatch>> apart = session.quarantine("");
+  if (!apart) return tl::make_unexpected(apart.error());
   std::string text;
   ordered_json list = ordered_json::array();
   for (const client::ServerStatus& server : *servers) {
     text += server_text(server);
     list.push_back(server_json(server));
   }
-  tell(text + models_text(*models), {arguments.json});
-  return write_json(arguments.json, {{"servers", list}, {"models", models_json(*models)}});
+  tell(text + models_text(*models) + quarantine_text(*apart), {arguments.json});
+  return write_json(arguments.json,
+                    {{"servers", list}, {"models", models_json(*models)}, {"quarantine", quarantine_json(*apart)}});
 }
 
 Status watch(client::Session& session, const ServiceArguments& arguments) {
@@ -250,9 +277,11 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->allow_extra_args(false);
                  command.add_option("--level", arguments.level, "What to identify instead of the cell's error sources");
                  command.add_option("--bias", arguments.bias, "Kernel of the learned bias instead of the cell's");
+                 command.add_flag("--release", arguments.release,
+                                  "The batches named are good: take them out of quarantine first");
                  add_watch(command, arguments);
                });
-  commands.add("status", "Show the servers that answer and the models in force", status,
+  commands.add("status", "Show the servers that answer, the models in force and the batches in quarantine", status,
                [](CLI::App&, ServiceArguments&) {});
   commands.add("watch", "Follow a training until it is done", watch,
                [](CLI::App& command, ServiceArguments& arguments) {

@@ -1,5 +1,7 @@
 #include "clients/session/convert.h"
 
+#include <nlohmann/json.hpp>
+
 namespace trammel::client {
 namespace {
 
@@ -164,6 +166,16 @@ ServerStatus from_wire(const wire::ServiceStatus& status) {
   result.uptime_s = status.uptime_s();
   result.queued_jobs = status.queued_jobs();
   return result;
+}
+
+Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json) {
+  const auto list = nlohmann::json::parse(json, nullptr, false);
+  if (!list.is_array()) return failure(ErrorCode::kInternal, "the server's list of batches in quarantine is none");
+  std::vector<QuarantinedBatch> batches;
+  for (const auto& one : list) {
+    batches.push_back({one.value("cell", ""), one.value("batch", ""), one.value("reason", ""), one.value("poses", 0)});
+  }
+  return batches;
 }
 
 Error error_of(const wire::ReplyHeader& header) { return {from_wire(header.result()), header.message()}; }

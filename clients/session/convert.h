@@ -16,6 +16,8 @@ namespace trammel::client {
 [[nodiscard]] CorrectedTarget from_wire(const wire::CorrectedTarget& correction);
 [[nodiscard]] JobStatus from_wire(const wire::Job& job);
 [[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
+/// The list that MANAGE_QUARANTINE answers. Refuses what is none.
+[[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json);
 /// Of a reply that is not RESULT_OK.
 [[nodiscard]] Error error_of(const wire::ReplyHeader& header);
 

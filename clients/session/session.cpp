@@ -57,6 +57,7 @@ struct Session::Participant {
   std::unique_ptr<Caller<wire::CorrectTarget>> correct_target;
   std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
   std::unique_ptr<Caller<wire::Train>> train;
+  std::unique_ptr<Caller<wire::Diagnose>> diagnose;
   std::unique_ptr<Caller<wire::ManageModels>> manage_models;
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
@@ -168,7 +169,7 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
     return opened;
   };
   const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
-                                 inside->train, inside->manage_models);
+                                 inside->train, inside->diagnose, inside->manage_models);
   if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
@@ -219,6 +220,56 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   const auto reply = participant_->call<wire::Train>(*participant_->train, std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
+}
+
+Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                       bool apply) {
+  if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  wire::DiagnoseRequest request;
+  request.about().cell(cell);
+  request.batch_id(batch_id);
+  request.csv(csv);
+  request.apply(apply);
+  const auto reply = participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), {cell, {}, true});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job();
+}
+
+Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
+  const auto found = participant_->find_job(job);
+  if (!found) return tl::make_unexpected(found.error());
+  wire::DiagnoseRequest request;
+  request.about().cell(cell);
+  request.job(job);
+  request.page(page);
+  auto reply =
+      participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), {cell, found->first, false});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return DiagnosisAnswer{std::move(reply->findings_json()), std::move(reply->page_html())};
+}
+
+Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cell) {
+  const auto known = servers();
+  if (!known) return tl::make_unexpected(known.error());
+  std::vector<QuarantinedBatch> batches;
+  for (const ServerStatus& server : *known) {
+    wire::ManageModelsRequest request;
+    request.about().cell(cell);
+    request.action(wire::MANAGE_QUARANTINE);
+    const auto reply = participant_->call<wire::ManageModels>(*participant_->manage_models, std::move(request),
+                                                              {cell, server.server_id, false});
+    if (!reply) return tl::make_unexpected(reply.error());
+    auto listed = quarantine_from(reply->text());
+    if (!listed) return listed;
+    batches.insert(batches.end(), listed->begin(), listed->end());
+  }
+  return batches;
+}
+
+Status Session::release(const std::string& cell, const std::string& batch_id) {
+  const auto reply = participant_->manage(cell, wire::MANAGE_RELEASE, 0, batch_id);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return {};
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {

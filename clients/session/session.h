@@ -82,6 +82,18 @@ struct JobStatus {
   bool in_force = false;
 };
 
+/// What a diagnosis found.
+struct DiagnosisAnswer {
+  std::string findings_json;  ///< as `trammel diagnose --json` prints them
+  std::string page_html;      ///< opens by itself; empty where it was not asked for, or is too old
+};
+
+/// A batch that no training takes, and why.
+struct QuarantinedBatch {
+  std::string cell, batch, reason;
+  int poses = 0;
+};
+
 struct ServerStatus {
   std::string server_id, version, state;
   std::vector<std::string> cells;
@@ -110,6 +122,14 @@ class Session {
                                                          const std::string& csv);
   [[nodiscard]] Result<std::int64_t> train(const std::string& cell, const std::vector<std::string>& batch_ids,
                                            const std::string& level, const std::string& bias);
+  /// Queues a diagnosis of a stored batch (empty: the newest) or of `csv`; with `apply` what is found is trained and
+  /// put in force if better. Returns the job; when that is done, diagnosis() is what it found.
+  [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
+                                              const std::string& csv, bool apply);
+  [[nodiscard]] Result<DiagnosisAnswer> diagnosis(const std::string& cell, std::int64_t job, bool page);
+  /// Of every server, of one cell or (empty) of all.
+  [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version);

@@ -51,11 +51,13 @@ class Handlers {
   /// Accepted means stored: see Trainer::submit.
   [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
   [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
-  /// RESULT_UNSUPPORTED.
+  /// Queues a diagnosis, or answers what one found: see Trainer::diagnose.
   [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
 
  private:
+  [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
+
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;

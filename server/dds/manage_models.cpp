@@ -1,3 +1,5 @@
+#include <nlohmann/json.hpp>
+
 #include "idl/limits.h"
 #include "server/base/check.h"
 #include "server/dds/codec.h"
@@ -9,6 +11,14 @@ namespace {
 /// Room for everything but the text in the largest sample.
 constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
+std::string as_json(const std::vector<StoredBatch>& batches) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const StoredBatch& batch : batches) {
+    list.push_back({{"cell", batch.cell}, {"batch", batch.id}, {"poses", batch.poses}, {"reason", batch.quarantine}});
+  }
+  return list.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 }  // namespace
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
@@ -19,6 +29,8 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
     reply.job(to_wire(*progress));
     return reply;
   }
+
+  if (request.action() == wire::MANAGE_QUARANTINE && request.about().cell().empty()) return quarantine_of("");
 
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const std::string& cell = request.about().cell();
@@ -66,15 +78,30 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
       reply.version(*version);
       return reply;
     }
+    case wire::MANAGE_QUARANTINE:
+      return quarantine_of(cell);
+    case wire::MANAGE_RELEASE: {
+      const Status released = trainer_.release(cell, request.text());
+      if (!released) return tl::make_unexpected(released.error());
+      return reply;
+    }
     case wire::MANAGE_JOB:
       break;
   }
   TRAMMEL_CHECK(false);
 }
 
+Result<wire::ManageModelsReply> Handlers::quarantine_of(const std::string& cell) const {
+  const auto batches = trainer_.quarantined(cell);
+  if (!batches) return tl::make_unexpected(batches.error());
+  wire::ManageModelsReply reply;
+  reply.text(as_json(*batches));
+  return reply;
+}
+
 bool happens_once(const wire::ManageModelsRequest& request) {
   return request.action() == wire::MANAGE_ACTIVATE || request.action() == wire::MANAGE_ROLLBACK ||
-         request.action() == wire::MANAGE_IMPORT;
+         request.action() == wire::MANAGE_IMPORT || request.action() == wire::MANAGE_RELEASE;
 }
 
 }  // namespace trammel

@@ -17,7 +17,8 @@ namespace trammel {
 namespace {
 
 constexpr int kApplicationId = 0x54524D4C;  // "TRML", in the file's header
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
+constexpr int kPagesKept = 20;      // of diagnoses; their findings are kept for ever
 constexpr int kBusyTimeout = 5000;  // ms, for whoever else reads the file
 
 constexpr const char* kSchema = R"sql(
@@ -82,6 +83,20 @@ CREATE TABLE activations (
 CREATE INDEX activations_by_cell ON activations (cell, number);
 )sql";
 
+/// What version 2 added to version 1.
+constexpr const char* kSchemaAdded = R"sql(
+ALTER TABLE jobs ADD COLUMN kind TEXT NOT NULL DEFAULT 'train' CHECK (kind IN ('train', 'diagnose'));
+ALTER TABLE batches ADD COLUMN quarantine TEXT NOT NULL DEFAULT '';
+
+CREATE TABLE diagnoses (
+  job      INTEGER PRIMARY KEY REFERENCES jobs (id),
+  csv      TEXT    NOT NULL,
+  apply    INTEGER NOT NULL,
+  findings TEXT    NOT NULL DEFAULT '',
+  page     TEXT    NOT NULL DEFAULT ''
+);
+)sql";
+
 constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
                                                                          {JobState::kRunning, "running"},
                                                                          {JobState::kDone, "done"},
@@ -134,7 +149,7 @@ std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts FROM jobs ";
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind FROM jobs ";
 
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
@@ -147,6 +162,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.created_at = row.getColumn(6).getInt64();
   job.model_version = row.getColumn(7).getInt();
   job.attempts = row.getColumn(8).getInt();
+  job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -158,8 +174,10 @@ Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
 }
 
 std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
-  change(database, "INSERT INTO jobs (cell, level, bias, state, message, created_at) VALUES (?, ?, ?, ?, ?, ?)",
-         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at);
+  change(database,
+         "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
+         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at,
+         job.kind == JobKind::kDiagnose ? "diagnose" : "train");
   return database.getLastInsertRowid();
 }
 
@@ -170,6 +188,17 @@ void insert_job_batches(SQLite::Database& database, std::int64_t job, const std:
     change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES (?, ?, ?, ?)", job, position++, cell,
            id);
   }
+}
+
+Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
+  for (const std::string& id : job.batch_ids) {
+    if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id);
+    }
+  }
+  const std::int64_t id = insert_job(database, job);
+  insert_job_batches(database, id, job.cell, job.batch_ids);
+  return read_job(database, id);
 }
 
 /// The newest line of a cell's history of what was in force.
@@ -250,9 +279,11 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
   if (mode != "wal") return failure(ErrorCode::kInternal, "{}: this file system cannot hold a WAL ({})", path, mode);
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
-  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion) return {};
+  const int schema = database.execAndGet("PRAGMA user_version").getInt();
+  if (schema == kSchemaVersion) return {};
   SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
-  database.exec(kSchema);
+  if (schema == 0) database.exec(kSchema);
+  database.exec(kSchemaAdded);
   database.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
   database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   transaction.commit();
@@ -336,22 +367,56 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
 }
 
 Result<StoredJob> Store::add_job(const StoredJob& job) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<StoredJob> {
-    for (const std::string& id : job.batch_ids) {
-      if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
-        return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id);
-      }
+  return connection_->in_transaction([&](SQLite::Database& database) { return insert_job_over(database, job); });
+}
+
+Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    Result<StoredJob> queued = insert_job_over(database, job);
+    if (queued) {
+      change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
+             diagnosis.apply ? 1 : 0);
     }
-    const std::int64_t id = insert_job(database, job);
-    insert_job_batches(database, id, job.cell, job.batch_ids);
-    return read_job(database, id);
+    return queued;
+  });
+}
+
+Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredDiagnosis> {
+    auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
+    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job);
+    return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
+                           row.getColumn(3).getString()};
+  });
+}
+
+Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    const int changes =
+        change(database, "UPDATE diagnoses SET findings = ?, page = ? WHERE job = ?", findings, page, job);
+    change(database,
+           "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN "
+           "(SELECT job FROM diagnoses WHERE page <> '' ORDER BY job DESC LIMIT ?)",
+           kPagesKept);
+    return changed_one(changes, job);
+  });
+}
+
+Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    const int changes =
+        change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
+    if (changes == 1) return {};
+    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
   });
 }
 
 Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredBatch> {
     auto row = prepare(
-        database, "SELECT csv, hash, request_id, accepted_at, poses FROM batches WHERE cell = ? AND id = ?", cell, id);
+        database,
+        "SELECT csv, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? AND id = ?",
+        cell, id);
     if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
     StoredBatch batch{cell,
                       id,
@@ -359,7 +424,9 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
                       row.getColumn(1).getString(),
                       row.getColumn(2).getString(),
                       row.getColumn(3).getInt64(),
-                      row.getColumn(4).getInt()};
+                      row.getColumn(4).getInt(),
+                      row.getColumn(5).getInt64(),
+                      row.getColumn(6).getString()};
     if (sha256_hex(batch.csv) != batch.hash) {
       return failure(ErrorCode::kInternal, "{}: batch {} of cell {} is not what was accepted: its hash should be {}",
                      connection_->path, id, cell, batch.hash);
@@ -371,11 +438,14 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
 Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredBatch>> {
     auto rows = prepare(
-        database, "SELECT id, hash, request_id, accepted_at, poses FROM batches WHERE cell = ? ORDER BY number", cell);
+        database,
+        "SELECT id, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? ORDER BY number",
+        cell);
     std::vector<StoredBatch> batches;
     while (rows.executeStep()) {
       batches.push_back({cell, rows.getColumn(0).getString(), "", rows.getColumn(1).getString(),
-                         rows.getColumn(2).getString(), rows.getColumn(3).getInt64(), rows.getColumn(4).getInt()});
+                         rows.getColumn(2).getString(), rows.getColumn(3).getInt64(), rows.getColumn(4).getInt(),
+                         rows.getColumn(5).getInt64(), rows.getColumn(6).getString()});
     }
     return batches;
   });
@@ -419,6 +489,16 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = ? "
+                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              message, id),
+                       id);
+  });
+}
+
+Status Store::set_job_done(std::int64_t id, const std::string& message) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    return changed_one(change(database,
+                              "UPDATE jobs SET state = 'done', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
                        id);

@@ -21,21 +21,34 @@ struct StoredBatch {
       request_id;  ///< client and sequence number of the request that brought it: a repeat of it is not a conflict
   std::int64_t accepted_at = 0;  ///< Unix time, s
   int poses = 0;
+  std::int64_t job = 0;         ///< the one that it came with
+  std::string quarantine = {};  ///< why no training takes it until it is released; empty: it is taken
 };
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
 
-/// One training to do or done.
+enum class JobKind { kTrain, kDiagnose };
+
+/// One training or diagnosis to do or done.
 struct StoredJob {
   std::int64_t id = 0;
   std::string cell;
-  std::vector<std::string> batch_ids;  ///< trained together, in this order
+  std::vector<std::string> batch_ids;  ///< trained together, in this order; none: a diagnosis brings its batch
   std::string level, bias;             ///< empty: as the cell file says
   JobState state = JobState::kQueued;
   std::string message;          ///< why it failed, or what became of its model
   std::int64_t created_at = 0;  ///< Unix time, s
   int model_version = 0;        ///< 0 until done
   int attempts = 0;             ///< times it was begun without being finished or put back
+  JobKind kind = JobKind::kTrain;
+};
+
+/// What a diagnosis was asked and what it found.
+struct StoredDiagnosis {
+  std::string csv;        ///< the batch, where it was sent with the question; else empty
+  bool apply = false;     ///< train what is found into the model
+  std::string findings;   ///< JSON; empty until found
+  std::string page = {};  ///< HTML; of the last few diagnoses only
 };
 
 /// A line of a cell's model history.
@@ -65,7 +78,15 @@ class Store {
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
   /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job);
+  /// Queues a diagnosis: of the one batch that the job names, or of the one that comes with it. Refuses as add_job().
+  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis);
+  /// kNotFound: the job is not there, or is no diagnosis.
+  [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
+  /// What an unfinished diagnosis has found; the job goes on.
+  [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings, const std::string& page);
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
+  /// Keeps the batch out of trainings for `reason`, or lets it in again (empty).
+  [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason);
   /// Newest last, without their text.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
 
@@ -76,6 +97,8 @@ class Store {
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id);
   [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message);
+  /// Of a job that makes no model.
+  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message);
 
   /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and, if asked, puts the
   /// model in force: one transaction. Returns the version.

@@ -11,10 +11,12 @@
 #include "server/base/check.h"
 #include "server/base/hash.h"
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/bias/kernel.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
+#include "server/trainer/extend.h"
 
 namespace trammel {
 namespace {
@@ -22,10 +24,6 @@ namespace {
 constexpr int kMaxAttempts = 3;                           // of one job that takes the process down
 constexpr std::size_t kMaxBatchId = 128;                  // bytes
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running training, for its watchers
-
-std::int64_t now() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id");
@@ -78,15 +76,6 @@ Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const st
   return {};
 }
 
-/// Makes the drawing of the rows held out a property of the batch: see the class.
-void mark_held_out(MeasurementBatch& batch, double share, std::uint64_t seed) {
-  std::set<int> held_out;
-  for (const Measurement& m : split_batch(batch, share, seed).validation.measurements) held_out.insert(m.row);
-  for (Measurement& m : batch.measurements) {
-    m.set = held_out.contains(m.row) ? MeasurementSet::kValidation : MeasurementSet::kTrain;
-  }
-}
-
 /// Appends `next` in time. Pose ids stay unique; extra columns, which no training reads, are left behind.
 void append(MeasurementBatch& all, MeasurementBatch next) {
   for (Measurement& m : next.measurements) {
@@ -100,6 +89,20 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
   all.source_text += next.source_text;
 }
 
+/// Whether trainings may take the batch.
+Status check_released(const StoredBatch& batch) {
+  if (batch.quarantine.empty()) return {};
+  return refused("batch {} of cell {} is in quarantine: {}; release it if it is good", batch.id, batch.cell,
+                 batch.quarantine);
+}
+
+Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& cell) {
+  auto parsed = parse_batch(stored.csv, "batch " + stored.id);
+  if (!parsed) return parsed;
+  parsed->id = stored.id;
+  return check_against_cell(std::move(*parsed), cell);
+}
+
 /// Whether the model knows the tools and payloads of these poses (its cell file may be an older one).
 bool fits(const CompensatedModel& model, const MeasurementBatch& batch) {
   return std::all_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
@@ -108,29 +111,48 @@ bool fits(const CompensatedModel& model, const MeasurementBatch& batch) {
 }
 
 /// Whether a new model takes the place of the one in force, and why.
-struct Verdict {
+struct Acceptance {
   bool put_in_force = false;
   std::string message;
 };
 
+/// The cell's own list and what the model in force has besides, as an applied diagnosis or somebody's level put it
+/// there: what was won stays won. Empty where there is nothing besides.
+std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force) {
+  std::vector<std::string> level = cell.model.error_sources;
+  const auto listed = [&](const std::string& name) {
+    return std::any_of(level.begin(), level.end(), [&](const std::string& spec) {
+      return name == spec || (spec == "compliance" && name.starts_with("compliance"));
+    });
+  };
+  std::vector<std::string> names;
+  for (const ErrorSourcePtr& source : in_force.parts().physics.sources) names.push_back(source->name());
+  const std::size_t own = level.size();
+  for (const std::string& name : lasting_sources(names)) {
+    if (!listed(name)) level.push_back(name);
+  }
+  if (level.size() == own) return std::nullopt;
+  return fmt::format("{}", fmt::join(level, ","));
+}
+
 /// Against the nominal model: the first one of a cell, or the first with a tool that the one in force does not know.
-Verdict judge_alone(const Evaluation& candidate) {
+Acceptance judge_alone(const Evaluation& candidate) {
   const bool better = candidate.compensated.rms < candidate.nominal.rms;
   return {better,
           fmt::format("{}: held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", better ? "in force" : "not in force",
                       to_mm(candidate.compensated.rms), to_mm(candidate.nominal.rms), candidate.poses)};
 }
 
-Verdict judge_against(const Evaluation& candidate, const Evaluation& present, int present_version,
-                      double accept_ratio) {
+Acceptance judge_against(const Evaluation& candidate, const Evaluation& present, int present_version,
+                         double accept_ratio) {
   const bool good = candidate.compensated.rms <= accept_ratio * present.compensated.rms;
   return {good, fmt::format("{}: held-out rms {:.4f} mm, limit {} x {:.4f} mm of version {}, {} poses",
                             good ? "in force" : "not in force", to_mm(candidate.compensated.rms), accept_ratio,
                             to_mm(present.compensated.rms), present_version, candidate.poses)};
 }
 
-Verdict judge(const CompensatedModel& candidate, const ServedModel* present, const MeasurementBatch& held_out,
-              double accept_ratio) {
+Acceptance judge(const CompensatedModel& candidate, const ServedModel* present, const MeasurementBatch& held_out,
+                 double accept_ratio) {
   if (held_out.measurements.empty()) {
     return {false, "not in force: no pose was held out to judge it; activate it if it is wanted"};
   }
@@ -261,12 +283,29 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   StoredJob job;
   job.cell = cell_name;
   job.batch_ids = {batch_id};
-  job.created_at = now();
+  job.created_at = unix_now();
   const auto accepted =
       store_.add_batch({cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses}, job);
   if (!accepted) return tl::make_unexpected(accepted.error());
   if (!repeated) enqueue(*accepted);
   return accepted->id;
+}
+
+Status Trainer::release(const std::string& cell_name, const std::string& batch_id) {
+  if (const auto found = cell(cell_name); !found) return tl::make_unexpected(found.error());
+  return store_.set_quarantine(cell_name, batch_id, "");
+}
+
+Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
+  std::vector<StoredBatch> all;
+  for (const auto& [name, known] : cells_) {
+    if (!cell_name.empty() && name != cell_name) continue;
+    auto batches = store_.batches(name);
+    if (!batches) return batches;
+    std::copy_if(batches->begin(), batches->end(), std::back_inserter(all),
+                 [](const StoredBatch& batch) { return !batch.quarantine.empty(); });
+  }
+  return all;
 }
 
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
@@ -292,11 +331,15 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   job.batch_ids = batch_ids.empty() ? std::vector{stored->back().id} : batch_ids;
   job.level = level;
   job.bias = bias;
-  job.created_at = now();
+  job.created_at = unix_now();
   const std::set<std::string> wanted(job.batch_ids.begin(), job.batch_ids.end());
   if (wanted.size() != job.batch_ids.size()) return refused("a batch is named twice; each counts once in a training");
   std::int64_t poses = 0;
-  for (const StoredBatch& batch : *stored) poses += wanted.contains(batch.id) ? batch.poses : 0;
+  for (const StoredBatch& batch : *stored) {
+    if (!wanted.contains(batch.id)) continue;
+    if (const Status free = check_released(batch); !free) return tl::make_unexpected(free.error());
+    poses += batch.poses;
+  }
   if (poses > options_.max_poses) {
     return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses);
   }
@@ -449,43 +492,57 @@ Status Trainer::attempt(std::int64_t id, const std::stop_token& stop) {
   JobProgress progress = progress_of(*job);
   progress.stage = JobStage::kTraining;
   report(progress);
+  if (job->kind == JobKind::kDiagnose) return attempt_diagnosis(*job, *cell_found, std::move(progress), stop);
+  const auto looked_at = hold_against_model_in_force(*job, **cell_found);
+  if (!looked_at) return tl::make_unexpected(looked_at.error());
   const auto batch = load_batches(*job, **cell_found);
   if (!batch) return tl::make_unexpected(batch.error());
 
-  TrainOptions options;
-  if (!job->level.empty()) options.level = job->level;
-  if (!job->bias.empty()) options.bias = job->bias;
-  options.validation_share = options_.validation_share;
-  options.seed = options_.seed;
-  options.trained_at = now();
-  auto reported = std::chrono::steady_clock::time_point::min();
-  options.progress = [&](const std::string& stage, double share) {
+  const auto model = train(*cell_found, *batch, train_options(*job, **cell_found, progress, stop));
+  if (!model) return tl::make_unexpected(model.error());
+  return keep(*model, *batch, std::move(progress), options_.accept_ratio, *looked_at);
+}
+
+std::function<bool(const std::string&, double)> Trainer::reporter(const JobProgress& progress,
+                                                                  const std::stop_token& stop) {
+  auto reported = std::make_shared<std::chrono::steady_clock::time_point>();
+  return [this, running = progress, reported, stop](const std::string& stage, double share) mutable {
     const auto time = std::chrono::steady_clock::now();
-    if (time >= reported + kReportInterval) {
-      reported = time;
-      progress.what = stage;
-      progress.share = share;
-      report(progress);
+    if (time >= *reported + kReportInterval) {
+      *reported = time;
+      running.what = stage;
+      running.share = share;
+      report(running);
     }
     return !stop.stop_requested();
   };
-  const auto model = train(*cell_found, *batch, options);
-  if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, progress);
 }
 
+TrainOptions Trainer::train_options(const StoredJob& job, const Cell& cell, const JobProgress& progress,
+                                    const std::stop_token& stop) {
+  TrainOptions options;
+  if (!job.level.empty()) {
+    options.level = job.level;
+  } else if (const auto served = registry_.in_force(job.cell)) {
+    options.level = level_with_additions(cell, served->model);
+  }
+  if (!job.bias.empty()) options.bias = job.bias;
+  options.validation_share = options_.validation_share;
+  options.seed = options_.seed;
+  options.trained_at = unix_now();
+  options.progress = reporter(progress, stop);
+  return options;
+}
 Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell& cell) const {
   std::vector<MeasurementBatch> batches;
   for (const std::string& id : job.batch_ids) {
     const auto stored = store_.batch(job.cell, id);
     if (!stored) return tl::make_unexpected(stored.error());
-    auto parsed = parse_batch(stored->csv, "batch " + id);
-    if (!parsed) return parsed;
-    parsed->id = id;
-    auto checked = check_against_cell(std::move(*parsed), cell);
+    if (const Status free = check_released(*stored); !free) return tl::make_unexpected(free.error());
+    auto checked = checked_batch(*stored, cell);
     if (!checked) return checked;
-    mark_held_out(*checked, options_.validation_share, options_.seed);
-    batches.push_back(std::move(*checked));
+    // The drawing of the rows held out is a property of the batch: see the class.
+    batches.push_back(with_held_out(std::move(*checked), options_.validation_share, options_.seed));
   }
   if (batches.size() == 1) return std::move(batches.front());
   MeasurementBatch all;
@@ -493,7 +550,8 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
   return all;
 }
 
-Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress) {
+Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress,
+                     double accept_ratio, const std::string& note) {
   progress.stage = JobStage::kStoring;
   progress.what.clear();
   progress.share = 1;
@@ -501,7 +559,8 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
   {
     const std::lock_guard lock(activation_mutex_);
     const MeasurementBatch held_out = split_batch(batch, options_.validation_share, options_.seed).validation;
-    const Verdict verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, options_.accept_ratio);
+    Acceptance verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, accept_ratio);
+    if (!note.empty()) verdict.message += "; the batch: " + note;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());
     const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});

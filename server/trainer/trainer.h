@@ -38,8 +38,8 @@ struct JobProgress {
   bool in_force = false;
 };
 
-/// The queue of trainings and the one thread that works on it. Everything accepted is in the store before it is
-/// acknowledged; what a crash interrupts is taken up again at the next start, at most three times. Thread-safe,
+/// The queue of trainings and diagnoses and the one thread that works on it. Everything accepted is in the store before
+/// it is acknowledged; what a crash interrupts is taken up again at the next start, at most three times. Thread-safe,
 /// take_up(), start() and stop() excepted.
 ///
 /// Which rows are held out is drawn batch by batch: a row held out once is held out in every training of that batch, so
@@ -70,14 +70,28 @@ class Trainer {
 
   [[nodiscard]] const std::map<std::string, std::shared_ptr<const Cell>>& cells() const { return cells_; }
 
-  /// Checks the batch against its cell, stores it with its job, queues it. Returns the job id; the same request again
-  /// returns the same. Refuses what the batch reader and the cell refuse, an unknown cell (kNotFound), an id that the
-  /// cell already has (kConflict), too many poses (kTooLarge) and, while the queue is full, everything new (kBusy).
+  /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
+  /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
+  /// Returns the job id; the same request again returns the same. Refuses what the batch reader and the cell refuse, an
+  /// unknown cell (kNotFound), an id that the cell already has (kConflict), too many poses (kTooLarge) and, while the
+  /// queue is full, everything new (kBusy).
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
-  /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says.
+  /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
+  /// and what the model in force has besides. Refuses batches in quarantine.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias);
+  /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`; with `apply` trains the causes found into the
+  /// model and puts it in force only if it is better on the rows held out. Returns the job; its findings are
+  /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
+  [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
+                                              const std::string& csv, bool apply);
+  /// Of a job whose diagnosis is found; kBusy while it is not.
+  [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
+  /// Lets trainings take a batch that was kept out because it did not fit the model in force.
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  /// The batches that are kept out, without their text, of one cell or (empty) of all.
+  [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// Puts a stored version in force and publishes it.
   [[nodiscard]] Status activate(const std::string& cell, int version);
   /// Back to the version in force before; returns it.
@@ -107,7 +121,22 @@ class Trainer {
   void run(std::int64_t job, const std::stop_token& stop);
   [[nodiscard]] Status attempt(std::int64_t job, const std::stop_token& stop);
   [[nodiscard]] Result<MeasurementBatch> load_batches(const StoredJob& job, const Cell& cell) const;
-  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress);
+  [[nodiscard]] Status attempt_diagnosis(const StoredJob& job, const std::shared_ptr<const Cell>& cell,
+                                         JobProgress progress, const std::stop_token& stop);
+  [[nodiscard]] Result<MeasurementBatch> batch_to_diagnose(const StoredJob& job, const StoredDiagnosis& asked,
+                                                           const Cell& cell) const;
+  /// What the batch that this job came with says against the model in force; refuses, and puts the batch in quarantine,
+  /// when it must not be learned from. Empty where nothing is to be said.
+  [[nodiscard]] Result<std::string> hold_against_model_in_force(const StoredJob& job, const Cell& cell);
+  [[nodiscard]] std::function<bool(const std::string&, double)> reporter(const JobProgress& progress,
+                                                                         const std::stop_token& stop);
+  [[nodiscard]] TrainOptions train_options(const StoredJob& job, const Cell& cell, const JobProgress& progress,
+                                           const std::stop_token& stop);
+  /// Stores the model and, if it is good enough, puts it in force. `note` goes with the outcome.
+  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress,
+                            double accept_ratio, const std::string& note);
+  /// Ends a job that makes no model.
+  [[nodiscard]] Status finish(JobProgress progress, const std::string& outcome);
   void report(const JobProgress& progress);
 
   const std::map<std::string, std::shared_ptr<const Cell>> cells_;

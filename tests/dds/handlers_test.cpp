@@ -293,13 +293,41 @@ TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
   EXPECT_FALSE(handlers_.answer(import));
 }
 
-TEST_F(HandlersTest, DiagnoseSaysThatItIsNotOffered) {
+TEST_F(HandlersTest, DiagnoseIsQueuedAndAnswersWhenItIsDone) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   wire::DiagnoseRequest request;
   request.about().cell("cell-7");
-  const auto reply = handlers_.answer(request);
-  ASSERT_TRUE(reply);
-  EXPECT_EQ(reply->header().result(), wire::RESULT_UNSUPPORTED);
-  EXPECT_NE(reply->header().message().find("not offered"), std::string::npos);
+  request.batch_id("lt-07");
+  const auto queued = handlers_.answer(request);
+  ASSERT_TRUE(queued) << queued.error().message;
+  EXPECT_TRUE(queued->findings_json().empty());
+  request.job(queued->job());
+  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kBusy);
+  ASSERT_TRUE(backend_.store->store_findings(queued->job(), "{}", "<html>"));
+  EXPECT_EQ(handlers_.answer(request)->findings_json(), "{}");
+  EXPECT_TRUE(handlers_.answer(request)->page_html().empty());
+  request.page(true);
+  EXPECT_EQ(handlers_.answer(request)->page_html(), "<html>");
+  request.about().cell("cell-8");
+  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(HandlersTest, BatchesInQuarantineAreListedAndReleased) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  ASSERT_TRUE(backend_.store->set_quarantine("cell-7", "lt-07", "another tool"));
+  wire::ManageModelsRequest request;
+  request.action(wire::MANAGE_QUARANTINE);
+  const auto all = handlers_.answer(request);
+  ASSERT_TRUE(all) << all.error().message;
+  EXPECT_NE(all->text().find("another tool"), std::string::npos) << all->text();
+  request.about().cell("cell-8");
+  EXPECT_EQ(handlers_.answer(request)->text(), "[]");
+  request.about().cell("cell-7");
+  request.action(wire::MANAGE_RELEASE);
+  request.text("lt-07");
+  EXPECT_TRUE(handlers_.answer(request));
+  request.action(wire::MANAGE_QUARANTINE);
+  EXPECT_EQ(handlers_.answer(request)->text(), "[]");
 }
 
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {

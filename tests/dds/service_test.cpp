@@ -362,6 +362,38 @@ TEST_F(ServiceTest, ASubmittedBatchIsTrainedWatchedAndPutInForce) {
   EXPECT_EQ(session->wait_for_job(99, kLimit, nullptr).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(ServiceTest, ASentBatchIsDiagnosedAndThePageComesAlong) {
+  server_.start();
+  server_.start_trainer();
+  const auto session = open_session(server_.options());
+  const auto job = session->diagnose("cell-7", "", test::small_batch_csv(*server_.backend().cell, {}), false);
+  ASSERT_TRUE(job) << job.error().message;
+  const auto status = session->wait_for_job(*job, kLimit, nullptr);
+  ASSERT_TRUE(status) << status.error().message;
+  EXPECT_EQ(status->stage, "done") << status->what;
+  const auto found = session->diagnosis("cell-7", *job, true);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_NE(found->findings_json.find("\"verdict\""), std::string::npos);
+  EXPECT_NE(found->page_html.find("</html>"), std::string::npos);
+  EXPECT_EQ(session->diagnosis("cell-8", *job, false).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(session->diagnose("cell-7", "lt-99", "", false).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(ServiceTest, ABatchInQuarantineIsShownAndReleased) {
+  server_.start();
+  const auto session = open_session(server_.options());
+  ASSERT_TRUE(session->submit_measurements("cell-7", "lt-07", test::small_batch_csv(*server_.backend().cell, {})));
+  ASSERT_TRUE(server_.backend().store->set_quarantine("cell-7", "lt-07", "another tool"));
+  const auto apart = session->quarantine("");
+  ASSERT_TRUE(apart) << apart.error().message;
+  ASSERT_EQ(apart->size(), 1u);
+  EXPECT_EQ(apart->front().batch, "lt-07");
+  EXPECT_EQ(apart->front().reason, "another tool");
+  EXPECT_EQ(session->train("cell-7", {"lt-07"}, "", "").error().code, ErrorCode::kRefused);
+  ASSERT_TRUE(session->release("cell-7", "lt-07"));
+  EXPECT_TRUE(session->train("cell-7", {"lt-07"}, "", ""));
+}
+
 TEST_F(ServiceTest, TellsWhoServesWhat) {
   server_.backend().serve(6);
   server_.start();

@@ -134,6 +134,64 @@ TEST_F(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
   EXPECT_EQ(read->bias, "matern52");
 }
 
+TEST_F(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
+  StoredJob asked = job();
+  asked.kind = JobKind::kDiagnose;
+  const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", true, "", ""});
+  ASSERT_TRUE(queued) << queued.error().message;
+  reopen();
+  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kDiagnose);
+  EXPECT_TRUE(store_->diagnosis(queued->id)->apply);
+  EXPECT_EQ(store_->diagnosis(queued->id)->csv, "q1_deg\n1\n");
+  ASSERT_TRUE(store_->store_findings(queued->id, "{}", "<html>"));
+  ASSERT_TRUE(store_->set_job_done(queued->id, "nothing found"));
+  reopen();
+  EXPECT_EQ(store_->diagnosis(queued->id)->findings, "{}");
+  EXPECT_EQ(store_->job(queued->id)->state, JobState::kDone);
+  EXPECT_EQ(store_->job(queued->id)->message, "nothing found");
+  EXPECT_EQ(store_->diagnosis(queued->id + 1).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
+  std::vector<std::int64_t> jobs;
+  for (int i = 0; i < 22; ++i) {
+    StoredJob asked = job();
+    asked.kind = JobKind::kDiagnose;
+    jobs.push_back(store_->add_diagnosis(asked, {"csv", false, "", ""})->id);
+    ASSERT_TRUE(store_->store_findings(jobs.back(), "{}", "<html>"));
+  }
+  EXPECT_EQ(store_->diagnosis(jobs[1])->page, "");
+  EXPECT_EQ(store_->diagnosis(jobs[1])->findings, "{}");
+  EXPECT_EQ(store_->diagnosis(jobs[2])->page, "<html>");
+}
+
+TEST_F(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
+  ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
+  ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
+  reopen();
+  EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "another tool");
+  EXPECT_EQ(store_->batches("cell-7")->at(0).quarantine, "another tool");
+  ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", ""));
+  EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "");
+  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-08", "x").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(StoreTest, TakesAFileOfTheFirstSchemaOn) {
+  ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
+  store_.reset();
+  {
+    SQLite::Database file(path_, SQLite::OPEN_READWRITE);
+    file.exec("DROP TABLE diagnoses");
+    file.exec("ALTER TABLE jobs DROP COLUMN kind");
+    file.exec("ALTER TABLE batches DROP COLUMN quarantine");
+    file.exec("PRAGMA user_version = 1");
+  }
+  open();
+  EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "");
+  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kTrain);
+  EXPECT_TRUE(store_->add_diagnosis(job(), {"csv", false, "", ""}));
+}
+
 TEST_F(StoreTest, RefusesAJobOverAnUnknownBatch) {
   StoredJob lost = job();
   lost.batch_ids = {"never-seen"};
@@ -275,11 +333,11 @@ TEST_F(StoreTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
 
 TEST_F(StoreTest, RefusesANewerSchema) {
   store_.reset();
-  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 2"); }
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3"); }
   const auto opened = Store::open(path_);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kRefused);
-  EXPECT_NE(opened.error().message.find("schema 2"), std::string::npos) << opened.error().message;
+  EXPECT_NE(opened.error().message.find("schema 3"), std::string::npos) << opened.error().message;
 }
 
 TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {

@@ -7,6 +7,8 @@
 #include <new>
 #include <thread>
 
+#include "server/plan/plan.h"
+#include "server/simulate/simulate.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -458,6 +460,96 @@ TEST_F(TrainerTest, RefusesToImportWhatIsNotOfTheCell) {
   EXPECT_FALSE(trainer_->import_model("cell-7", serialize(test::nominal_model(test::small_cell("cell-8"), 7))));
   EXPECT_FALSE(trainer_->import_model("cell-7", "no model"));
   EXPECT_TRUE(store_->models("cell-7")->empty());
+}
+
+/// Joint 3 of the small cell oscillates, which its error sources do not know.
+std::string csv_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
+  VirtualRobot robot{make_physical_model(cell, {"base", "gear_transmission:3@2"}).value(), 20e-6, 60e-6, {}};
+  robot.truth.values(0) = 1e-3;
+  robot.truth.values.tail<2>() = Eigen::Vector2d(1e-4, 2e-4);
+  return to_csv(simulate(robot, plan_poses(*cell, {120, 1}).value(), {}).value());
+}
+
+TEST_F(TrainerTest, DiagnosesAStoredBatchAndKeepsWhatItFound) {
+  start();
+  train("lt-07");
+  const auto job = trainer_->diagnose("cell-7", "", "", false);
+  ASSERT_TRUE(job) << job.error().message;
+  const JobProgress done = watch_.wait_until_finished(*job);
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_EQ(done.model_version, 0);
+  EXPECT_NE(trainer_->diagnosis(*job)->findings.find("\"verdict\""), std::string::npos);
+  EXPECT_NE(trainer_->diagnosis(*job)->page.find("</html>"), std::string::npos);
+  EXPECT_EQ(store_->models("cell-7")->size(), 1u);
+}
+
+TEST_F(TrainerTest, PutsTheExtendedModelInForceBecauseItIsBetterAndKeepsWhatWasAdded) {
+  start();
+  const std::string oscillating = csv_of_an_oscillating_joint(cells_.at("cell-7"));
+  watch_.wait_until_finished(trainer_->submit("cell-7", "lt-07", oscillating, "client:1").value());
+  const auto job = trainer_->diagnose("cell-7", "lt-07", "", true);
+  ASSERT_TRUE(job) << job.error().message;
+  const JobProgress done = watch_.wait_until_finished(*job);
+  ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_TRUE(done.in_force) << done.what << trainer_->diagnosis(*job)->findings;
+  EXPECT_EQ(done.model_version, 2);
+  const std::string level = registry_->in_force("cell-7")->model.provenance().level;
+  EXPECT_TRUE(level.starts_with("base,")) << level;
+  const JobProgress again = retrain({"lt-07"});
+  EXPECT_EQ(store_->models("cell-7")->at(2).level, level) << again.what;
+}
+
+TEST_F(TrainerTest, ADiagnosisThatNamesNothingAppliesNothing) {
+  start();
+  train("lt-07");
+  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_NE(done.what.find("nothing applied"), std::string::npos) << done.what;
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(store_->models("cell-7")->size(), 1u);
+}
+
+TEST_F(TrainerTest, DiagnosesABatchThatIsSentWithoutStoringItAsOne) {
+  start();
+  const auto job = trainer_->diagnose("cell-7", "", csv(), false);
+  ASSERT_TRUE(job) << job.error().message;
+  EXPECT_EQ(watch_.wait_until_finished(*job).stage, JobStage::kDone);
+  EXPECT_TRUE(store_->batches("cell-7")->empty());
+  EXPECT_FALSE(trainer_->diagnose("cell-7", "", "q1_deg\n1\n", false));
+  EXPECT_EQ(trainer_->diagnose("cell-7", "lt-99", "", false).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(TrainerTest, ABatchThatNothingExplainsIsKeptApartUntilItIsReleased) {
+  start();
+  train("lt-07");
+  test::SmallBatch noisy;
+  noisy.noise = 2e-3;
+  noisy.seed = 5;
+  const JobProgress refused = train("lt-08", noisy);
+  EXPECT_EQ(refused.stage, JobStage::kFailed);
+  EXPECT_NE(refused.what.find("quarantine"), std::string::npos) << refused.what;
+  ASSERT_EQ(trainer_->quarantined("")->size(), 1u);
+  EXPECT_EQ(trainer_->quarantined("cell-7")->front().id, "lt-08");
+  EXPECT_EQ(in_force(), 1);
+
+  const auto again = trainer_->retrain("cell-7", {"lt-07", "lt-08"}, "", "");
+  ASSERT_FALSE(again);
+  EXPECT_NE(again.error().message.find("nothing known explains it"), std::string::npos) << again.error().message;
+  ASSERT_TRUE(trainer_->release("cell-7", "lt-08"));
+  EXPECT_TRUE(trainer_->quarantined("")->empty());
+  EXPECT_EQ(retrain({"lt-08"}).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, ABatchOfATrackerThatWasSetUpElsewhereIsLearnedFromAndSaysSo) {
+  start();
+  train("lt-07");
+  test::SmallBatch elsewhere;
+  elsewhere.base_shift = 0.5;
+  elsewhere.seed = 5;
+  const JobProgress done = train("lt-08", elsewhere);
+  EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+  EXPECT_TRUE(done.in_force) << done.what;
+  EXPECT_NE(done.what.find("stands elsewhere"), std::string::npos) << done.what;
 }
 
 TEST_F(TrainerTest, AnUnknownJobIsNotFound) { EXPECT_EQ(trainer_->progress(77).error().code, ErrorCode::kNotFound); }

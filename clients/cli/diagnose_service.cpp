@@ -1,0 +1,69 @@
+#include "clients/cli/diagnose_service.h"
+
+#include <filesystem>
+
+#include "clients/cli/diagnose_text.h"
+#include "clients/cli/output.h"
+#include "server/base/text_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::chrono::hours kLongest{1};
+
+Result<std::int64_t> ask(client::Session& session, const std::string& cell, const DiagnoseArguments& arguments) {
+  if (!std::filesystem::exists(arguments.batch)) return session.diagnose(cell, arguments.batch, "", arguments.apply);
+  const Result<std::string> csv = read_text_file(arguments.batch);
+  if (!csv) return tl::make_unexpected(csv.error());
+  return session.diagnose(cell, "", *csv, arguments.apply);
+}
+
+Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
+  ProgressLine progress;
+  return session.wait_for_job(job, kLongest, [&](const client::JobStatus& status) {
+    progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
+  });
+}
+
+Status write_found(const client::DiagnosisAnswer& found, const ordered_json& json, const DiagnoseArguments& arguments) {
+  Status done = write_json(arguments.json, json);
+  if (done && !arguments.next_poses.empty()) done = write_output(arguments.next_poses, next_poses_csv(json));
+  if (!done || arguments.report.empty()) return done;
+  if (found.page_html.empty()) return refused("{}: the service has this page no more", arguments.report);
+  return write_output(arguments.report, found.page_html);
+}
+
+}  // namespace
+
+Status diagnose_at_service(const DiagnoseArguments& arguments) {
+  if (!arguments.model.empty() || !arguments.cell_out.empty()) {
+    return failure(ErrorCode::kUsage, "--model and --cell-out are for files; a service keeps its models itself");
+  }
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  const Result<std::int64_t> job = ask(**session, *cell, arguments);
+  if (!job) return tl::make_unexpected(job.error());
+  const Result<client::JobStatus> end = wait(**session, *job);
+  if (!end) return tl::make_unexpected(end.error());
+  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
+  const auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
+  if (!found) return tl::make_unexpected(found.error());
+  ordered_json json = ordered_json::parse(found->findings_json, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::kInternal, "what job {} found is not JSON", *job);
+  say(diagnosis_text(json), arguments);
+  if (arguments.apply) {
+    json["applied"] = {
+        {"job", *job}, {"outcome", end->what}, {"version", end->model_version}, {"in_force", end->in_force}};
+    say(fmt::format("\nversion {}: {}\n", end->model_version, end->what), arguments);
+  }
+  if (const Status written = write_found(*found, json, arguments); !written) return written;
+  if (!arguments.apply || end->in_force) return {};
+  return refused("cell {}: {}", *cell, end->what);
+}
+
+}  // namespace trammel::cli
