@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostPoses = 250;  // distances are quadratic; evenly drawn beyond
-constexpr int kPermutations = 399;
+constexpr Index kMostPoses = 200;  // distances are quadratic; evenly drawn beyond
+constexpr int kPermutations = 299;
 constexpr double kLeastSpread = 1e-9;
 
 /// Distances between rows, less row and column means.
