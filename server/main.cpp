@@ -72,8 +72,12 @@ void log_progress(const JobProgress& progress) {
       spdlog::debug("{}: job {} is being stored", progress.cell, progress.job);
       break;
     case JobStage::kDone:
-      spdlog::info("{}: job {} made version {}, {}", progress.cell, progress.job, progress.model_version,
-                   progress.what);
+      if (progress.model_version == 0) {
+        spdlog::info("{}: job {} is done: {}", progress.cell, progress.job, progress.what);
+      } else {
+        spdlog::info("{}: job {} made version {}, {}", progress.cell, progress.job, progress.model_version,
+                     progress.what);
+      }
       break;
     case JobStage::kFailed:
       spdlog::warn("{}: job {} failed: {}", progress.cell, progress.job, progress.what);

@@ -16,7 +16,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct PlanArguments {
-  std::string cell, criterion = "lhs", output, rapid, krl, json;
+  std::string cell, from, criterion = "lhs", output, rapid, krl, json;
   PlanOptions options;
   ProgramOptions program;
   bool positions_only = false;
@@ -94,6 +94,9 @@ std::string separation_text(const PlanArguments& arguments, const Plan::Separati
 
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   const DrawCount& draw = plan.draw;
+  if (!arguments.from.empty()) {
+    return fmt::format("{} poses for cell {} in {}\n", plan.poses.size(), cell.name, arguments.output);
+  }
   std::string text = fmt::format(
       "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {} out of sight, {} too near to a "
       "joint limit\n",
@@ -139,13 +142,24 @@ ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Pla
   return json;
 }
 
+/// Poses that somebody has chosen already: those of `diagnose --next-poses`, for one.
+Result<Plan> plan_from(const Cell& cell, const std::string& path) {
+  return read_joint_csv(path)
+      .and_then([&](JointList list) { return check_against_cell(std::move(list), cell); })
+      .and_then([&](const JointList& list) { return plan_of(cell, list); });
+}
+
 Status plan(PlanArguments arguments) {
+  if (arguments.options.count == 0 && arguments.from.empty()) {
+    return failure(ErrorCode::kUsage, "--count or --from is required");
+  }
   if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
   arguments.options.orientation = !arguments.positions_only;
   Result<Cell> read = read_cell(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<Plan> planned = make_plan(cell, arguments.options);
+  const Result<Plan> planned =
+      arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
   if (!planned) return tl::make_unexpected(planned.error());
   const auto outputs = outputs_of(*cell, arguments, *planned);
   if (!outputs) return tl::make_unexpected(outputs.error());
@@ -163,7 +177,11 @@ void add_plan_command(CLI::App& app, Action& chosen) {
   PlanOptions& options = arguments->options;
   CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--count", options.count, "Number of poses")->required()->check(CLI::Range(1, 1000000));
+  CLI::Option* count = command->add_option("--count", options.count, "Number of poses")->check(CLI::Range(1, 1000000));
+  command
+      ->add_option("--from", arguments->from,
+                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them")
+      ->excludes(count);
   command->add_option("--seed", options.seed, "Seed of the draw")->capture_default_str();
   command
       ->add_option("--criterion", arguments->criterion,

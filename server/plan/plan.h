@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/measurement/joint_list.h"
 #include "server/plan/separation.h"
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
@@ -75,6 +76,11 @@ struct Plan {
   };
   std::optional<Separation> separation;
 };
+
+/// The poses of `list` (checked against the cell) as a plan: each with the pose it is approached from, on the side that
+/// its directions say where they are all the same, else on one that the limits allow. Refuses a pose that lies too near
+/// to a limit to be approached.
+[[nodiscard]] Result<Plan> plan_of(const Cell& cell, const JointList& list);
 
 /// A plan as the options say, every pose with the pose it is approached from (by default from above, as source section
 /// 3.2.4.2). Poses of one tool and payload come together; within them the most telling come first. Refuses as

@@ -42,6 +42,19 @@ TEST_F(PlanCommand, WritesPlanProgramsAndFigures) {
   EXPECT_GT(json["separability"]["plan"]["strength"], json["separability"]["lhs"]["strength"]);
 }
 
+TEST_F(PlanCommand, MakesAProgramOfPosesThatWereChosenElsewhere) {
+  const std::string chosen = folder_.write(
+      "next.csv", "pose_id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\nn1,10,20,-30,40,50,60\nn2,0,0,69.9,0,5,0\n");
+  ASSERT_EQ(plan({"--from", chosen, "-o", file("p.csv"), "--rapid", file("p.mod")}), 0);
+  const JointList list = read_joint_csv(file("p.csv")).value();
+  ASSERT_EQ(list.poses.size(), 2u);
+  EXPECT_EQ(list.poses[0].pose_id, "n1");
+  EXPECT_EQ(list.poses[0].context.direction, std::vector<int>(6, 1));
+  EXPECT_NE(text("p.mod").find("[10,20,-30,40,50,60]"), std::string::npos) << text("p.mod");
+  EXPECT_EQ(plan({"--from", chosen, "--count", "3", "-o", file("p.csv")}), 2);
+  EXPECT_EQ(plan({"-o", file("p.csv")}), 2);
+}
+
 TEST_F(PlanCommand, RefusesBeforeItWritesAnything) {
   EXPECT_EQ(plan({"--count", "5", "-o", file("p.csv"), "--rapid", file("p.mod"), "--rapid-tool", "no tool"}), 3);
   EXPECT_FALSE(std::filesystem::exists(file("p.csv")));

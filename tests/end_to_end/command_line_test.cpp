@@ -347,6 +347,52 @@ TEST_F(CommandLine, TheReportIsOnePageWithItsChartsInside) {
   EXPECT_EQ(page.find("{{"), std::string::npos);
 }
 
+/// A truth file whose joint 3 oscillates besides, which the shipped cell does not know.
+std::string oscillating_truth(const test::TemporaryFolder& folder) {
+  std::string truth = test::read_file(kTruth);
+  const std::string noise = "noise:";
+  truth.insert(truth.find(noise), "  gear_transmission:3@48.5: {gear_sin3_rad: 4.0e-5}\n");
+  return folder.write("oscillating.yaml", truth);
+}
+
+TEST_F(CommandLine, ADiagnosisNamesTheGearAndExtendsTheCellByIt) {
+  must({"plan", "--cell", cell_, "--count", "150", "-o", file("plan.csv")});
+  must({"simulate", "--cell", cell_, "--truth", oscillating_truth(folder_), "--plan", file("plan.csv"), "-o",
+        file("batch.csv")});
+  const Finished applied = must({"diagnose", "--cell", cell_, "--batch", file("batch.csv"), "--json",
+                                 file("found.json"), "--report", file("page.html"), "--next-poses", file("next.csv"),
+                                 "--apply", "--cell-out", file("extended.yaml"), "--model", file("extended.model")});
+  const json found = json::parse(test::read_file(file("found.json")));
+  EXPECT_EQ(found.at("verdict"), "named") << applied.out;
+  ASSERT_EQ(found.at("findings").size(), 1u);
+  EXPECT_EQ(found.at("findings").at(0).at("cause"), "gear_transmission");
+  EXPECT_EQ(found.at("findings").at(0).at("joint"), 3);
+  const json& order = found.at("findings").at(0).at("parameters").at("order");
+  EXPECT_NEAR(order.at("value").get<double>(), 48.5, 0.3);
+  EXPECT_TRUE(found.at("applied").at("better").get<bool>());
+  EXPECT_LT(found.at("applied").at("after").at("rms_mm").get<double>(),
+            found.at("applied").at("before").at("rms_mm").get<double>());
+  EXPECT_NE(test::read_file(file("page.html")).find("gear transmission"), std::string::npos);
+
+  const std::string before = test::read_file(cell_);
+  const std::string after = test::read_file(file("extended.yaml"));
+  const std::string list = "[base, geometry, compliance";
+  EXPECT_NE(after.find(list + ", gear_transmission:3@48."), std::string::npos) << after;
+  EXPECT_EQ(after.substr(0, after.find(list)), before.substr(0, before.find(list)));
+  const json evaluated = json::parse(
+      must({"evaluate", "--model", file("extended.model"), "--batch", file("batch.csv"), "--json", "-"}).out);
+  EXPECT_LT(evaluated.at("rms_mm").get<double>(), 0.04);
+}
+
+TEST_F(CommandLine, ADiagnosisThatNamesNothingExtendsNothing) {
+  const Finished finished = trammel({"diagnose", "--cell", cell_, "--batch", measure("good", 80, 1), "--json",
+                                     file("found.json"), "--apply", "--cell-out", file("out")});
+  EXPECT_EQ(finished.exit_code, kRefusedData) << finished.out;
+  EXPECT_NE(finished.err.find("no cause was named"), std::string::npos) << finished.err;
+  EXPECT_FALSE(std::filesystem::exists(file("out")));
+  EXPECT_EQ(json::parse(test::read_file(file("found.json"))).at("verdict"), "nothing");
+}
+
 TEST_F(CommandLine, AServiceThatIsNotThereEndsWith4) {
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"status"}, {"models", "--cell", "cell-7"}, {"rollback", "--cell", "cell-7"}}) {
@@ -407,6 +453,38 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
   must_answer({"export", "--model", "cell-7@2", "-o", file("second.model")});
   EXPECT_EQ(imported(file("second.model")), 2) << "the service has it already";
   EXPECT_EQ(imported(train(measure("other", 30, 3), "M1")), 3);
+}
+
+TEST_F(CommandLineWithService, ABatchIsDiagnosedThereAndWhatItNamesPutInForce) {
+  must({"plan", "--cell", cell_, "--count", "150", "-o", file("plan.csv")});
+  must({"simulate", "--cell", cell_, "--truth", oscillating_truth(folder_), "--plan", file("plan.csv"), "-o",
+        file("batch.csv")});
+  must_answer({"submit", "--cell", "cell-7", "--batch", file("batch.csv"), "--watch"});
+  must_answer({"diagnose", "--cell", "cell-7", "--batch", "batch", "--json", file("found.json"), "--report",
+               file("page.html"), "--apply"});
+  const json found = json::parse(test::read_file(file("found.json")));
+  EXPECT_EQ(found.at("findings").at(0).at("cause"), "gear_transmission");
+  EXPECT_TRUE(found.at("applied").at("in_force").get<bool>());
+  EXPECT_NE(test::read_file(file("page.html")).find("</html>"), std::string::npos);
+  const json models = json::parse(must_answer({"models", "--cell", "cell-7", "--json", "-"}).out).at("models");
+  EXPECT_NE(models.at(1).at("level").get<std::string>().find("gear_transmission:3"), std::string::npos);
+}
+
+TEST_F(CommandLineWithService, AnotherToolIsKeptApartShownAndReleased) {
+  must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 60, 1), "--watch"});
+  std::string truth = test::read_file(kTruth);
+  truth.insert(truth.find("noise:"), "  tool: {tx_mm: 3.0, tz_mm: -2.0}\n");
+  must({"plan", "--cell", cell_, "--count", "60", "--seed", "9", "-o", file("plan.csv")});
+  must({"simulate", "--cell", cell_, "--truth", folder_.write("tool.yaml", truth), "--plan", file("plan.csv"), "-o",
+        file("second.csv")});
+  const Finished kept = ask({"submit", "--cell", "cell-7", "--batch", file("second.csv"), "--watch"});
+  EXPECT_EQ(kept.exit_code, kRefusedData);
+  EXPECT_NE(kept.err.find("the tool is another one"), std::string::npos) << kept.err;
+  const json status = json::parse(must_answer({"status", "--json", "-"}).out);
+  EXPECT_EQ(status.at("quarantine").at(0).at("batch"), "second");
+  EXPECT_EQ(ask({"retrain", "--cell", "cell-7", "--batch", "second", "--watch"}).exit_code, kRefusedData);
+  must_answer({"retrain", "--cell", "cell-7", "--batch", "second", "--release", "--watch"});
+  EXPECT_TRUE(json::parse(must_answer({"status", "--json", "-"}).out).at("quarantine").empty());
 }
 
 TEST_F(CommandLineWithService, WhatTheServiceRefusesEndsWith3AndItsReason) {
