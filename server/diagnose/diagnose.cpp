@@ -92,7 +92,7 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   Eigen::Matrix3Xd nominal(3, before.poses());
   for (Index i = 0; i < before.poses(); ++i) {
     const Measurement& m = before.batch().measurements[static_cast<std::size_t>(i)];
-    nominal.col(i) = m.p_W - found.before.nominal_pose_W(m.context).translation();
+    nominal.col(i) = m.p_W - found.before.model.nominal_pose_W(m.context).translation();
   }
   steps.push_back({"nominal", figures_of(nominal).rms});
   steps.push_back({"calibrated", before.position_rms(before.residual())});
@@ -127,8 +127,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
 
   if (!reported(options, "measuring the gain", 0.65)) return tl::make_unexpected(given_up());
   const std::vector<std::string> candidates = candidate_sources(*cell, found.batch, nullptr);
-  const LinearProblem before(found.before, found.all, found.before_priors, candidates);
-  const LinearProblem after(found.model, found.batch, found.priors, candidates);
+  const LinearProblem before(found.before.model, found.all, found.before.priors, candidates);
+  const LinearProblem after(found.after.model, found.batch, found.after.priors, candidates);
   const MatrixXd columns = background_columns(after, found.unnamed);
   const Background all(columns);
 
@@ -147,7 +147,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
   }
-  for (const ErrorSourcePtr& source : found.before.sources) diagnosis.sources_before.push_back(source->name());
+  for (const ErrorSourcePtr& source : found.before.model.sources) diagnosis.sources_before.push_back(source->name());
   diagnosis.sources_after = diagnosis.sources_before;
   for (const Finding& finding : diagnosis.findings) {
     if (!finding.source.empty() && finding.could_also_be.empty()) diagnosis.sources_after.push_back(finding.source);
@@ -166,8 +166,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
       }
       return figures_of(e);
     };
-    diagnosis.held_out_before = errors(found.before);
-    diagnosis.held_out_after = errors(found.model);
+    diagnosis.held_out_before = errors(found.before.model);
+    diagnosis.held_out_after = errors(found.after.model);
     diagnosis.held_out_how = fmt::format("{} validation rows", split.validation.measurements.size());
   }
 
@@ -211,10 +211,10 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);
   diagnosis.limits = limits_of(found.all, merged.statistics);
 
-  const Matrix3 R_BW = found.before.X_WB.linear().transpose();
+  const Matrix3 R_BW = found.before.model.X_WB.linear().transpose();
   diagnosis.batch = found.batch;
   diagnosis.residual_after_B = R_BW * after.positions(after.residual());
-  const LinearProblem same_poses(found.before, found.batch, found.before_priors, {});
+  const LinearProblem same_poses(found.before.model, found.batch, found.before.priors, {});
   diagnosis.residual_before_B = R_BW * same_poses.positions(same_poses.residual());
   diagnosis.batch_hash = batch_hash(batch);
   diagnosis.cell_hash = sha256_hex(cell->cell_yaml + cell->robot_yaml);

@@ -7,15 +7,6 @@ namespace trammel {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-std::string name_in_model(const PhysicalModel& model, const std::string& spec) {
-  const std::vector<std::string> forms = alternatives(spec, *model.cell);
-  for (const ErrorSourcePtr& source : model.sources) {
-    if (source->name() == spec || std::find(forms.begin(), forms.end(), source->name()) != forms.end())
-      return source->name();
-  }
-  return spec;
-}
-
 std::vector<Index> places_of_source(const PhysicalModel& model, const std::string& source) {
   std::vector<Index> places;
   Index next = 0;

@@ -6,9 +6,6 @@
 
 namespace trammel {
 
-/// How the model calls the source that a list of error sources spells `spec` (one of several forms may stand there).
-[[nodiscard]] std::string name_in_model(const PhysicalModel& model, const std::string& spec);
-
 /// `model` without the source of that name.
 [[nodiscard]] PhysicalModel without_source(const PhysicalModel& model, const std::string& source);
 

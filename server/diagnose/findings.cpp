@@ -102,11 +102,10 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     Finding finding;
     finding.cause = one.cause;
     finding.source = one.source;
-    const std::string name = name_in_model(problem.model(), one.source);
-    finding.parameters = parameters_of(problem, name, one.cause, estimated);
+    finding.parameters = parameters_of(problem, one.in_model, one.cause, estimated);
     if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
-    const std::vector<Index> places = places_of_source(problem.model(), name);
-    const VectorXd effect = effect_of_source(problem, name);
+    const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
+    const VectorXd effect = effect_of_source(problem, one.in_model);
     const Background rest(without_columns(columns, places));
     finding.effect_rms = problem.position_rms(effect);
     finding.strength = effect.dot(rest.project(effect).col(0));

@@ -15,6 +15,7 @@ constexpr double kSureFrequency = 0.9;
 constexpr double kRivalFrequency = 0.03;
 constexpr double kMargin = 3;           // nat: odds of 20 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
+constexpr double kRelated = 0.4;        // the same of 0.63
 constexpr double kAsGood = 6;           // of strength
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kAtOnce = 0.05;        // of the poses
@@ -84,7 +85,9 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);
     const bool as_good = same_effect && lacks < std::max(kAsGood, kShapeError * best.strength);
-    const bool as_likely = seen.score[place] - seen.score[f] < kMargin;
+    // Another cause may be there as well: only what makes much of this effect is a rival for it.
+    const bool related = of_effect.strength > kRelated * whole;
+    const bool as_likely = related && seen.score[place] - seen.score[f] < kMargin;
     const bool wins = naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency;
     if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
   }

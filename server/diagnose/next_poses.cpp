@@ -31,7 +31,7 @@ bool stays_itself(const Cause& cause) { return cause.pose_id.empty() && cause.ca
 
 /// Planned poses, as if measured where the model has them, in the context of the batch.
 Result<MeasurementBatch> pool_of(const SearchResult& found, std::uint64_t seed) {
-  const Cell& cell = *found.before.cell;
+  const Cell& cell = *found.before.model.cell;
   const Result<MatrixXd> planned = plan_poses(cell, {.count = kPool, .seed = seed});
   if (!planned) return tl::make_unexpected(planned.error());
   MeasurementBatch pool;
@@ -46,7 +46,7 @@ Result<MeasurementBatch> pool_of(const SearchResult& found, std::uint64_t seed) 
     m.context.velocity.reset();
     for (int& direction : m.context.direction) direction = random() % 2 == 0 ? 1 : -1;
     m.context.index = static_cast<int>(done.size() + static_cast<std::size_t>(i));
-    const Pose X_WT = found.before.pose_W(m.context);
+    const Pose X_WT = found.before.model.pose_W(m.context);
     m.p_W = X_WT.translation();
     if (like.R_WT) m.R_WT = X_WT.linear();
     pool.measurements.push_back(std::move(m));
@@ -127,8 +127,8 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
   const std::optional<Doubted> now = doubted(before, make_families(before), *finding);
   const Result<MeasurementBatch> pool = pool_of(found, options.seed);
   if (!now || !pool) return {};
-  const LinearProblem later(found.before, *pool, found.before_priors,
-                            candidate_sources(*found.before.cell, found.all, nullptr));
+  const LinearProblem later(found.before.model, *pool, found.before.priors,
+                            candidate_sources(*found.before.model.cell, found.all, nullptr));
   const std::optional<Doubted> then = doubted(later, make_families(later), *finding);
   if (!then || then->columns.cols() != now->columns.cols()) return {};
 

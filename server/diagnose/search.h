@@ -8,6 +8,7 @@
 
 #include "server/diagnose/candidates.h"
 #include "server/diagnose/diagnose.h"
+#include "server/diagnose/refine.h"
 #include "server/diagnose/scan.h"
 
 namespace trammel {
@@ -15,7 +16,8 @@ namespace trammel {
 /// A cause that was accepted.
 struct Accepted {
   Cause cause;
-  std::string source;  ///< empty for an outlier
+  std::string source;    ///< as a cell file spells it; empty for an outlier
+  std::string in_model;  ///< as the model names it
   Best best;
   double penalty = 0;  ///< nat: what its family reaches by chance
   double p_value = 1;
@@ -24,22 +26,11 @@ struct Accepted {
   SuspectedPose pose;  ///< of an outlier
 };
 
-/// A smooth function that no named cause beats.
-struct Unnamed {
-  std::vector<std::string> depends_on;
-  Eigen::MatrixXd columns;  ///< R x m over all poses that are left, SI, of the fitted size
-  double score = 0;
-  double p_value = 1;
-};
-
 /// What forward and backward selection ended with.
 struct SearchResult {
-  PhysicalModel before;  ///< calibrated, as the cell has it
-  std::vector<Parameter> before_priors;
-  MeasurementBatch all;              ///< that was looked at
-  std::vector<std::string> sources;  ///< of the cell, then those accepted
-  PhysicalModel model;               ///< calibrated with all of them
-  std::vector<Parameter> priors;
+  PriorModel before;       ///< calibrated, as the cell has it
+  PriorModel after;        ///< with all that was accepted
+  MeasurementBatch all;    ///< that was looked at
   MeasurementBatch batch;  ///< without outliers
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
@@ -53,8 +44,5 @@ struct SearchResult {
 [[nodiscard]] Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell,
                                                  const std::vector<std::string>& sources, const MeasurementBatch& batch,
                                                  const DiagnoseOptions& options);
-
-/// All columns of a background: the model's own parameters, then what is unnamed.
-[[nodiscard]] Eigen::MatrixXd background_columns(const LinearProblem& problem, const std::vector<Unnamed>& unnamed);
 
 }  // namespace trammel
