@@ -179,153 +179,153 @@ class Search {
                                            other.joint == cause.joint && is_description_of(cause, other));
     });
     return simpler && seen.score[*simpler] > seen.score[strongest] - kSimplerMargin ? *simpler : strongest;
+  }
 
-    /// nat: what the best few named causes, taken one after the other, explain together.
-    double named_path_score(const std::vector<FamilyPtr>& families, MatrixXd columns, const VectorXd& data,
-                            const std::function<bool(std::size_t)>& open) const {
-      double total = 0;
-      for (int k = 0; k < kPathLength; ++k) {
-        const Background background(columns);
-        const MatrixXd projected = background.project(data);
-        double highest = 0;
-        MatrixXd chosen;
-        for (std::size_t f = 0; f < families.size(); ++f) {
-          if (!families[f]->named() || !open(f)) continue;
-          const Best best = families[f]->scan({background}, projected).front();
-          const double score = best.evidence - chance_.penalty_of(*families[f]);
-          if (score <= highest) continue;
-          highest = score;
-          chosen = families[f]->columns(best);
-        }
-        if (highest < chance_.limit) break;
-        total += highest;
-        columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
-        columns.rightCols(chosen.cols()) = chosen;
+  /// nat: what the best few named causes, taken one after the other, explain together.
+  double named_path_score(const std::vector<FamilyPtr>& families, MatrixXd columns, const VectorXd& data,
+                          const std::function<bool(std::size_t)>& open) const {
+    double total = 0;
+    for (int k = 0; k < kPathLength; ++k) {
+      const Background background(columns);
+      const MatrixXd projected = background.project(data);
+      double highest = 0;
+      MatrixXd chosen;
+      for (std::size_t f = 0; f < families.size(); ++f) {
+        if (!families[f]->named() || !open(f)) continue;
+        const Best best = families[f]->scan({background}, projected).front();
+        const double score = best.evidence - chance_.penalty_of(*families[f]);
+        if (score <= highest) continue;
+        highest = score;
+        chosen = families[f]->columns(best);
       }
-      return total;
+      if (highest < chance_.limit) break;
+      total += highest;
+      columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
+      columns.rightCols(chosen.cols()) = chosen;
     }
+    return total;
+  }
 
-    Result<bool> take_unnamed(const LinearProblem& problem, const Family& family, const Scan& seen, std::size_t place) {
-      const MatrixXd all = family.columns(seen.best[place]);
-      std::vector<Index> telling;
-      for (Index k = 0; k < all.cols(); ++k) {
-        if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
-      }
-      result_.unnamed.push_back({family.depends_on(),
-                                 problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling),
-                                 seen.score[place], chance_.p_value(seen.score[place])});
-      refine(result_.after, result_.batch, result_.unnamed);
-      return true;
+  Result<bool> take_unnamed(const LinearProblem& problem, const Family& family, const Scan& seen, std::size_t place) {
+    const MatrixXd all = family.columns(seen.best[place]);
+    std::vector<Index> telling;
+    for (Index k = 0; k < all.cols(); ++k) {
+      if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
     }
+    result_.unnamed.push_back({family.depends_on(),
+                               problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling),
+                               seen.score[place], chance_.p_value(seen.score[place])});
+    refine(result_.after, result_.batch, result_.unnamed);
+    return true;
+  }
 
-    Result<bool> take_named(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
-                            const Background& background, const MatrixXd& columns, const Scan& seen, std::size_t place,
-                            const std::function<bool(std::size_t)>& open) {
-      const Family& family = *families[place];
-      const Best& best = seen.best[place];
-      if (family.predicts() && seen.score[place] < kBeyondDoubt * chance_.limit) {
-        // What scores little on all poses is not chosen in a fold that has most of them.
-        const auto contends = [&](std::size_t f) {
-          return families[f]->named() && families[f]->predicts() && open(f) &&
-                 seen.score[f] > kContender * seen.score[place];
-        };
-        const auto gain = Folds(problem).gain_of_selection(problem.residual(), columns, families, chance_, contends);
-        if (!(gain.after < gain.before)) {
-          closed_.push_back(family.cause(best));
-          return true;
-        }
-      }
-      Accepted one{family.cause(best),
-                   family.source(best),
-                   "",
-                   best,
-                   chance_.penalty_of(family),
-                   chance_.p_value(seen.score[place]),
-                   1,
-                   {},
-                   {}};
-      if (!family.predicts()) return take_outlier(problem, std::move(one));
-      const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
-      one.naming_frequency = naming.frequency;
-      one.could_also_be = naming.could_also_be;
-      if (const Status extended = extend(one); !extended) return tl::make_unexpected(extended.error());
-      result_.accepted.push_back(std::move(one));
-      return true;
-    }
-
-    Result<bool> take_outlier(const LinearProblem& problem, Accepted one) {
-      const auto pose = static_cast<std::size_t>(one.best.at);
-      const auto outliers = std::count_if(result_.accepted.begin(), result_.accepted.end(),
-                                          [](const Accepted& a) { return a.source.empty(); });
-      if (static_cast<double>(outliers) >= kMostOutliers * static_cast<double>(result_.all.measurements.size())) {
-        closed_.push_back(one.cause);
+  Result<bool> take_named(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                          const Background& background, const MatrixXd& columns, const Scan& seen, std::size_t place,
+                          const std::function<bool(std::size_t)>& open) {
+    const Family& family = *families[place];
+    const Best& best = seen.best[place];
+    if (family.predicts() && seen.score[place] < kBeyondDoubt * chance_.limit) {
+      // What scores little on all poses is not chosen in a fold that has most of them.
+      const auto contends = [&](std::size_t f) {
+        return families[f]->named() && families[f]->predicts() && open(f) &&
+               seen.score[f] > kContender * seen.score[place];
+      };
+      const auto gain = Folds(problem).gain_of_selection(problem.residual(), columns, families, chance_, contends);
+      if (!(gain.after < gain.before)) {
+        closed_.push_back(family.cause(best));
         return true;
       }
-      const Measurement& m = result_.batch.measurements[pose];
-      const Index row = problem.first_row(static_cast<Index>(pose));
-      const Index count = problem.row_count(static_cast<Index>(pose));
-      one.pose = {m.pose_id, m.row, problem.positions(problem.residual()).col(static_cast<Index>(pose)).norm(),
-                  "single pose, cause not separable: repeat it and its neighbours"};
-      result_.batch.measurements.erase(result_.batch.measurements.begin() + static_cast<std::ptrdiff_t>(pose));
-      for (Unnamed& unnamed : result_.unnamed) {
-        MatrixXd kept(unnamed.columns.rows() - count, unnamed.columns.cols());
-        kept << unnamed.columns.topRows(row), unnamed.columns.bottomRows(unnamed.columns.rows() - row - count);
-        unnamed.columns = std::move(kept);
-      }
-      result_.accepted.push_back(std::move(one));
-      refine(result_.after, result_.batch, result_.unnamed);
+    }
+    Accepted one{family.cause(best),
+                 family.source(best),
+                 "",
+                 best,
+                 chance_.penalty_of(family),
+                 chance_.p_value(seen.score[place]),
+                 1,
+                 {},
+                 {}};
+    if (!family.predicts()) return take_outlier(problem, std::move(one));
+    const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
+    one.naming_frequency = naming.frequency;
+    one.could_also_be = naming.could_also_be;
+    if (const Status extended = extend(one); !extended) return tl::make_unexpected(extended.error());
+    result_.accepted.push_back(std::move(one));
+    return true;
+  }
+
+  Result<bool> take_outlier(const LinearProblem& problem, Accepted one) {
+    const auto pose = static_cast<std::size_t>(one.best.at);
+    const auto outliers = std::count_if(result_.accepted.begin(), result_.accepted.end(),
+                                        [](const Accepted& a) { return a.source.empty(); });
+    if (static_cast<double>(outliers) >= kMostOutliers * static_cast<double>(result_.all.measurements.size())) {
+      closed_.push_back(one.cause);
       return true;
     }
+    const Measurement& m = result_.batch.measurements[pose];
+    const Index row = problem.first_row(static_cast<Index>(pose));
+    const Index count = problem.row_count(static_cast<Index>(pose));
+    one.pose = {m.pose_id, m.row, problem.positions(problem.residual()).col(static_cast<Index>(pose)).norm(),
+                "single pose, cause not separable: repeat it and its neighbours"};
+    result_.batch.measurements.erase(result_.batch.measurements.begin() + static_cast<std::ptrdiff_t>(pose));
+    for (Unnamed& unnamed : result_.unnamed) {
+      MatrixXd kept(unnamed.columns.rows() - count, unnamed.columns.cols());
+      kept << unnamed.columns.topRows(row), unnamed.columns.bottomRows(unnamed.columns.rows() - row - count);
+      unnamed.columns = std::move(kept);
+    }
+    result_.accepted.push_back(std::move(one));
+    refine(result_.after, result_.batch, result_.unnamed);
+    return true;
+  }
 
-    double remaining_score(const LinearProblem& problem, const MatrixXd& columns, const Accepted& one) const {
-      std::vector<Index> own, others;
-      Index next = 0;
-      for (const ErrorSourcePtr& source : problem.model().sources) {
-        for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next)
-          (source->name() == one.in_model ? own : others).push_back(next);
-      }
-      for (; next < columns.cols(); ++next) others.push_back(next);
-      const Background rest(columns(Eigen::all, others));
-      const VectorXd effect = effect_of_source(problem, one.in_model);
-      const VectorXd projected = rest.project(problem.residual() + effect);
-      const MatrixXd C = columns(Eigen::all, own);
+  double remaining_score(const LinearProblem& problem, const MatrixXd& columns, const Accepted& one) const {
+    std::vector<Index> own, others;
+    Index next = 0;
+    for (const ErrorSourcePtr& source : problem.model().sources) {
+      for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next)
+        (source->name() == one.in_model ? own : others).push_back(next);
+    }
+    for (; next < columns.cols(); ++next) others.push_back(next);
+    const Background rest(columns(Eigen::all, others));
+    const VectorXd effect = effect_of_source(problem, one.in_model);
+    const VectorXd projected = rest.project(problem.residual() + effect);
+    const MatrixXd C = columns(Eigen::all, own);
+    const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());
+    const VectorXd right = C.transpose() * projected;
+    const double strength = right.dot(information.llt().solve(right));
+    return log_evidence(strength, std::min<double>(one.best.freedom, static_cast<double>(own.size()))) - one.penalty;
+  }
+
+  Result<bool> prune_unnamed(const LinearProblem& problem) {
+    for (std::size_t k = 0; k < result_.unnamed.size(); ++k) {
+      std::vector<Unnamed> others = result_.unnamed;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      const Background rest(background_columns(problem, others));
+      const MatrixXd C = problem.weight().asDiagonal() * result_.unnamed[k].columns;
       const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());
-      const VectorXd right = C.transpose() * projected;
-      const double strength = right.dot(information.llt().solve(right));
-      return log_evidence(strength, std::min<double>(one.best.freedom, static_cast<double>(own.size()))) - one.penalty;
+      const VectorXd right = C.transpose() * rest.project(problem.residual());
+      const Eigen::LLT<MatrixXd> factor(information);
+      const double log_det = 2 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
+      const double evidence = 0.5 * (right.dot(factor.solve(right)) - log_det);
+      if (evidence >= chance_.limit) continue;
+      result_.unnamed = std::move(others);
+      return true;
     }
+    return false;
+  }
 
-    Result<bool> prune_unnamed(const LinearProblem& problem) {
-      for (std::size_t k = 0; k < result_.unnamed.size(); ++k) {
-        std::vector<Unnamed> others = result_.unnamed;
-        others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-        const Background rest(background_columns(problem, others));
-        const MatrixXd C = problem.weight().asDiagonal() * result_.unnamed[k].columns;
-        const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());
-        const VectorXd right = C.transpose() * rest.project(problem.residual());
-        const Eigen::LLT<MatrixXd> factor(information);
-        const double log_det = 2 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
-        const double evidence = 0.5 * (right.dot(factor.solve(right)) - log_det);
-        if (evidence >= chance_.limit) continue;
-        result_.unnamed = std::move(others);
-        return true;
-      }
-      return false;
-    }
-
-    std::shared_ptr<const Cell> cell_;
-    const DiagnoseOptions& options_;
-    SearchResult result_;
-    Chance chance_;
-    std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
-    std::vector<Cause> closed_;    // were tried and did not hold
-  };
+  std::shared_ptr<const Cell> cell_;
+  const DiagnoseOptions& options_;
+  SearchResult result_;
+  Chance chance_;
+  std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
+  std::vector<Cause> closed_;    // were tried and did not hold
+};
 
 }  // namespace
 
-Result<SearchResult>
-search_causes(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-              const MeasurementBatch& batch, const DiagnoseOptions& options) {
+Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+                                   const MeasurementBatch& batch, const DiagnoseOptions& options) {
   Search search(cell, options);
   if (const Status started = search.start(sources, batch); !started) return tl::make_unexpected(started.error());
   bool changed = true;
