@@ -98,9 +98,20 @@ std::vector<NumberFound> numbers_in(const Finding& finding, const hidden::Effect
   return numbers;
 }
 
+/// The weak ripple of twice the order that every hidden gear has.
+bool is_harmonic(const Cause& said, const hidden::Effect& effect) {
+  return said.cause == "gear_transmission" && said.order && std::abs(*said.order - 2 * effect.values(2)) < 1;
+}
+
 void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgement& judgement) {
   std::vector<bool> named(hidden.truth.causes.size(), false);
+  std::vector<bool> mentioned(hidden.truth.causes.size(), false);
   for (const Finding& finding : diagnosis.findings) {
+    for (std::size_t k = 0; k < mentioned.size(); ++k) {
+      const auto is_it = [&](const Cause& cause) { return means(cause, hidden, k); };
+      const bool open = std::any_of(finding.could_also_be.begin(), finding.could_also_be.end(), is_it);
+      if (open || is_it(finding.cause)) mentioned[k] = true;
+    }
     const auto place = place_of(finding.cause, hidden);
     if (!finding.could_also_be.empty()) {
       ++judgement.open;
@@ -108,11 +119,12 @@ void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgem
       named[*place] = true;
       const std::vector<NumberFound> numbers = numbers_in(finding, hidden.world.effects[*place]);
       judgement.numbers.insert(judgement.numbers.end(), numbers.begin(), numbers.end());
-    } else {
+    } else if (!place || !is_harmonic(finding.cause, hidden.world.effects[*place])) {
       ++judgement.wrong;
     }
   }
   judgement.right = static_cast<int>(std::count(named.begin(), named.end(), true));
+  judgement.right_or_open = static_cast<int>(std::count(mentioned.begin(), mentioned.end(), true));
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ struct Judgement {
   bool detected = false;         ///< says that something is there
   bool exact = false;            ///< names everything that was hidden, rightly, and nothing else
   int right = 0;                 ///< causes hidden that are named
+  int right_or_open = 0;         ///< causes hidden that are named or among what a finding leaves open
   int wrong = 0;                 ///< causes named that were not hidden
   int open = 0;                  ///< findings that leave open which of several causes it is
   bool set_holds_truth = false;  ///< the first cause hidden is among all that is named or left open, however

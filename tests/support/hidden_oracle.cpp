@@ -51,6 +51,11 @@ std::vector<HiddenCause> steady_causes(const World& world) {
   }
   for (const int joint : {1, 2, 3, 4, 6}) causes.push_back({"link_bending", joint, "", -1, {}});
   if (world.loads.size() > 1) causes.push_back({"payload", 0, "", -1, {}});
+  for (const ArmParameter& parameter : arm_parameters()) {
+    const auto& known = world.sources;
+    const bool identified = std::find(known.begin(), known.end(), parameter.group) != known.end();
+    if (!identified && parameter.group != "base") causes.push_back({parameter.group, 0, parameter.name, -1, {}});
+  }
   return causes;
 }
 
@@ -68,7 +73,8 @@ double share_left(const VectorXd& effect, const MatrixXd& columns) {
 }
 
 bool same(const HiddenCause& one, const HiddenCause& other) {
-  return one.cause == other.cause && one.joint == other.joint;
+  if (one.cause != other.cause || one.parameter != other.parameter) return false;
+  return !one.parameter.empty() || one.joint == other.joint;
 }
 
 VectorXd rows_of(const World& world, const std::vector<MeasuringPose>& poses) {
