@@ -60,6 +60,12 @@ ShownValue show_with_uncertainty(double value, double expanded) {
   const int decimals = 1 - order(expanded);
   if (decimals >= 0 && decimals <= 4)
     return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", expanded, decimals)};
+  constexpr int kLongest = 5;  // digits in front of the point that still read as a number
+  if (decimals < 0 && order(expanded) < kLongest && order(value) < kLongest) {
+    const double step = std::pow(10, -decimals);
+    return {fmt::format("{:.0f}", std::round(value / step) * step),
+            fmt::format("{:.0f}", std::round(expanded / step) * step)};
+  }
   const int digits = value == 0 ? 1 : std::clamp(order(value) - order(expanded) + 1, 0, 9);
   return {fmt::format("{:.{}e}", value, digits), fmt::format("{:.1e}", expanded)};
 }

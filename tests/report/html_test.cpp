@@ -25,6 +25,7 @@ TEST(ShownValue, IsRoundedToTwoDigitsOfItsUncertainty) {
     return text.value + " +- " + text.expanded;
   };
   EXPECT_EQ(shown(0.498731, 0.00213), "0.4987 +- 0.0021");
+  EXPECT_EQ(shown(812.4, 183.2), "810 +- 180");
   EXPECT_EQ(shown(-12.34567, 0.51), "-12.35 +- 0.51");
   EXPECT_EQ(shown(1.698e-3, 1.23e-5), "1.698e-03 +- 1.2e-05");
   EXPECT_EQ(shown(2.8e-10, 3.1e-12), "2.800e-10 +- 3.1e-12");
