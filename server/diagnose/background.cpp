@@ -10,15 +10,18 @@ using Eigen::MatrixXd;
 
 namespace {
 
-Eigen::LLT<MatrixXd> factor_of(const MatrixXd& columns) {
+MatrixXd information_of(const MatrixXd& columns) {
   MatrixXd information = transposed_product(columns, columns);
   information.diagonal().array() += 1;
-  return information.llt();
+  return information;
 }
 
 }  // namespace
 
-Background::Background(MatrixXd columns) : columns_(std::move(columns)), factor_(factor_of(columns_)) {
+Background::Background(MatrixXd columns) : Background(columns, information_of(columns)) {}
+
+Background::Background(MatrixXd columns, const MatrixXd& information)
+    : columns_(std::move(columns)), factor_(information) {
   const MatrixXd inverse = factor_.matrixU().solve(MatrixXd::Identity(columns_.cols(), columns_.cols()));
   root_ = transposed_product(columns_.transpose(), inverse);
 }
@@ -28,9 +31,5 @@ MatrixXd Background::project(const MatrixXd& y) const { return y - root_ * trans
 MatrixXd Background::estimate(const MatrixXd& y) const { return factor_.solve(transposed_product(columns_, y)); }
 
 MatrixXd Background::covariance() const { return factor_.solve(MatrixXd::Identity(columns_.cols(), columns_.cols())); }
-
-MatrixXd estimate_numbers(const MatrixXd& columns, const MatrixXd& y) {
-  return factor_of(columns).solve(transposed_product(columns, y));
-}
 
 }  // namespace trammel

@@ -11,6 +11,8 @@ namespace trammel {
 class Background {
  public:
   explicit Background(Eigen::MatrixXd columns);
+  /// The same with 1 + ZᵀZ known.
+  Background(Eigen::MatrixXd columns, const Eigen::MatrixXd& information);
 
   /// S⁻¹ y of every column.
   [[nodiscard]] Eigen::MatrixXd project(const Eigen::MatrixXd& y) const;
@@ -27,8 +29,5 @@ class Background {
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::MatrixXd root_;
 };
-
-/// Background::estimate() alone, without the background's root.
-[[nodiscard]] Eigen::MatrixXd estimate_numbers(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& y);
 
 }  // namespace trammel

@@ -24,6 +24,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double kPeriodogramLine = 0.01;
 constexpr std::size_t kRecoveries = 3;
 constexpr int kFewestPoses = 12;
 
@@ -156,7 +157,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     const HeldOut held_out = held_out_of(before, after);
     diagnosis.held_out_before = held_out.before;
     diagnosis.held_out_after = held_out.after;
-    diagnosis.held_out_how = fmt::format("{} folds, each predicted from the others", Folds(after).count());
+    diagnosis.held_out_how =
+        fmt::format("{} folds, each predicted from the others", Folds(after, after.nuisance()).count());
   } else {
     const auto errors = [&](const PhysicalModel& model) {
       Eigen::Matrix3Xd e(3, static_cast<Index>(split.validation.measurements.size()));
@@ -182,7 +184,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   for (int joint = 0; joint < cell->robot.size(); ++joint) {
     if (cell->robot.joint(joint).type != JointType::kRevolute || !make_gear_family(before, joint)) continue;
     Periodogram lines = periodogram(before, joint, first);
-    lines.limit = strength_for(found.chance.limit, 2);
+    const double chance = found.chance.penalty_of(*make_gear_family(before, joint));
+    lines.limit = strength_for(found.chance.limit_at(kPeriodogramLine) + chance, 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
   diagnosis.waterfall = waterfall_of(found, before, after, diagnosis.findings);

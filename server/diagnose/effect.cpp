@@ -45,4 +45,21 @@ VectorXd effect_of_source(const LinearProblem& problem, const std::string& sourc
   return effect.cwiseProduct(problem.weight());
 }
 
+OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source, const VectorXd& change,
+                         const Eigen::MatrixXd& covariance) {
+  const std::vector<Index> places = places_of_source(problem.model(), source);
+  OwnEstimate own{VectorXd(change(places)), Eigen::MatrixXd(covariance(places, places))};
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Parameter& parameter = problem.nuisance_parameters()[static_cast<std::size_t>(places[k])];
+    // An order says where an oscillation is, not how large.
+    if (parameter.name.starts_with("order")) {
+      own.size(static_cast<Index>(k)) = 0;
+    } else {
+      own.size(static_cast<Index>(k)) += problem.model().values(places[k]) / parameter.prior_scale;
+    }
+  }
+  own.precision = own.precision.inverse().eval();
+  return own;
+}
+
 }  // namespace trammel

@@ -15,4 +15,14 @@ namespace trammel {
 /// Places of a source's parameters among all of the model's.
 [[nodiscard]] std::vector<Eigen::Index> places_of_source(const PhysicalModel& model, const std::string& source);
 
+/// One source's share of a joint estimate, in units of priors.
+struct OwnEstimate {
+  Eigen::VectorXd size;       ///< how far its parameters make it act
+  Eigen::MatrixXd precision;  ///< of them, everything else free: the inverse of their covariance, priors included
+  [[nodiscard]] double strength() const { return size.dot(precision * size); }
+};
+/// `change` and `covariance`: the joint estimate of all of a background's numbers, about where the model stands.
+[[nodiscard]] OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source,
+                                       const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance);
+
 }  // namespace trammel

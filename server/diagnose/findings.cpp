@@ -66,12 +66,12 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   return estimates;
 }
 
-MatrixXd without_columns(const MatrixXd& columns, const std::vector<Index>& left_out) {
+std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   std::vector<Index> kept;
-  for (Index k = 0; k < columns.cols(); ++k) {
+  for (Index k = 0; k < count; ++k) {
     if (std::find(left_out.begin(), left_out.end(), k) == left_out.end()) kept.push_back(k);
   }
-  return columns(Eigen::all, kept);
+  return kept;
 }
 
 Finding outlier(const Accepted& one) {
@@ -91,8 +91,8 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
   const MatrixXd columns = background_columns(problem, found.unnamed);
   const Background all(columns);
   const Estimated estimated{all.estimate(problem.residual()), all.covariance()};
-  const Folds folds(problem);
-  const VectorXd held_out = folds.held_out_residual(problem.residual(), columns);
+  const Folds folds(problem, columns);
+  const VectorXd held_out = folds.held_out_residual(problem.residual());
   std::vector<Finding> findings;
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) {
@@ -106,15 +106,14 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
     const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
     const VectorXd effect = effect_of_source(problem, one.in_model);
-    const Background rest(without_columns(columns, places));
     finding.effect_rms = problem.position_rms(effect);
-    finding.strength = effect.dot(rest.project(effect).col(0));
+    finding.strength = own_estimate(problem, one.in_model, estimated.change, estimated.covariance).strength();
     finding.p_value = one.p_value;
     finding.naming_frequency = one.naming_frequency;
     finding.could_also_be = one.could_also_be;
     finding.held_out_after = figures_of(problem.positions(held_out));
-    finding.held_out_before =
-        figures_of(problem.positions(folds.held_out_residual(problem.residual() + effect, rest.columns())));
+    finding.held_out_before = figures_of(
+        problem.positions(folds.held_out_residual(problem.residual() + effect, all_but(columns.cols(), places))));
     finding.held_out_gain = finding.held_out_before.rms - finding.held_out_after.rms;
     finding.action = action_for(one.cause, !one.could_also_be.empty());
     findings.push_back(std::move(finding));
@@ -124,7 +123,7 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
 
 HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {
   const auto of = [](const LinearProblem& problem, const MatrixXd& columns) {
-    return figures_of(problem.positions(Folds(problem).held_out_residual(problem.residual(), columns)));
+    return figures_of(problem.positions(Folds(problem, columns).held_out_residual(problem.residual())));
   };
   return {of(before, before.nuisance()), of(after, after.nuisance())};
 }

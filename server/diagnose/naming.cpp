@@ -16,6 +16,7 @@ constexpr double kRivalFrequency = 0.03;
 constexpr double kMargin = 3;           // nat: odds of 20 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
 constexpr double kRelated = 0.4;        // the same of 0.63
+constexpr double kTouches = 0.1;        // less is a coincidence
 constexpr double kAsGood = 6;           // of strength
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kAtOnce = 0.05;        // of the poses
@@ -47,6 +48,9 @@ bool is_whole_of(const Cause& whole, const Cause& step) {
 }
 
 bool is_description_of(const Cause& general, const Cause& special) {
+  const bool of_links = special.cause == "geometry" || special.cause == "compliance";
+  if (general.cause == special.cause && of_links && !general.parameter.empty() && !special.parameter.empty())
+    return general.parameter == special.parameter;
   if (general.cause == special.cause) return general.joint == special.joint || general.joint < 0 || special.joint < 0;
   if (special.cause == "geometry" && general.cause == "joint_map")
     return special.parameter == fmt::format("q{}", general.joint + 1);
@@ -88,7 +92,8 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     // Another cause may be there as well: only what makes much of this effect is a rival for it.
     const bool related = of_effect.strength > kRelated * whole;
     const bool as_likely = related && seen.score[place] - seen.score[f] < kMargin;
-    const bool wins = naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency;
+    const bool wins =
+        naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency && of_effect.strength > kTouches * whole;
     if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
   }
   return naming;

@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 8;
-constexpr double kSettled = 0.02;  // standard deviations, together
+constexpr int kMostSteps = 5;
+constexpr double kSettled = 0.05;  // standard deviations, together
 
 /// How far each parameter stands from its prior, in units of it.
 VectorXd from_prior(const PriorModel& at) {

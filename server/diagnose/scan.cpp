@@ -13,7 +13,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kTail = 0.1;  // share of the draws that its tail is fitted to
-constexpr double kChance = 0.01;
+constexpr double kChance =
+    0.003;  // of a false alarm a scan: a diagnosis scans at least twice, and 1 % is for all of it
 
 double quantile(const VectorXd& ascending, double share) {
   const double place = share * static_cast<double>(ascending.size() - 1);
@@ -43,6 +44,11 @@ Tail tail_of(const VectorXd& ascending) {
 double Chance::penalty_of(const Family& family) const {
   const auto known = penalty.find(family.label());
   return known == penalty.end() ? family.surprise() : known->second;
+}
+
+double Chance::limit_at(double share) const {
+  const Tail tail = tail_of(null_score);
+  return tail.threshold + tail.scale * std::log(kTail / share);
 }
 
 double Chance::p_value(double score) const {
@@ -82,8 +88,7 @@ Chance chance_of(const std::vector<FamilyPtr>& families, const Background& backg
     }
   }
   std::sort(chance.null_score.begin(), chance.null_score.end());
-  const Tail tail = tail_of(chance.null_score);
-  chance.limit = tail.threshold + tail.scale * std::log(kTail / kChance);
+  chance.limit = chance.limit_at(kChance);
   return chance;
 }
 

@@ -16,9 +16,11 @@ struct Chance {
   std::map<std::string, double> penalty;  ///< nat, by label: what a family reaches by chance (it may search far), and
                                           ///< how little it is to be expected
   Eigen::VectorXd null_score;             ///< the best score of all families in each draw, ascending
-  double limit = 0;                       ///< nat: score that the best of all reaches in 1 of 100 batches
+  double limit = 0;                       ///< nat: score that the best of all reaches in 3 of 1000 batches
 
   [[nodiscard]] double penalty_of(const Family& family) const;
+  /// nat: score that the best of all reaches with nothing there in `share` of all batches (below a tenth).
+  [[nodiscard]] double limit_at(double share) const;
   /// Chance that the best of all reaches a score with nothing there; beyond the draws by their exponential tail.
   [[nodiscard]] double p_value(double score) const;
 };

@@ -16,8 +16,9 @@ using Eigen::VectorXd;
 
 constexpr int kMostSteps = 40;          // forward and backward
 constexpr double kMostOutliers = 0.1;   // of the poses
-constexpr double kBeyondDoubt = 12;     // times the line: there no fold can disagree
+constexpr double kBeyondDoubt = 6;      // times the line: there no fold can disagree
 constexpr double kTellingColumn = 0.1;  // sigmas over all rows, that a function's share may at most be left out with
+constexpr double kUnnamedMargin = 2;    // nat, by which no name must be better than a name
 constexpr double kContender = 0.3;      // of the best score, to be among those that folds choose from
 constexpr double kSimplerMargin = 5;    // nat
 constexpr int kPathLength = 3;          // named causes that together may beat one anonymous function
@@ -63,7 +64,9 @@ class Search {
     if (!best || seen.score[*best] < chance_.limit) return false;
     auto named = seen.strongest([&](std::size_t f) { return open(f) && families[f]->named(); });
     if (named) named = simplest(families, seen, *named, open);
-    if (!families[*best]->named()) {
+    const bool unnamed_wins =
+        !families[*best]->named() && (!named || seen.score[*best] > seen.score[*named] + kUnnamedMargin);
+    if (unnamed_wins) {
       const bool path = named && named_path_score(families, columns, problem.residual(), open) >= seen.score[*best];
       if (!path) return take_unnamed(problem, *families[*best], seen, *best);
     }
@@ -73,10 +76,12 @@ class Search {
   /// Drops what does not pass any more beside all the rest.
   Result<bool> prune() {
     const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-    const MatrixXd columns = background_columns(problem, result_.unnamed);
+    const Background all(background_columns(problem, result_.unnamed));
+    const VectorXd change = all.estimate(problem.residual());
+    const MatrixXd covariance = all.covariance();
     for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
       if (result_.accepted[k].source.empty()) continue;
-      const double score = remaining_score(problem, columns, result_.accepted[k]);
+      const double score = remaining_score(problem, change, covariance, result_.accepted[k]);
       if (score >= chance_.limit) continue;
       closed_.push_back(result_.accepted[k].cause);
       remove_from(result_.after, result_.accepted[k].in_model);
@@ -230,7 +235,7 @@ class Search {
         return families[f]->named() && families[f]->predicts() && open(f) &&
                seen.score[f] > kContender * seen.score[place];
       };
-      const auto gain = Folds(problem).gain_of_selection(problem.residual(), columns, families, chance_, contends);
+      const auto gain = Folds(problem, columns).gain_of_selection(problem.residual(), families, chance_, contends);
       if (!(gain.after < gain.before)) {
         closed_.push_back(family.cause(best));
         return true;
@@ -278,22 +283,12 @@ class Search {
     return true;
   }
 
-  double remaining_score(const LinearProblem& problem, const MatrixXd& columns, const Accepted& one) const {
-    std::vector<Index> own, others;
-    Index next = 0;
-    for (const ErrorSourcePtr& source : problem.model().sources) {
-      for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next)
-        (source->name() == one.in_model ? own : others).push_back(next);
-    }
-    for (; next < columns.cols(); ++next) others.push_back(next);
-    const Background rest(columns(Eigen::all, others));
-    const VectorXd effect = effect_of_source(problem, one.in_model);
-    const VectorXd projected = rest.project(problem.residual() + effect);
-    const MatrixXd C = columns(Eigen::all, own);
-    const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());
-    const VectorXd right = C.transpose() * projected;
-    const double strength = right.dot(information.llt().solve(right));
-    return log_evidence(strength, std::min<double>(one.best.freedom, static_cast<double>(own.size()))) - one.penalty;
+  /// nat: of a finding beside all the rest, from the joint estimate of everything.
+  double remaining_score(const LinearProblem& problem, const VectorXd& change, const MatrixXd& covariance,
+                         const Accepted& one) const {
+    const OwnEstimate own = own_estimate(problem, one.in_model, change, covariance);
+    return log_evidence(own.strength(), std::min<double>(one.best.freedom, static_cast<double>(own.size.size()))) -
+           one.penalty;
   }
 
   Result<bool> prune_unnamed(const LinearProblem& problem) {

@@ -38,7 +38,7 @@ struct SearchResult {
 };
 
 /// Forward selection, one cause at a time, each on what the model found so far leaves over: the best candidate is
-/// accepted if it passes the line that the best of all candidates reaches by chance in 1 of 100 batches and, chosen
+/// accepted if it passes the line that the best of all candidates reaches by chance in 3 of 1000 batches and, chosen
 /// anew in every fold, lowers the error of poses held out. An anonymous function that explains more than any named
 /// cause becomes part of the background. At the end everything must still pass beside all the rest.
 [[nodiscard]] Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell,
