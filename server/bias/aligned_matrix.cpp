@@ -26,6 +26,12 @@ AlignedMatrix::AlignedMatrix(Eigen::Index rows, Eigen::Index cols) : rows_(rows)
   std::memset(data, 0, bytes);
 }
 
+AlignedMatrix AlignedMatrix::copy() const {
+  AlignedMatrix copy(rows_, cols_);
+  copy.map() = map();
+  return copy;
+}
+
 void AlignedMatrix::Release::operator()(double* data) const { std::free(data); }
 
 }  // namespace trammel

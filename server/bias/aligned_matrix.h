@@ -12,6 +12,7 @@ class AlignedMatrix {
   AlignedMatrix() = default;
   AlignedMatrix(Eigen::Index rows, Eigen::Index cols);
 
+  [[nodiscard]] AlignedMatrix copy() const;
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
   [[nodiscard]] Eigen::Index cols() const { return cols_; }
   [[nodiscard]] double* data() { return data_.get(); }

@@ -251,7 +251,7 @@ std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q) const {
   const MatrixXd mean_B = mean_all_B(q);
   for (Index d = 0; d < kOutputs; ++d) {
     const GaussianProcess& output = fitted_->outputs[static_cast<std::size_t>(d)];
-    const std::vector<GaussianProcess::Variance> variance = output.variance(q);
+    const std::vector<PosteriorVariance> variance = output.variance(q);
     for (std::size_t i = 0; i < predictions.size(); ++i) {
       BiasPrediction& prediction = predictions[i];
       prediction.mean_B[d] = mean_B(static_cast<Index>(i), d);
