@@ -25,6 +25,7 @@ constexpr double kLogRatioMin = -20.0;  // below it thousands of smooth points a
 // Of the compressed variance: what may stay unexplained at any of the data, relative to the noise; where it pays.
 constexpr double kUnexplained = 1e-3;
 constexpr double kMostKept = 0.75;
+constexpr Index kMostPoints = 2000;
 constexpr Index kFewestToCompress = 200;
 
 const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
@@ -192,8 +193,7 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
   gp.inverse_diagonal_.resize(n);  // of M⁻¹ = L⁻ᵀ L⁻¹
   for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
-  gp.exact_ = VarianceTable(gp.features_.copy(), n, matrix);
-  matrix = {};
+  gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
   gp.finish(form);
   return gp;
 }
@@ -211,7 +211,7 @@ void GaussianProcess::finish(VarianceForm form) {
 
 void GaussianProcess::compress() {
   if (size_ < kFewestToCompress) return;
-  const auto most = static_cast<Index>(kMostKept * static_cast<double>(size_));
+  const Index most = std::min(kMostPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
   const double tolerance = kUnexplained * noise_.minCoeff();
   const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
   if (static_cast<Index>(points.size()) == most) return;

@@ -19,7 +19,7 @@ constexpr double kStartShare = 0.125;  // of all,
 constexpr Index kCarryPoints = 300;    // at most
 constexpr double kCarryShare = 0.45;
 constexpr Index kCurvaturePoints = 1000;  // most for which the curvature is differenced
-constexpr Index kLarge = 3000;            // above it an evaluation costs more than the last nat is worth
+constexpr Index kMostPoints = 2500;       // the rest would cost more than the last nats are worth
 constexpr std::size_t kCarried = 5;
 constexpr std::size_t kRivals = 3;         // of one output, on all points
 constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
@@ -78,6 +78,10 @@ class Search {
   }
 
   std::optional<SearchResult> run() {
+    if (!options_.last.empty()) {
+      for (Index d = 0; d < data_.y.cols() && !result_.given_up; ++d) refit(d);
+      return result_;
+    }
     std::vector<Optimum> shared = from_many_starts();
     if (result_.given_up) return result_;
     if (shared.empty()) return std::nullopt;
@@ -114,7 +118,7 @@ class Search {
     return std::min(all(), std::clamp(share, kStartPoints, kCarryPoints));
   }
 
-  Index all() const { return data_.q.rows(); }
+  Index all() const { return std::min(data_.q.rows(), kMostPoints); }
 
   ProfiledLikelihood likelihood(Index count, Index first_output, Index outputs) const {
     return {kernel_, subset(data_, order_, count, first_output, outputs), prior_};
@@ -167,6 +171,32 @@ class Search {
     return different(std::move(honest), kCarried);
   }
 
+  // From where the last fit ended. What it was is kept where it is no longer defined.
+  void refit(Index d) {
+    const GpHyperparameters& last = options_.last[static_cast<std::size_t>(d)];
+    ProfiledLikelihood middle = likelihood(std::min(all(), kCurvaturePoints), d, 1);
+    ProfiledLikelihood whole = likelihood(all(), d, 1);
+    VectorXd start(last.kernel.size() + 1);
+    start << last.kernel, 2.0 * (last.log_noise_stddev - last.log_signal_stddev);
+    Optimum now = searched(&middle, start, {.max_evaluations = 1});
+    GpHyperparameters next = last;
+    if (now.defined) {
+      use_curvature(&middle, 1.0 / std::pow(prior_.parameter_spread, 2), &now);
+      const double grown = static_cast<double>(middle.size()) / static_cast<double>(whole.size());
+      now = counted(improved(&whole, start, grown * now.inverse_hessian, {.max_evaluations = 12, .tolerance = 0.02}),
+                    whole);
+      if (now.defined) next = hyperparameters_at(now);
+    }
+    result_.outputs.push_back(next);
+    report(static_cast<double>(d + 1) / static_cast<double>(data_.y.cols()));
+  }
+
+  static GpHyperparameters hyperparameters_at(const Optimum& optimum) {
+    const Index count = optimum.x.size() - 1;
+    const double log_signal = 0.5 * std::log(optimum.signal_variance[0]);
+    return {optimum.x.head(count), log_signal, log_signal + 0.5 * optimum.x[count]};
+  }
+
   struct Stage {
     Index points;
     BfgsOptions options;
@@ -178,17 +208,16 @@ class Search {
   std::vector<Stage> stages() const {
     const Index share = static_cast<Index>(kCarryShare * static_cast<double>(all()));
     const Index middle = std::clamp(share, kCarryPoints, kCurvaturePoints);
-    const bool large = all() > kLarge;
     std::vector<Stage> stages = {{std::min(all(), kCarryPoints),
                                   {.max_evaluations = 40, .tolerance = all() > kCarryPoints ? 0.02 : 0.002},
                                   kCarried,
                                   false}};
     if (all() > kCarryPoints) {
-      const std::size_t rivals = large ? 1 : kRivals;
+      const std::size_t rivals = all() < kMostPoints ? kRivals : 1;
       stages.push_back({std::min(all(), middle), {.max_evaluations = 15, .tolerance = 0.02}, rivals, true});
     }
-    if (large) stages.push_back({share, {.max_evaluations = 6, .tolerance = 0.1}, 1, false});
-    if (all() > middle) stages.push_back({all(), {.max_evaluations = large ? 1 : 12, .tolerance = 0.02}, 1, false});
+    if (all() > middle)
+      stages.push_back({all(), {.max_evaluations = all() < kMostPoints ? 12 : 4, .tolerance = 0.02}, 1, false});
     return stages;
   }
 
@@ -221,10 +250,7 @@ class Search {
                        outputs);
     }
     report(0.4 + 0.6 * static_cast<double>(d + 1) / outputs);
-    const Optimum& best = rivals.front();
-    const Index count = best.x.size() - 1;
-    const double log_signal = 0.5 * std::log(best.signal_variance[0]);
-    result_.outputs.push_back({best.x.head(count), log_signal, log_signal + 0.5 * best.x[count]});
+    result_.outputs.push_back(hyperparameters_at(rivals.front()));
   }
 
   std::shared_ptr<const Kernel> kernel_;

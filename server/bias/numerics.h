@@ -21,6 +21,7 @@ constexpr std::ptrdiff_t kTargetBlock = 8;
 
 struct Numerics {
   const char* name;
+  std::ptrdiff_t packed_rows;  ///< rows that the packed form holds together
 
   /// doubles of scratch that `sweep` and `inverse_root` need for `rows` = n + extra.
   std::ptrdiff_t (*work_size)(std::ptrdiff_t rows);
@@ -44,7 +45,8 @@ struct Numerics {
 
   /// Length of the packed form of a lower triangle of n rows.
   std::ptrdiff_t (*packed_size)(std::ptrdiff_t n);
-  void (*pack_lower)(std::ptrdiff_t n, const double* a, std::ptrdiff_t ld, double* packed);
+  /// Packs `packed_rows` rows from `first`, a multiple of them, to packed_size(first) and on of the whole.
+  void (*pack_lower)(std::ptrdiff_t n, std::ptrdiff_t first, const double* a, std::ptrdiff_t ld, double* packed);
   /// From and to a triangle stored row after row, n (n + 1) / 2 doubles.
   void (*pack_triangle)(std::ptrdiff_t n, const double* triangle, double* packed);
   void (*unpack_triangle)(std::ptrdiff_t n, const double* packed, double* triangle);

@@ -536,11 +536,9 @@ Index packed_size(Index n) {
   return total;
 }
 
-void pack_lower(Index n, const double* a, Index ld, double* packed) {
-  for (Index i = 0; i < n; i += kTileRows) {
-    for (Index k = 0; k < least(n, i + kTileRows); ++k, packed += kTileRows) {
-      for (Index r = 0; r < kTileRows; ++r) packed[r] = i + r < n && i + r >= k ? a[i + r + k * ld] : 0.0;
-    }
+void pack_lower(Index n, Index first, const double* a, Index ld, double* packed) {
+  for (Index k = 0; k < least(n, first + kTileRows); ++k, packed += kTileRows) {
+    for (Index r = 0; r < kTileRows; ++r) packed[r] = first + r < n && first + r >= k ? a[first + r + k * ld] : 0.0;
   }
 }
 
@@ -605,10 +603,10 @@ void square_norms(Index n, const double* packed, Index count, const double* k, d
 }  // namespace
 
 const Numerics& TRAMMEL_NUMERICS_BUILD() {
-  static const Numerics build = {TRAMMEL_NUMERICS_NAME, work_size,           sweep,        inverse_root,
-                                 multiply_work_size,    multiply_transposed, packed_size,  pack_lower,
-                                 pack_triangle,         unpack_triangle,     square_norms, radial_tile,
-                                 radial_gradient,       radial_weighted_sum, weight_column};
+  static const Numerics build = {
+      TRAMMEL_NUMERICS_NAME, kTileRows,       work_size,           sweep,         inverse_root,    multiply_work_size,
+      multiply_transposed,   packed_size,     pack_lower,          pack_triangle, unpack_triangle, square_norms,
+      radial_tile,           radial_gradient, radial_weighted_sum, weight_column};
   return build;
 }
 

@@ -9,9 +9,15 @@ namespace trammel {
 
 using Eigen::Index;
 
-VarianceTable::VarianceTable(AlignedMatrix features, Index size, const AlignedMatrix& root)
+// From the last rows up: columns to the right of a row are not needed above it, so that never more than one triangle
+// and one matrix are there.
+VarianceTable::VarianceTable(AlignedMatrix features, Index size, AlignedMatrix root)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
-  numerics().pack_lower(size, root.data(), root.rows(), packed_root_.data());
+  const Numerics& n = numerics();
+  for (Index first = (size - 1) / n.packed_rows * n.packed_rows; first >= 0; first -= n.packed_rows) {
+    n.pack_lower(size, first, root.data(), root.rows(), packed_root_.data() + n.packed_size(first));
+    root.forget_columns_from(first);
+  }
 }
 
 VarianceTable::VarianceTable(AlignedMatrix features, Index size, const std::vector<double>& rows)

@@ -19,7 +19,7 @@ class VarianceTable {
  public:
   VarianceTable() = default;
   /// `features` of `size` points, padded; `root` holds G in its lower triangle.
-  VarianceTable(AlignedMatrix features, Eigen::Index size, const AlignedMatrix& root);
+  VarianceTable(AlignedMatrix features, Eigen::Index size, AlignedMatrix root);
 
   /// posterior / prior share of each row of `targets` (features), and k(x, x) in `prior`. Both targets.rows long.
   void shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets, double* posterior,

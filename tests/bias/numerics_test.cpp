@@ -71,7 +71,8 @@ TEST_P(EveryBuild, InverseRootIsTheInverseOfTheCholeskyFactor) {
     EXPECT_LT((m * a.row(n).head(n).transpose() + y).norm(), 1e-8) << n;
 
     std::vector<double> packed(static_cast<std::size_t>(build().packed_size(n)));
-    build().pack_lower(n, a.data(), a.rows(), packed.data());
+    for (Index first = 0; first < n; first += build().packed_rows)
+      build().pack_lower(n, first, a.data(), a.rows(), packed.data() + build().packed_size(first));
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k = random_joints(n, 45, kTargetBlock);
     double norms[kTargetBlock];
     build().square_norms(n, packed.data(), kTargetBlock, k.data(), norms);
