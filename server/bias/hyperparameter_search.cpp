@@ -25,6 +25,7 @@ constexpr std::size_t kRivals = 3;         // of one output, on all points
 constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
 constexpr double kUnexplainedNoise = 1.4;  // in logs, above metrology's
 constexpr Index kFinerPoints = 400;
+constexpr double kParameterSpread = 10.0;  // in logs: holds an idle joint's length scale without costing it 0.1 nat
 constexpr double kWorseLeaveOneOut = 1.1;
 
 // The standard library leaves its distributions and shuffles to the implementation; these give the same model anywhere.
@@ -75,6 +76,7 @@ class Search {
     order_ = shuffled(data.q.rows(), &random_);
     prior_.noise_stddev = metrology_stddev;
     prior_.parameter_centre = 0.5 * (box_.low + box_.high);
+    prior_.parameter_spread = kParameterSpread;
   }
 
   std::optional<SearchResult> run() {

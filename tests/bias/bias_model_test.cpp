@@ -169,7 +169,7 @@ TEST(BiasModel, RefitsFromWhereItWasInAFewEvaluations) {
   ASSERT_TRUE(refitted.has_value());
   const BiasModel from_scratch = fit(all);
   EXPECT_NEAR(refitted->report().log_likelihood.sum(), from_scratch.report().log_likelihood.sum(), 0.5) << "nat";
-  EXPECT_LT(refitted->report().evaluations, from_scratch.report().evaluations);
+  EXPECT_LE(refitted->report().evaluations, 15) << "five an output";
 }
 
 TEST(BiasModel, RestoresBitForBit) {
