@@ -25,7 +25,7 @@ constexpr std::size_t kRivals = 3;         // of one output, on all points
 constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
 constexpr double kUnexplainedNoise = 1.4;  // in logs, above metrology's
 constexpr Index kFinerPoints = 400;
-constexpr double kParameterSpread = 10.0;  // in logs: holds an idle joint's length scale without costing it 0.1 nat
+constexpr double kWideSpread = 10.0;  // in logs, of the prior on kernel parameters
 constexpr double kWorseLeaveOneOut = 1.1;
 
 // The standard library leaves its distributions and shuffles to the implementation; these give the same model anywhere.
@@ -76,7 +76,6 @@ class Search {
     order_ = shuffled(data.q.rows(), &random_);
     prior_.noise_stddev = metrology_stddev;
     prior_.parameter_centre = 0.5 * (box_.low + box_.high);
-    prior_.parameter_spread = kParameterSpread;
   }
 
   std::optional<SearchResult> run() {
@@ -122,8 +121,11 @@ class Search {
 
   Index all() const { return std::min(data_.q.rows(), kMostPoints); }
 
+  // On few points the prior must lead; on all it must not cost the likelihood 0.1 nat.
   ProfiledLikelihood likelihood(Index count, Index first_output, Index outputs) const {
-    return {kernel_, subset(data_, order_, count, first_output, outputs), prior_};
+    GpPrior prior = prior_;
+    if (count == all()) prior.parameter_spread = kWideSpread;
+    return {kernel_, subset(data_, order_, count, first_output, outputs), prior};
   }
 
   void report(double share) {
