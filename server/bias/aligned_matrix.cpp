@@ -16,16 +16,46 @@ constexpr std::size_t kHugePage = std::size_t{2} << 20U;
 
 AlignedMatrix::AlignedMatrix(Eigen::Index rows, Eigen::Index cols) : rows_(rows), cols_(cols) {
   const std::size_t bytes = static_cast<std::size_t>(rows * cols) * sizeof(double);
-  const std::size_t alignment = bytes >= kHugePage ? kHugePage : kCacheLine;
-  const std::size_t size = (bytes / alignment + 1) * alignment;
-  auto* data = static_cast<double*>(std::aligned_alloc(alignment, size));
-  if (data == nullptr) throw std::bad_alloc();
-  data_.reset(data);
+  if (bytes < kHugePage) {
+    const std::size_t size = (bytes / kCacheLine + 1) * kCacheLine;
+    auto* data = static_cast<double*>(std::aligned_alloc(kCacheLine, size));
+    if (data == nullptr) throw std::bad_alloc();
+    data_ = {data, Release(data, 0)};
+    std::memset(data, 0, bytes);
+    return;
+  }
+  // Pages of the kernel's are zero, and there only once they are touched.
+  const std::size_t size = (bytes / kHugePage + 2) * kHugePage;
+  void* block = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (block == MAP_FAILED) throw std::bad_alloc();
   // Advice: a kernel without huge pages is slower, not wrong.
-  if (bytes >= kHugePage) madvise(data, size, MADV_HUGEPAGE);
-  std::memset(data, 0, bytes);
+  madvise(block, size, MADV_HUGEPAGE);
+  const std::size_t start = reinterpret_cast<std::size_t>(block);
+  auto* data = reinterpret_cast<double*>((start + kHugePage - 1) / kHugePage * kHugePage);
+  data_ = {data, Release(block, size)};
 }
 
-void AlignedMatrix::Release::operator()(double* data) const { std::free(data); }
+void AlignedMatrix::forget_columns_from(Eigen::Index col) {
+  const Release& mapped = data_.get_deleter();
+  if (mapped.size == 0) return;
+  const std::size_t first = reinterpret_cast<std::size_t>(data_.get() + col * rows_);
+  const std::size_t start = (first + kHugePage - 1) / kHugePage * kHugePage;
+  const std::size_t end = reinterpret_cast<std::size_t>(mapped.block) + mapped.size;
+  if (start < end) madvise(reinterpret_cast<void*>(start), end - start, MADV_DONTNEED);
+}
+
+AlignedMatrix AlignedMatrix::copy() const {
+  AlignedMatrix copy(rows_, cols_);
+  copy.map() = map();
+  return copy;
+}
+
+void AlignedMatrix::Release::operator()(double* /*data*/) const {
+  if (size > 0) {
+    munmap(block, size);
+  } else {
+    std::free(block);
+  }
+}
 
 }  // namespace trammel

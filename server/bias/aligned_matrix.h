@@ -12,6 +12,9 @@ class AlignedMatrix {
   AlignedMatrix() = default;
   AlignedMatrix(Eigen::Index rows, Eigen::Index cols);
 
+  [[nodiscard]] AlignedMatrix copy() const;
+  /// Gives the memory of these columns back; what they hold is undefined afterwards.
+  void forget_columns_from(Eigen::Index col);
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
   [[nodiscard]] Eigen::Index cols() const { return cols_; }
   [[nodiscard]] double* data() { return data_.get(); }
@@ -23,7 +26,11 @@ class AlignedMatrix {
 
  private:
   struct Release {
+    Release() : block(nullptr), size(0) {}
+    Release(void* start, std::size_t mapped) : block(start), size(mapped) {}
     void operator()(double* data) const;
+    void* block;
+    std::size_t size;  // of the mapping; 0: from the heap
   };
   [[nodiscard]] std::size_t index(Eigen::Index row, Eigen::Index col) const {
     return static_cast<std::size_t>(row + col * rows_);

@@ -65,6 +65,7 @@ BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, co
     std::swap(here, there);
   }
   result.value = here.value;
+  result.gradient = here.gradient;
   return result;
 }
 

@@ -22,9 +22,11 @@ struct BfgsOptions {
 struct BfgsResult {
   Eigen::VectorXd x;
   double value = 0;
+  Eigen::VectorXd gradient;
   Eigen::MatrixXd inverse_hessian;  ///< the approximation at x
   int evaluations = 0;
-  bool defined = false;    ///< false when the function was not defined at the start; nothing else is then set
+  bool defined = false;    ///< false when the function was not defined at the
+                           ///< start; nothing else is then set
   bool converged = false;  ///< the tolerance was met within the evaluations allowed
 };
 

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "server/base/units.h"
-#include "server/bias/gaussian_process.h"
 #include "server/bias/hyperparameter_search.h"
+#include "server/bias/local_experts.h"
 
 namespace trammel {
 namespace {
@@ -106,8 +106,8 @@ GpHyperparameters from_column(const VectorXd& column) {
 struct BiasModel::Fitted {
   BiasState state;
   BiasFitReport report;
-  std::vector<GaussianProcess> outputs;  // empty for `none`
-  Vector3 stddev = Vector3::Zero();      // of the residual itself: all that `none` knows
+  std::vector<LocalExperts> outputs;  // empty for `none`
+  Vector3 stddev = Vector3::Zero();   // of the residual itself: all that `none` knows
 
   static Result<std::shared_ptr<Fitted>> from(const BiasState& state);
   MatrixXd leave_one_out_mean_B() const;
@@ -117,10 +117,10 @@ namespace {
 
 double row_rms(const MatrixXd& rows) { return std::sqrt(rows.squaredNorm() / static_cast<double>(rows.rows())); }
 
-BiasFitReport report_of(const std::vector<GaussianProcess>& outputs, const MatrixXd& leave_one_out_error) {
+BiasFitReport report_of(const std::vector<LocalExperts>& outputs, const MatrixXd& leave_one_out_error) {
   BiasFitReport report;
   for (Index d = 0; d < kOutputs; ++d) {
-    const GaussianProcess& output = outputs[static_cast<std::size_t>(d)];
+    const LocalExperts& output = outputs[static_cast<std::size_t>(d)];
     report.log_likelihood[d] = output.log_likelihood();
     report.noise_stddev[d] = std::sqrt(output.noise_variance());
   }
@@ -168,7 +168,7 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   const VectorXd shape = noise_shape(state.sigma);
   for (Index d = 0; d < kOutputs; ++d) {
     const VectorXd y = state.residual_B.col(d).array() - state.offset[d];
-    auto output = GaussianProcess::condition(*kernel, state.q, y, shape, from_column(state.hyperparameters.col(d)));
+    auto output = LocalExperts::condition(*kernel, state.q, y, shape, from_column(state.hyperparameters.col(d)));
     if (!output)
       return refused("bias output {}: the covariance of {} observations is not positive definite", kAxis[d], y.size());
     fitted->outputs.push_back(*std::move(output));
@@ -191,6 +191,17 @@ Result<BiasModel> BiasModel::restore(const BiasState& state) {
 }
 
 Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& options) {
+  return fit_from(problem, options, nullptr);
+}
+
+Result<BiasModel> BiasModel::refit(const BiasOptions& options) const {
+  const BiasState& state = fitted_->state;
+  BiasOptions same_kernel = options;
+  same_kernel.kernel = state.kernel;
+  return fit_from({state.q, state.residual_B, state.sigma}, same_kernel, &state);
+}
+
+Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOptions& options, const BiasState* last) {
   if (const Status fine = check(problem.q, problem.residual_B, problem.sigma); !fine)
     return tl::make_unexpected(fine.error());
   BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kOutputs), {}};
@@ -207,8 +218,12 @@ Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& 
   const SearchBox box = (*kernel)->search_box(problem.q);
   const GpHyperparameters idle = silent(0.5 * (box.low + box.high), metrology_stddev);
   if (!speaking.empty()) {
+    SearchOptions search{options.starts, options.seed, options.progress, {}};
+    for (const Index d : speaking) {
+      if (last != nullptr) search.last.push_back(from_column(last->hyperparameters.col(d)));
+    }
     auto searched = search_hyperparameters(*kernel, {problem.q, y(Eigen::all, speaking), noise_shape(problem.sigma)},
-                                           metrology_stddev, {options.starts, options.seed, options.progress});
+                                           metrology_stddev, search);
     if (!searched)
       return refused("bias fit: no start of {} gave a positive definite covariance of {} observations", options.starts,
                      problem.q.rows());
@@ -225,6 +240,72 @@ Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& 
   (*fitted)->report.starts_at_best = found.starts_at_best;
   (*fitted)->report.evaluations = found.evaluations;
   return BiasModel(*fitted);
+}
+
+Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
+  const BiasState& old = fitted_->state;
+  if (more.q.cols() != old.q.cols())
+    return refused("bias data: {} joints, the model has {}", more.q.cols(), old.q.cols());
+  const Index n = old.q.rows() + more.q.rows();
+  BiasState state = old;
+  state.q.conservativeResize(n, Eigen::NoChange);
+  state.q.bottomRows(more.q.rows()) = more.q;
+  if (more.residual_B.rows() != more.q.rows() || more.residual_B.cols() != kOutputs ||
+      more.sigma.size() != more.q.rows())
+    return refused("bias data: residual or sigma does not have {} rows", more.q.rows());
+  state.residual_B.conservativeResize(n, Eigen::NoChange);
+  state.residual_B.bottomRows(more.q.rows()) = more.residual_B;
+  state.sigma.conservativeResize(n);
+  state.sigma.tail(more.q.rows()) = more.sigma;
+  if (const Status fine = check(state.q, state.residual_B, state.sigma); !fine)
+    return tl::make_unexpected(fine.error());
+  if (fitted_->outputs.empty() || median(clipped(state.sigma)) != median(clipped(old.sigma))) return restore(state);
+
+  const VectorXd shape = noise_shape(state.sigma).tail(more.q.rows());
+  std::vector<LocalExperts> outputs;
+  for (Index d = 0; d < kOutputs; ++d) {
+    auto output = fitted_->outputs[static_cast<std::size_t>(d)].with(
+        more.q, more.residual_B.col(d).array() - state.offset[d], shape);
+    if (!output) return restore(state);
+    outputs.push_back(*std::move(output));
+  }
+  return regrown(std::move(state), std::move(outputs));
+}
+
+Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) const {
+  const BiasState& old = fitted_->state;
+  std::vector<Index> kept;
+  auto gone = observations.begin();
+  for (Index i = 0; i < old.q.rows(); ++i) {
+    if (gone != observations.end() && *gone == i) {
+      ++gone;
+    } else {
+      kept.push_back(i);
+    }
+  }
+  if (gone != observations.end())
+    return refused("bias data: observation {} is not one of {} in rising order", *gone, old.q.rows());
+  BiasState state = old;
+  state.q = old.q(kept, Eigen::all);
+  state.residual_B = old.residual_B(kept, Eigen::all);
+  state.sigma = old.sigma(kept);
+  if (const Status fine = check(state.q, state.residual_B, state.sigma); !fine)
+    return tl::make_unexpected(fine.error());
+  if (fitted_->outputs.empty() || median(clipped(state.sigma)) != median(clipped(old.sigma))) return restore(state);
+
+  std::vector<LocalExperts> outputs;
+  for (const LocalExperts& output : fitted_->outputs) outputs.push_back(output.without(observations));
+  return regrown(std::move(state), std::move(outputs));
+}
+
+Result<BiasModel> BiasModel::regrown(BiasState state, std::vector<LocalExperts> outputs) const {
+  auto fitted = std::make_shared<Fitted>();
+  fitted->state = std::move(state);
+  fitted->outputs = std::move(outputs);
+  fitted->report = report_of(fitted->outputs, fitted->state.residual_B - fitted->leave_one_out_mean_B());
+  fitted->report.starts_at_best = fitted_->report.starts_at_best;
+  fitted->report.evaluations = fitted_->report.evaluations;
+  return BiasModel(std::move(fitted));
 }
 
 Vector3 BiasModel::mean_B(const JointVector& q) const { return mean_all_B(q.transpose()).row(0); }
@@ -250,8 +331,8 @@ std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q) const {
   for (BiasPrediction& prediction : predictions) prediction.prior_share = 0;
   const MatrixXd mean_B = mean_all_B(q);
   for (Index d = 0; d < kOutputs; ++d) {
-    const GaussianProcess& output = fitted_->outputs[static_cast<std::size_t>(d)];
-    const std::vector<GaussianProcess::Variance> variance = output.variance(q);
+    const LocalExperts& output = fitted_->outputs[static_cast<std::size_t>(d)];
+    const std::vector<PosteriorVariance> variance = output.variance(q);
     for (std::size_t i = 0; i < predictions.size(); ++i) {
       BiasPrediction& prediction = predictions[i];
       prediction.mean_B[d] = mean_B(static_cast<Index>(i), d);
@@ -266,7 +347,7 @@ std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q) const {
 VectorXd BiasModel::leave_one_out_prior_share() const {
   if (fitted_->outputs.empty()) return VectorXd::Ones(fitted_->state.q.rows());
   VectorXd share = VectorXd::Zero(fitted_->state.q.rows());
-  for (const GaussianProcess& output : fitted_->outputs) share = share.cwiseMax(output.leave_one_out_share());
+  for (const LocalExperts& output : fitted_->outputs) share = share.cwiseMax(output.leave_one_out_share());
   return share;
 }
 

@@ -13,6 +13,8 @@
 /// What the physics leaves over, learned: joints -> residual of the tool position, with its uncertainty.
 namespace trammel {
 
+class LocalExperts;
+
 /// N observations of the residual measured - calibrated.
 struct BiasProblem {
   Eigen::MatrixXd q;           ///< N x n, rad
@@ -69,6 +71,14 @@ class BiasModel {
   /// differ between AVX2 and AVX-512). Refuses what fit refuses, and hyperparameters of the wrong shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
+  /// More observations with the hyperparameters as they are: N² operations for each where the median sigma stays what
+  /// it was, N³ otherwise. Equal to restoring the longer state, to rounding. Refuses what fit refuses.
+  [[nodiscard]] Result<BiasModel> with(const BiasProblem& more) const;
+  /// Without these observations (rising indices), likewise; refuses to keep fewer than 10.
+  [[nodiscard]] Result<BiasModel> without(const std::vector<Eigen::Index>& observations) const;
+  /// Fitted to its own observations again, from where the last fit ended: a few evaluations, no new starts.
+  [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
+
   [[nodiscard]] BiasPrediction predict(const JointVector& q) const;
   /// The mean alone: what an iteration needs.
   [[nodiscard]] Vector3 mean_B(const JointVector& q) const;
@@ -88,6 +98,9 @@ class BiasModel {
 
  private:
   struct Fitted;
+  [[nodiscard]] static Result<BiasModel> fit_from(const BiasProblem& problem, const BiasOptions& options,
+                                                  const BiasState* last);
+  [[nodiscard]] Result<BiasModel> regrown(BiasState state, std::vector<LocalExperts> outputs) const;
   explicit BiasModel(std::shared_ptr<const Fitted> fitted) : fitted_(std::move(fitted)) {}
   std::shared_ptr<const Fitted> fitted_;
 };

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/bias/inducing_points.h"
 #include "server/bias/numerics.h"
 
 namespace trammel {
@@ -18,8 +19,14 @@ using Eigen::VectorXd;
 constexpr Index kTile = 64;
 constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
 constexpr double kLogParameterMax = 40.0;
-constexpr double kLogRatioMin =
-    -20.0;  // below it thousands of smooth points are no longer positive definite in doubles
+constexpr double kLogRatioMin = -20.0;  // below it thousands of smooth points are no longer positive
+                                        // definite in doubles
+
+// Of the compressed variance: what may stay unexplained at any of the data, relative to the noise; where it pays.
+constexpr double kUnexplained = 1e-3;
+constexpr double kMostKept = 0.75;
+constexpr Index kMostPoints = 2000;
+constexpr Index kFewestToCompress = 200;
 
 const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
 
@@ -163,7 +170,7 @@ double ProfiledLikelihood::leave_one_out_rms() const {
 
 std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const Kernel> kernel, const MatrixXd& q,
                                                           const VectorXd& y, const VectorXd& noise_shape,
-                                                          const GpHyperparameters& hyperparameters) {
+                                                          const GpHyperparameters& hyperparameters, VarianceForm form) {
   const Index n = q.rows();
   GaussianProcess gp;
   gp.kernel_ = std::move(kernel);
@@ -174,33 +181,53 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
   gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
   const double ratio = gp.noise_variance_ / gp.signal_variance_;
+  gp.y_ = y;
+  gp.noise_ = ratio * noise_shape;
 
   AlignedMatrix matrix = augmented_storage(n, 1);
   AlignedMatrix work(numerics().work_size(n + 1), 1);
   assemble_augmented(*gp.kernel_, gp.parameters_, gp.features_, ratio, noise_shape, y, &matrix);
-  VectorXd prior(n);
-  gp.kernel_->diagonal(gp.parameters_, rows_of(gp.features_, 0, n), prior.data());
-  double log_det = 0;
-  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &log_det)) return std::nullopt;
+  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &gp.log_det_)) return std::nullopt;
 
   gp.weights_ = {padded_rows(n), 1};
-  const auto weights = gp.weights_.map().col(0);
   gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
-  gp.root_ = {numerics().packed_size(n), 1};
-  numerics().pack_lower(n, matrix.data(), matrix.rows(), gp.root_.data());
-
-  const auto points = static_cast<double>(n);
-  gp.log_likelihood_ = -0.5 * (y.dot(weights.head(n)) / gp.signal_variance_ + log_det +
-                               points * (std::log(gp.signal_variance_) + kLogTwoPi));
-  gp.leave_one_out_mean_.resize(n);
-  gp.leave_one_out_share_.resize(n);
-  for (Index i = 0; i < n; ++i) {
-    const double inverse_diagonal = matrix.map().col(i).segment(i, n - i).squaredNorm();  // of M⁻¹ = L⁻ᵀ L⁻¹
-    gp.leave_one_out_mean_[i] = y[i] - weights[i] / inverse_diagonal;
-    const double share = (1.0 / inverse_diagonal - ratio * noise_shape[i]) / prior[i];
-    gp.leave_one_out_share_[i] = std::clamp(share, 0.0, 1.0);
-  }
+  gp.inverse_diagonal_.resize(n);  // of M⁻¹ = L⁻ᵀ L⁻¹
+  for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
+  gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
+  gp.finish(form);
   return gp;
+}
+
+void GaussianProcess::finish(VarianceForm form) {
+  const auto weights = weights_.map().col(0).head(size_);
+  log_likelihood_ = -0.5 * (y_.dot(weights) / signal_variance_ + log_det_ +
+                            static_cast<double>(size_) * (std::log(signal_variance_) + kLogTwoPi));
+  VectorXd prior(size_);
+  kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
+  leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
+  leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
+  if (form == VarianceForm::kCompressed) compress();
+}
+
+void GaussianProcess::compress() {
+  if (size_ < kFewestToCompress) return;
+  const Index most = std::min(kMostPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
+  const double tolerance = kUnexplained * noise_.minCoeff();
+  const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
+  if (static_cast<Index>(points.size()) == most) return;
+  auto few = InducingPoints::at(*kernel_, parameters_, features_, points);
+  if (!few) return;
+  const FeatureBlock all = rows_of(features_, 0, size_);
+  few->learn(*kernel_, parameters_, all, noise_, y_);
+  auto posterior = few->posterior();
+  if (!posterior) return;
+  // Widened to the exact variance at the data, D - D² diag(M⁻¹).
+  const VectorXd known = noise_ - noise_.cwiseAbs2().cwiseProduct(inverse_diagonal_);
+  VectorXd share(size_);
+  VectorXd prior(size_);
+  posterior->variance.shares(*kernel_, parameters_, all, share.data(), prior.data());
+  posterior->variance.widen(std::max(1.0, known.cwiseQuotient(share).maxCoeff()));
+  compressed_ = std::move(posterior->variance);
 }
 
 void GaussianProcess::mean(const MatrixXd& q, double* out) const {
@@ -208,27 +235,15 @@ void GaussianProcess::mean(const MatrixXd& q, double* out) const {
   kernel_->weighted_sum(parameters_, rows_of(features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(), out);
 }
 
-std::vector<GaussianProcess::Variance> GaussianProcess::variance(const MatrixXd& q) const {
+std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
-  const Index block = q.rows() == 1 ? 1 : kTargetBlock;
-  const Index ld = padded_rows(size_);
-  AlignedMatrix cross(ld, block);
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> interleaved(size_, block);
+  VectorXd posterior(q.rows());
   VectorXd prior(q.rows());
-  kernel_->diagonal(parameters_, rows_of(targets, 0, q.rows()), prior.data());
-  std::vector<Variance> variances(static_cast<std::size_t>(q.rows()));
-  for (Index first = 0; first < q.rows(); first += block) {
-    const Index count = std::min(block, q.rows() - first);
-    kernel_->tile(parameters_, rows_of(features_, 0, size_), rows_of(targets, first, count), cross.data(), ld);
-    interleaved = cross.map().topRows(size_);
-    double explained[kTargetBlock];
-    numerics().square_norms(size_, root_.data(), block, interleaved.data(), explained);
-    for (Index j = 0; j < count; ++j) {
-      const double prior_variance = signal_variance_ * prior[first + j];
-      const double posterior = std::clamp(prior_variance - signal_variance_ * explained[j], 0.0, prior_variance);
-      variances[static_cast<std::size_t>(first + j)] = {posterior, prior_variance};
-    }
-  }
+  const VarianceTable& table = compressed_ ? *compressed_ : exact_;
+  table.shares(*kernel_, parameters_, rows_of(targets, 0, q.rows()), posterior.data(), prior.data());
+  std::vector<PosteriorVariance> variances(static_cast<std::size_t>(q.rows()));
+  for (Index i = 0; i < q.rows(); ++i)
+    variances[static_cast<std::size_t>(i)] = {signal_variance_ * posterior[i], signal_variance_ * prior[i]};
   return variances;
 }
 

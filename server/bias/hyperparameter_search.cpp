@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "server/bias/optima.h"
+
 namespace trammel {
 namespace {
 
@@ -12,11 +14,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kStartPoints = 150;
-constexpr Index kCarryPoints = 300;
+constexpr Index kStartPoints = 150;    // at least, and where there are many:
+constexpr double kStartShare = 0.125;  // of all,
+constexpr Index kCarryPoints = 300;    // at most
 constexpr double kCarryShare = 0.45;
-constexpr int kCarried = 3;
-constexpr double kSameOptimum = 0.1;  // nat
+constexpr Index kCurvaturePoints = 1000;  // most for which the curvature is differenced
+constexpr Index kMostPoints = 2500;       // the rest would cost more than the last nats are worth
+constexpr std::size_t kCarried = 5;
+constexpr std::size_t kRivals = 3;         // of one output, on all points
+constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
+constexpr double kUnexplainedNoise = 1.4;  // in logs, above metrology's
+constexpr Index kFinerPoints = 400;
+constexpr double kWideSpread = 10.0;  // in logs, of the prior on kernel parameters
 constexpr double kWorseLeaveOneOut = 1.1;
 
 // The standard library leaves its distributions and shuffles to the implementation; these give the same model anywhere.
@@ -70,116 +79,182 @@ class Search {
   }
 
   std::optional<SearchResult> run() {
-    std::vector<Optimum> candidates = from_many_starts();
+    if (!options_.last.empty()) {
+      for (Index d = 0; d < data_.y.cols() && !result_.given_up; ++d) refit(d);
+      return result_;
+    }
+    std::vector<Optimum> shared = from_many_starts();
     if (result_.given_up) return result_;
-    if (candidates.empty()) return std::nullopt;
-    const Optimum shared = best_when_carried(std::move(candidates));
+    if (shared.empty()) return std::nullopt;
+    shared = carried(std::move(shared));
     for (Index d = 0; d < data_.y.cols() && !result_.given_up; ++d) refine(d, shared);
     return result_;
   }
 
  private:
-  struct Optimum : BfgsResult {
-    VectorXd signal_variance;  // of each output at x
-  };
+  // Few points cannot tell a joint's fine influence from noise, so the search on few finds it in no start. Where more
+  // noise is left than metrology knows of, more points are asked once whether shorter length scales explain it.
+  void look_finer(ProfiledLikelihood* likelihood, std::vector<Optimum>* rivals) {
+    const Optimum& best = rivals->front();
+    const double unexplained = log_noise(best) - std::log(prior_.noise_stddev);
+    const bool tried = std::any_of(rivals->begin(), rivals->end(), [&](const Optimum& rival) {
+      return other_kind(rival, best) && log_noise(rival) < log_noise(best);
+    });
+    if (likelihood->size() < kFinerPoints || unexplained < kUnexplainedNoise || tried) return;
+    VectorXd start = best.x;
+    const Index count = box_.low.size();
+    start.head(count) = start.head(count).cwiseMin((box_.low.array() + std::log(2.0)).matrix());
+    start[count] = std::max(start[count] - unexplained, kLeastLogRatio);
+    Optimum finer = counted(searched(likelihood, start, {.max_evaluations = 40, .tolerance = 0.02}), *likelihood);
+    if (finer.defined) rivals->push_back(std::move(finer));
+  }
 
-  Index all() const { return data_.q.rows(); }
+  Optimum counted(Optimum found, const ProfiledLikelihood& likelihood) {
+    if (likelihood.size() == all()) result_.evaluations += found.evaluations;
+    return found;
+  }
 
+  Index start_points() const {
+    const Index share = static_cast<Index>(kStartShare * static_cast<double>(all()));
+    return std::min(all(), std::clamp(share, kStartPoints, kCarryPoints));
+  }
+
+  Index all() const { return std::min(data_.q.rows(), kMostPoints); }
+
+  // On few points the prior must lead; on all it must not cost the likelihood 0.1 nat.
   ProfiledLikelihood likelihood(Index count, Index first_output, Index outputs) const {
-    return {kernel_, subset(data_, order_, count, first_output, outputs), prior_};
+    GpPrior prior = prior_;
+    if (count == all()) prior.parameter_spread = kWideSpread;
+    return {kernel_, subset(data_, order_, count, first_output, outputs), prior};
   }
 
   void report(double share) {
     if (options_.progress && !options_.progress(share)) result_.given_up = true;
   }
 
-  Optimum improve(ProfiledLikelihood* likelihood, const VectorXd& start, const MatrixXd& inverse_hessian,
-                  const BfgsOptions& options) {
-    std::vector<std::pair<VectorXd, VectorXd>> visited;  // the last point tried need not be the one kept
-    const Objective objective = [&](const VectorXd& x, Evaluation* out) {
-      const bool defined = likelihood->evaluate(x, out);
-      if (defined) visited.emplace_back(x, likelihood->signal_variance());
-      return defined;
-    };
-    Optimum found{minimise(objective, start, inverse_hessian, options), {}};
-    if (likelihood->size() == all()) result_.evaluations += found.evaluations;
-    for (const auto& [x, signal_variance] : visited) {
-      if (found.defined && x == found.x) found.signal_variance = signal_variance;
-    }
-    return found;
-  }
-
   // The different optima of the small subset, best first, at most kCarried.
   std::vector<Optimum> from_many_starts() {
-    ProfiledLikelihood small = likelihood(std::min(all(), kStartPoints), 0, data_.y.cols());
+    ProfiledLikelihood small = likelihood(start_points(), 0, data_.y.cols());
     const Index count = box_.low.size();
+    const double least_log_ratio =
+        std::max(std::log(std::pow(prior_.noise_stddev, 2) / data_.y.cwiseAbs2().mean()), kLeastLogRatio);
     std::vector<Optimum> found;
+    double best = HUGE_VAL;
     for (int s = 0; s < std::max(1, options_.starts) && !result_.given_up; ++s) {
       VectorXd start(count + 1);
       for (Index k = 0; k < count; ++k) start[k] = random_.uniform(box_.low[k], box_.high[k]);
-      start[count] = random_.uniform(std::log(1e-4), std::log(1.0));
-      const double curvature = 0.02 * static_cast<double>(small.size());
-      Optimum end = improve(&small, start, MatrixXd::Identity(count + 1, count + 1) / curvature, {});
+      start[count] = random_.uniform(std::min(least_log_ratio, std::log(1e-4)), std::log(1.0));
+      Optimum end = counted(searched(&small, start, {.tolerance = 0.01}), small);
       if (end.defined) found.push_back(std::move(end));
       report(0.3 * (s + 1) / options_.starts);
     }
-    std::stable_sort(found.begin(), found.end(), [](const Optimum& a, const Optimum& b) { return a.value < b.value; });
-    std::vector<Optimum> different;
-    for (Optimum& end : found) {
-      if (end.value < found.front().value + kSameOptimum) ++result_.starts_at_best;
-      const bool known = !different.empty() && end.value - different.back().value < kSameOptimum;
-      if (!known && static_cast<int>(different.size()) < kCarried) different.push_back(end);
-    }
-    return different;
+    for (const Optimum& end : found) best = std::min(best, end.value);
+    for (const Optimum& end : found) result_.starts_at_best += end.value < best + kSameOptimum ? 1 : 0;
+    return different(std::move(found), kCarried);
   }
 
   // By likelihood; one that predicts left-out points clearly worse than another has won by luck and is passed over.
-  Optimum best_when_carried(std::vector<Optimum> candidates) {
+  std::vector<Optimum> carried(std::vector<Optimum> candidates) {
     ProfiledLikelihood medium = likelihood(std::min(all(), kCarryPoints), 0, data_.y.cols());
     std::vector<double> leave_one_out;
     for (Optimum& candidate : candidates) {
-      const double grown = static_cast<double>(std::min(all(), kStartPoints)) / static_cast<double>(medium.size());
-      Optimum carried =
-          improve(&medium, candidate.x, grown * candidate.inverse_hessian, {.max_evaluations = 20, .tolerance = 0.02});
-      if (carried.defined) candidate = std::move(carried);
+      const double grown = static_cast<double>(start_points()) / static_cast<double>(medium.size());
+      Optimum better = counted(
+          improved(&medium, candidate.x, grown * candidate.inverse_hessian, {.max_evaluations = 20, .tolerance = 0.02}),
+          medium);
+      if (better.defined) candidate = std::move(better);
       Evaluation unused;
       leave_one_out.push_back(medium.evaluate(candidate.x, &unused) ? medium.leave_one_out_rms() : HUGE_VAL);
     }
     const double least = *std::min_element(leave_one_out.begin(), leave_one_out.end());
-    std::size_t best = candidates.size();
+    std::vector<Optimum> honest;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      if (leave_one_out[i] > kWorseLeaveOneOut * least) continue;
-      if (best == candidates.size() || candidates[i].value < candidates[best].value) best = i;
+      if (leave_one_out[i] <= kWorseLeaveOneOut * least) honest.push_back(std::move(candidates[i]));
     }
     report(0.4);
-    return candidates[best < candidates.size() ? best : 0];
+    return different(std::move(honest), kCarried);
   }
 
-  // Output d alone, from the shared optimum, over growing subsets.
-  void refine(Index d, const Optimum& shared) {
+  // From where the last fit ended. What it was is kept where it is no longer defined.
+  void refit(Index d) {
+    const GpHyperparameters& last = options_.last[static_cast<std::size_t>(d)];
+    ProfiledLikelihood middle = likelihood(std::min(all(), kCurvaturePoints), d, 1);
+    ProfiledLikelihood whole = likelihood(all(), d, 1);
+    VectorXd start(last.kernel.size() + 1);
+    start << last.kernel, 2.0 * (last.log_noise_stddev - last.log_signal_stddev);
+    Optimum now = searched(&middle, start, {.max_evaluations = 1});
+    GpHyperparameters next = last;
+    if (now.defined) {
+      use_curvature(&middle, 1.0 / std::pow(prior_.parameter_spread, 2), &now);
+      const double grown = static_cast<double>(middle.size()) / static_cast<double>(whole.size());
+      now = counted(improved(&whole, start, grown * now.inverse_hessian, {.max_evaluations = 12, .tolerance = 0.02}),
+                    whole);
+      if (now.defined) next = hyperparameters_at(now);
+    }
+    result_.outputs.push_back(next);
+    report(static_cast<double>(d + 1) / static_cast<double>(data_.y.cols()));
+  }
+
+  static GpHyperparameters hyperparameters_at(const Optimum& optimum) {
+    const Index count = optimum.x.size() - 1;
+    const double log_signal = 0.5 * std::log(optimum.signal_variance[0]);
+    return {optimum.x.head(count), log_signal, log_signal + 0.5 * optimum.x[count]};
+  }
+
+  struct Stage {
+    Index points;
+    BfgsOptions options;
+    std::size_t rivals;  // carried on to the next stage
+    bool curvature;      // differenced at the end, for the next stage
+  };
+
+  // What is cheap is done well, so that a few evaluations on all points are enough.
+  std::vector<Stage> stages() const {
     const Index share = static_cast<Index>(kCarryShare * static_cast<double>(all()));
-    const Index sizes[] = {std::min(all(), kCarryPoints), std::max(share, kCarryPoints), all()};
-    const BfgsOptions limits[] = {{.max_evaluations = 30, .tolerance = 0.02},
-                                  {.max_evaluations = 10, .tolerance = 0.05},
-                                  {.max_evaluations = 3, .tolerance = 0.3}};
+    const Index middle = std::clamp(share, kCarryPoints, kCurvaturePoints);
+    std::vector<Stage> stages = {{std::min(all(), kCarryPoints),
+                                  {.max_evaluations = 40, .tolerance = all() > kCarryPoints ? 0.02 : 0.002},
+                                  kCarried,
+                                  false}};
+    if (all() > kCarryPoints) {
+      const std::size_t rivals = all() < kMostPoints ? kRivals : 1;
+      stages.push_back({std::min(all(), middle), {.max_evaluations = 15, .tolerance = 0.02}, rivals, true});
+    }
+    if (all() > middle)
+      stages.push_back({all(), {.max_evaluations = all() < kMostPoints ? 12 : 4, .tolerance = 0.02}, 1, false});
+    return stages;
+  }
+
+  // Output d alone, from the shared optima, over growing subsets. The last nats decide between optima, so all that may
+  // still win are carried on.
+  void refine(Index d, const std::vector<Optimum>& shared) {
     const auto outputs = static_cast<double>(data_.y.cols());
-    Optimum now = shared;
-    now.inverse_hessian *= outputs;
-    Index previous = sizes[0];
-    now.signal_variance = shared.signal_variance.segment(d, 1);
-    for (int stage = 0; stage < 3 && !result_.given_up; ++stage) {
-      if (stage > 0 && std::min(sizes[stage], all()) == previous) continue;
-      ProfiledLikelihood part = likelihood(std::min(sizes[stage], all()), d, 1);
-      const double grown = static_cast<double>(previous) / static_cast<double>(part.size());
-      Optimum found = improve(&part, now.x, grown * now.inverse_hessian, limits[stage]);
-      previous = part.size();
-      if (found.defined) now = std::move(found);
-      report(0.4 + 0.6 * (static_cast<double>(d) + stage / 3.0) / outputs);
+    std::vector<Optimum> rivals = shared;
+    for (Optimum& rival : rivals) {
+      rival.inverse_hessian *= outputs;
+      rival.signal_variance = rival.signal_variance.segment(d, 1).eval();
+    }
+    Index previous = std::min(all(), kCarryPoints);
+    const std::vector<Stage> all_stages = stages();
+    for (std::size_t s = 0; s < all_stages.size() && !result_.given_up; ++s) {
+      const Stage& stage = all_stages[s];
+      ProfiledLikelihood part = likelihood(stage.points, d, 1);
+      const double grown = static_cast<double>(previous) / static_cast<double>(stage.points);
+      previous = stage.points;
+      for (Optimum& rival : rivals) {
+        Optimum found = counted(improved(&part, rival.x, grown * rival.inverse_hessian, stage.options), part);
+        if (found.defined) rival = std::move(found);
+      }
+      if (stage.points <= kCurvaturePoints) look_finer(&part, &rivals);
+      rivals = different(std::move(rivals), stage.rivals);
+      if (stage.curvature) {
+        for (Optimum& rival : rivals) use_curvature(&part, 1.0 / std::pow(prior_.parameter_spread, 2), &rival);
+      }
+      report(0.4 + 0.6 * (static_cast<double>(d) + static_cast<double>(s) / static_cast<double>(all_stages.size())) /
+                       outputs);
     }
     report(0.4 + 0.6 * static_cast<double>(d + 1) / outputs);
-    const Index count = now.x.size() - 1;
-    const double log_signal = 0.5 * std::log(now.signal_variance[0]);
-    result_.outputs.push_back({now.x.head(count), log_signal, log_signal + 0.5 * now.x[count]});
+    result_.outputs.push_back(hyperparameters_at(rivals.front()));
   }
 
   std::shared_ptr<const Kernel> kernel_;

@@ -21,6 +21,7 @@ constexpr std::ptrdiff_t kTargetBlock = 8;
 
 struct Numerics {
   const char* name;
+  std::ptrdiff_t packed_rows;  ///< rows that the packed form holds together
 
   /// doubles of scratch that `sweep` and `inverse_root` need for `rows` = n + extra.
   std::ptrdiff_t (*work_size)(std::ptrdiff_t rows);
@@ -34,9 +35,21 @@ struct Numerics {
   bool (*inverse_root)(std::ptrdiff_t n, std::ptrdiff_t extra, double* a, std::ptrdiff_t ld, double* work,
                        double* log_det);
 
+  /// doubles of scratch that `multiply_transposed` needs.
+  std::ptrdiff_t (*multiply_work_size)(std::ptrdiff_t rows, std::ptrdiff_t cols);
+  /// c += sign a bᵀ; a is rows x depth, b cols x depth, c rows x cols, all with padded_rows() rows, c with as many
+  /// columns. `lower_only` leaves out tiles above the diagonal of c.
+  void (*multiply_transposed)(std::ptrdiff_t rows, std::ptrdiff_t cols, std::ptrdiff_t depth, double sign,
+                              const double* a, std::ptrdiff_t lda, const double* b, std::ptrdiff_t ldb, bool lower_only,
+                              double* c, std::ptrdiff_t ldc, double* work);
+
   /// Length of the packed form of a lower triangle of n rows.
   std::ptrdiff_t (*packed_size)(std::ptrdiff_t n);
-  void (*pack_lower)(std::ptrdiff_t n, const double* a, std::ptrdiff_t ld, double* packed);
+  /// Packs `packed_rows` rows from `first`, a multiple of them, to packed_size(first) and on of the whole.
+  void (*pack_lower)(std::ptrdiff_t n, std::ptrdiff_t first, const double* a, std::ptrdiff_t ld, double* packed);
+  /// From and to a triangle stored row after row, n (n + 1) / 2 doubles.
+  void (*pack_triangle)(std::ptrdiff_t n, const double* triangle, double* packed);
+  void (*unpack_triangle)(std::ptrdiff_t n, const double* packed, double* triangle);
   /// out[j] = |W k_j|² for the packed lower triangle W; `k` is kTargetBlock columns interleaved
   /// (k[i * kTargetBlock + j]) when count > 1, one plain column when count == 1.
   void (*square_norms)(std::ptrdiff_t n, const double* packed, std::ptrdiff_t count, const double* k, double* out);

@@ -406,7 +406,7 @@ void multiply_block(Index rows, Index size, const double* packed_a, const double
   }
 }
 
-Index block_size(Index n) { return n <= 400 ? 32 : n <= 1000 ? 48 : n <= 1500 ? 64 : 96; }
+Index block_size(Index n) { return n <= 1000 ? 32 : n <= 3000 ? 48 : 96; }
 
 struct Workspace {
   double *panel, *factor, *packed_a, *packed_b;
@@ -510,17 +510,61 @@ bool inverse_root(Index n, Index extra, double* a, Index ld, double* work, doubl
   return true;
 }
 
+Index multiply_work_size(Index rows, Index cols) { return kMaxBlock * (padded_rows(rows) + padded_rows(cols)); }
+
+void multiply_transposed(Index rows, Index cols, Index depth, double sign, const double* a, Index lda, const double* b,
+                         Index ldb, bool lower_only, double* c, Index ldc, double* work) {
+  const Index row_end = round_up(rows, kTileRows);
+  const Index col_end = round_up(cols, kTileColumns);
+  double* packed_a = work;
+  double* packed_b = work + row_end * kMaxBlock;
+  for (Index k = 0; k < depth; k += kMaxBlock) {
+    const Index size = least(kMaxBlock, depth - k);
+    pack_rows(row_end, size, a + k * lda, lda, packed_a);
+    pack_columns_transposed(col_end, size, b + k * ldb, ldb, packed_b);
+    for (Index i = 0; i < row_end; i += kTileRows) {
+      const Index stop = lower_only ? least(col_end, i + kTileRows) : col_end;
+      for (Index j = 0; j < stop; j += kTileColumns)
+        micro_tile<true>(size, packed_a + i * size, packed_b + j * size, sign, c + i + j * ldc, ldc);
+    }
+  }
+}
+
 Index packed_size(Index n) {
   Index total = 0;
   for (Index i = 0; i < n; i += kTileRows) total += kTileRows * least(n, i + kTileRows);
   return total;
 }
 
-void pack_lower(Index n, const double* a, Index ld, double* packed) {
+void pack_lower(Index n, Index first, const double* a, Index ld, double* packed) {
+  for (Index k = 0; k < least(n, first + kTileRows); ++k, packed += kTileRows) {
+    for (Index r = 0; r < kTileRows; ++r) packed[r] = first + r < n && first + r >= k ? a[first + r + k * ld] : 0.0;
+  }
+}
+
+// Row i of a triangle that is stored row after row starts here.
+Index triangle_row(Index i) { return i * (i + 1) / 2; }
+
+void pack_triangle(Index n, const double* triangle, double* packed) {
   for (Index i = 0; i < n; i += kTileRows) {
-    for (Index k = 0; k < least(n, i + kTileRows); ++k, packed += kTileRows) {
-      for (Index r = 0; r < kTileRows; ++r) packed[r] = i + r < n && i + r >= k ? a[i + r + k * ld] : 0.0;
+    const Index depth = least(n, i + kTileRows);
+    for (Index r = 0; r < kTileRows; ++r) {
+      const Index length = i + r < n ? i + r + 1 : 0;
+      const double* row = triangle + triangle_row(i + r);
+      for (Index k = 0; k < length; ++k) packed[k * kTileRows + r] = row[k];
+      for (Index k = length; k < depth; ++k) packed[k * kTileRows + r] = 0.0;
     }
+    packed += depth * kTileRows;
+  }
+}
+
+void unpack_triangle(Index n, const double* packed, double* triangle) {
+  for (Index i = 0; i < n; i += kTileRows) {
+    for (Index r = 0; r < kTileRows && i + r < n; ++r) {
+      double* row = triangle + triangle_row(i + r);
+      for (Index k = 0; k <= i + r; ++k) row[k] = packed[k * kTileRows + r];
+    }
+    packed += least(n, i + kTileRows) * kTileRows;
   }
 }
 
@@ -559,9 +603,10 @@ void square_norms(Index n, const double* packed, Index count, const double* k, d
 }  // namespace
 
 const Numerics& TRAMMEL_NUMERICS_BUILD() {
-  static const Numerics build = {TRAMMEL_NUMERICS_NAME, work_size,           sweep,        inverse_root,
-                                 packed_size,           pack_lower,          square_norms, radial_tile,
-                                 radial_gradient,       radial_weighted_sum, weight_column};
+  static const Numerics build = {
+      TRAMMEL_NUMERICS_NAME, kTileRows,       work_size,           sweep,         inverse_root,    multiply_work_size,
+      multiply_transposed,   packed_size,     pack_lower,          pack_triangle, unpack_triangle, square_norms,
+      radial_tile,           radial_gradient, radial_weighted_sum, weight_column};
   return build;
 }
 

@@ -123,6 +123,55 @@ TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
   }
 }
 
+TEST(BiasModel, GrowsAndShrinksAsIfConditionedAnew) {
+  const BiasProblem all = smooth_problem(230, 30);
+  const BiasModel model = fit({all.q.topRows(200), all.residual_B.topRows(200), all.sigma.head(200)});
+  const auto grown = model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
+  ASSERT_TRUE(grown.has_value());
+  const auto anew = BiasModel::restore(grown->state());
+  ASSERT_TRUE(anew.has_value());
+  std::vector<Index> fresh;
+  for (Index i = 200; i < 230; ++i) fresh.push_back(i);
+  const auto shrunk = grown->without(fresh);
+  ASSERT_TRUE(shrunk.has_value());
+  const Eigen::MatrixXd q = random_joints(20, 31);
+  EXPECT_LT((grown->mean_all_B(q) - anew->mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((shrunk->mean_all_B(q) - model.mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((grown->leave_one_out_mean_B() - anew->leave_one_out_mean_B()).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_GT((grown->mean_all_B(q) - model.mean_all_B(q)).cwiseAbs().maxCoeff(), 1e-7)
+      << "the new poses teach something";
+}
+
+TEST(BiasModel, GrowsToRoundingWhereTheMedianSigmaMoves) {
+  BiasProblem all = smooth_problem(90, 32);
+  for (Index i = 0; i < 90; ++i) all.sigma[i] = 10e-6 * (1.0 + 0.01 * static_cast<double>(i));
+  const BiasModel model = fit({all.q.topRows(80), all.residual_B.topRows(80), all.sigma.head(80)});
+  const auto grown = model.with({all.q.bottomRows(10), all.residual_B.bottomRows(10), all.sigma.tail(10)});
+  ASSERT_TRUE(grown.has_value());
+  expect_same_predictions(*grown, *BiasModel::restore(grown->state()));
+}
+
+TEST(BiasModel, RefusesToGrowOrShrinkIntoWhatItCannotLearnFrom) {
+  const BiasModel model = fit(smooth_problem(12, 33));
+  EXPECT_EQ(model.without({0, 1, 2}).error().message, "bias data: 9 observations, at least 10");
+  EXPECT_EQ(model.without({12}).error().message, "bias data: observation 12 is not one of 12 in rising order");
+  BiasProblem bad = smooth_problem(2, 34);
+  bad.q(1, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(model.with(bad).error().message, "bias data row 14: joint 1 is nan, not finite");
+}
+
+TEST(BiasModel, RefitsFromWhereItWasInAFewEvaluations) {
+  const BiasProblem all = smooth_problem(330, 35);
+  const BiasModel model = fit({all.q.topRows(300), all.residual_B.topRows(300), all.sigma.head(300)});
+  const auto grown = model.with({all.q.bottomRows(30), all.residual_B.bottomRows(30), all.sigma.tail(30)});
+  ASSERT_TRUE(grown.has_value());
+  const auto refitted = grown->refit({});
+  ASSERT_TRUE(refitted.has_value());
+  const BiasModel from_scratch = fit(all);
+  EXPECT_NEAR(refitted->report().log_likelihood.sum(), from_scratch.report().log_likelihood.sum(), 0.5) << "nat";
+  EXPECT_LE(refitted->report().evaluations, 15) << "five an output";
+}
+
 TEST(BiasModel, RestoresBitForBit) {
   const BiasModel model = fit(smooth_problem(120, 8));
   const auto restored = BiasModel::restore(model.state());

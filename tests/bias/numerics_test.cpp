@@ -71,7 +71,8 @@ TEST_P(EveryBuild, InverseRootIsTheInverseOfTheCholeskyFactor) {
     EXPECT_LT((m * a.row(n).head(n).transpose() + y).norm(), 1e-8) << n;
 
     std::vector<double> packed(static_cast<std::size_t>(build().packed_size(n)));
-    build().pack_lower(n, a.data(), a.rows(), packed.data());
+    for (Index first = 0; first < n; first += build().packed_rows)
+      build().pack_lower(n, first, a.data(), a.rows(), packed.data() + build().packed_size(first));
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k = random_joints(n, 45, kTargetBlock);
     double norms[kTargetBlock];
     build().square_norms(n, packed.data(), kTargetBlock, k.data(), norms);
@@ -83,6 +84,67 @@ TEST_P(EveryBuild, InverseRootIsTheInverseOfTheCholeskyFactor) {
       build().square_norms(n, packed.data(), 1, column.data(), &alone);
       EXPECT_NEAR(alone, expected, 1e-9 * expected);
     }
+  }
+}
+
+TEST_P(EveryBuild, MultipliesByATranspose) {
+  struct Size {
+    Index rows, cols, depth;
+  };
+  for (const auto& [rows, cols, depth] : {Size{1, 1, 1}, {24, 8, 96}, {50, 31, 97}, {7, 130, 200}}) {
+    MatrixXd a = MatrixXd::Zero(padded_rows(rows), depth);
+    MatrixXd b = MatrixXd::Zero(padded_rows(cols), depth);
+    MatrixXd c = MatrixXd::Zero(padded_rows(rows), padded_rows(cols));
+    a.topRows(rows) = random_joints(rows, 47, depth);
+    b.topRows(cols) = random_joints(cols, 48, depth);
+    c.topLeftCorner(rows, cols) = random_joints(rows, 49, cols);
+    const MatrixXd expected = c - a * b.transpose();
+    VectorXd work(build().multiply_work_size(rows, cols));
+    build().multiply_transposed(rows, cols, depth, -1.0, a.data(), a.rows(), b.data(), b.rows(), false, c.data(),
+                                c.rows(), work.data());
+    EXPECT_LT((c - expected).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+TEST_P(EveryBuild, MultipliesTheLowerTriangleAlone) {
+  const MatrixXd a = random_joints(72, 50, 60);
+  MatrixXd c = MatrixXd::Zero(72, 72);
+  VectorXd work(build().multiply_work_size(72, 72));
+  build().multiply_transposed(72, 72, 60, 1.0, a.data(), 72, a.data(), 72, true, c.data(), 72, work.data());
+  const MatrixXd difference = (c - a * a.transpose()).triangularView<Eigen::Lower>();
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST_P(EveryBuild, TrianglesSurvivePacking) {
+  for (const Index n : {1, 23, 24, 25, 100}) {
+    const VectorXd triangle = random_joints(n * (n + 1) / 2, 51, 1);
+    VectorXd packed(build().packed_size(n));
+    VectorXd back(triangle.size());
+    build().pack_triangle(n, triangle.data(), packed.data());
+    build().unpack_triangle(n, packed.data(), back.data());
+    EXPECT_EQ(triangle, back) << n;
+  }
+}
+
+// What one processor learns, another predicts with.
+TEST_P(EveryBuild, AgreesWithTheBaselineToRounding) {
+  const Index n = 200;
+  MatrixXd a = MatrixXd::Zero(padded_rows(n), 7);
+  a.topLeftCorner(n, 6) = random_joints(n, 52);
+  a.col(6) = 0.5 * a.leftCols(6).rowwise().squaredNorm();
+  for (const RadialShape shape : {RadialShape::kSquaredExponential, RadialShape::kMatern32, RadialShape::kMatern52}) {
+    const auto inverse_of = [&](const Numerics& numerics) {
+      MatrixXd m = MatrixXd::Zero(padded_rows(n), padded_rows(n));
+      numerics.radial_tile(shape, 6, n, a.data(), a.rows(), n, a.data(), a.rows(), m.data(), m.rows());
+      m.diagonal().head(n).array() += 0.01;
+      m.bottomRows(m.rows() - n).setZero();
+      VectorXd work(numerics.work_size(n));
+      double log_det = 0;
+      EXPECT_TRUE(numerics.sweep(n, 0, m.data(), m.rows(), work.data(), &log_det));
+      return MatrixXd(m.topLeftCorner(n, n).triangularView<Eigen::Lower>());
+    };
+    const MatrixXd expected = inverse_of(numerics_baseline());
+    EXPECT_LT((inverse_of(build()) - expected).norm(), 1e-11 * expected.norm());
   }
 }
 
