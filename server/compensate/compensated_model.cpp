@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/check.h"
+#include "server/compensate/domain.h"
 #include "server/compensate/model_file.h"
 #include "server/robot/inverse_kinematics.h"
 
@@ -11,7 +12,6 @@ namespace trammel {
 
 namespace {
 
-constexpr double kRangeMargin = 0.05;           // of a joint's training range, on either side
 constexpr double kInterval95 = 1.959963984540;  // standard deviations
 constexpr double kRotationTolerance = 1e-7;     // rad, of a corrected target
 
@@ -76,16 +76,13 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     Result<BiasModel> bias = BiasModel::restore(*parts.bias);
     if (!bias) return tl::make_unexpected(bias.error());
     inside->bias = std::move(*bias);
+    const Eigen::MatrixXd& residual_B = parts.bias->residual_B;
+    inside->bias_size_B = (residual_B.colwise().squaredNorm() / static_cast<double>(residual_B.rows())).cwiseSqrt();
   }
   parts.provenance.hash = content_hash(parts);
   parts.provenance.id = parts.provenance.hash.substr(0, 12);
   inside->parts = std::move(parts);
   return CompensatedModel(std::move(inside));
-}
-
-bool CompensatedModel::in_range(const JointVector& q) const {
-  const Eigen::ArrayXd margin = kRangeMargin * (parts().q_max - parts().q_min).array() + 1e-9;
-  return (q.array() >= parts().q_min.array() - margin).all() && (q.array() <= parts().q_max.array() + margin).all();
 }
 
 Status CompensatedModel::check_trained_with(const std::string& tool, const std::string& payload) const {
@@ -105,7 +102,7 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
   context.tool = tool;
   context.payload = payload;
   context.served = true;
-  return predict(context, Domain::kDecide);
+  return predict(context, std::nullopt);
 }
 
 Vector3 CompensatedModel::variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
@@ -134,7 +131,7 @@ Vector3 CompensatedModel::variance_of_unsaid(const PoseContext& context, bool te
   return variance;
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, Domain domain) const {
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optional<double> bias_weight) const {
   PoseContext context = asked;
   if (!context.temperature) context.temperature = parts().temperature_mean;
   const PhysicalModel& physics = parts().physics;
@@ -149,23 +146,23 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, Domain domai
   const double sigma = cell().tracker.sigma;
 
   Vector3 variance = Vector3::Constant(sigma * sigma + parts().discrepancy * parts().discrepancy) + identified;
-  prediction.in_domain = domain == Domain::kInside || (domain == Domain::kDecide && in_range(context.q) &&
-                                                       parts().trained_with.contains({context.tool, context.payload}));
+  const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
+  const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
+  prediction.in_domain = trained_with && domain.in_range(context.q);
   if (inside_->bias) {
     const BiasPrediction bias = inside_->bias->predict(context.q);
-    if (domain == Domain::kDecide) prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
-    if (prediction.in_domain) {
-      prediction.X_BT_predicted.translation() += bias.mean_B;
-      // Noise is never less than the tracker's: a fit to few poses takes some of it for signal. What the parameters
-      // leave uncertain is corrected by the bias as far as the bias knows anything, and counts in full where it does
-      // not.
-      const Vector3 known = bias.stddev_B.cwiseAbs2();
-      const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(sigma * sigma);
-      variance = known + noise + bias.prior_share * identified;
-    } else {
-      // Not used, so all of it may be missing.
-      variance += bias.mean_B.cwiseAbs2() + bias.stddev_B.cwiseAbs2();
-    }
+    prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
+    const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias.prior_share) : 0.0);
+    prediction.bias_weight = weight;
+    prediction.X_BT_predicted.translation() += weight * bias.mean_B;
+    // Noise is never less than the tracker's: a fit to few poses takes some of it for signal. What the parameters
+    // leave uncertain is corrected by the bias as far as the bias knows anything, and counts in full where it does
+    // not. What of the bias is not taken may be missing: as much as it is there, and as it was at the training poses.
+    const Vector3 known = bias.stddev_B.cwiseAbs2();
+    const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(sigma * sigma);
+    const Vector3 untaken = bias.mean_B.cwiseAbs2().cwiseMax(inside_->bias_size_B.cwiseAbs2());
+    variance = weight * (noise + bias.prior_share * identified) + (1 - weight) * variance.cwiseMax(noise + identified) +
+               known + (1 - weight) * (1 - weight) * untaken;
   }
   prediction.stddev_B = (variance + unsaid).cwiseSqrt();
   prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
@@ -200,7 +197,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     else
       joints.status = InverseStatus::kOk;
     joints.q = context.q;
-    result.X_BT_wanted = predict(context, Domain::kOutside).X_BT_nominal;
+    result.X_BT_wanted = predict(context, 0.0).X_BT_nominal;
   } else {
     result.X_BT_wanted = target.X_BT;
     if (target.conf) {
@@ -229,9 +226,10 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   if (joints.status != InverseStatus::kOk) return why(joints.status);
 
   context.q = joints.q;
-  ErrorPrediction prediction = predict(context, Domain::kDecide);
-  // Decided once: a target at the edge must not switch models between steps.
-  const Domain domain = prediction.in_domain ? Domain::kInside : Domain::kOutside;
+  ErrorPrediction prediction = predict(context, std::nullopt);
+  // Decided once, at the target: what the bias is worth there does not change by the little that a correction moves.
+  const bool in_domain = prediction.in_domain;
+  const double bias_weight = prediction.bias_weight;
   result.error_before = (prediction.X_BT_predicted.translation() - result.X_BT_wanted.translation()).norm();
   Vector6 missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
   const auto settled = [&] {
@@ -244,7 +242,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     joints = nominal_joints(result.X_BT_commanded, context.q);
     if (joints.status != InverseStatus::kOk) return why(joints.status);
     context.q = joints.q;
-    prediction = predict(context, domain);
+    prediction = predict(context, bias_weight);
     missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
   }
   result.q = joints.q;
@@ -254,9 +252,11 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return end(CorrectionStatus::kNotConverged,
                fmt::format("{:.2e} mm left after {} iterations", 1e3 * result.error_after, result.iterations));
   }
-  if (domain == Domain::kOutside) {
+  if (!in_domain) {
     return end(CorrectionStatus::kOutOfDomain,
-               "too far from the training poses: corrected by the calibrated model alone");
+               fmt::format("too far from the training poses: corrected by the calibrated model and {:.0f} % of the "
+                           "learned bias",
+                           100 * bias_weight));
   }
   return end(CorrectionStatus::kOk, "");
 }
@@ -277,7 +277,7 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
     PoseContext context = m.context;
     context.served = !own;
     const Vector3 p_B = X_BW * m.p_W;
-    const ErrorPrediction prediction = predict(context, Domain::kDecide);
+    const ErrorPrediction prediction = predict(context, std::nullopt);
     errors.nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
     if (!context.temperature) context.temperature = parts().temperature_mean;
     errors.calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();

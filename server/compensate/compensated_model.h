@@ -36,7 +36,8 @@ struct ErrorPrediction {
   Pose X_BT_predicted;                 ///< where it will be
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
-  bool in_domain = false;              ///< false: error_B is the calibrated model's, without learned bias
+  bool in_domain = false;              ///< false: the learned bias is not, or not fully, in error_B
+  double bias_weight = 0;              ///< how much of the learned bias is, in [0, 1]: 1 in domain, 0 well outside
 };
 
 enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
@@ -137,10 +138,10 @@ class CompensatedModel {
   struct Inside {
     Parts parts;
     std::optional<BiasModel> bias;
+    Vector3 bias_size_B = Vector3::Zero();  // m, rms over the training poses
   };
-  enum class Domain { kDecide, kInside, kOutside };
-  [[nodiscard]] ErrorPrediction predict(const PoseContext& context, Domain domain) const;
-  [[nodiscard]] bool in_range(const JointVector& q) const;
+  /// `bias_weight`: to take instead of what the pose's place in the domain says.
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& context, std::optional<double> bias_weight) const;
   /// Variance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
   /// approached, how warm the arm is.
   [[nodiscard]] Vector3 variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,

@@ -88,7 +88,8 @@ Verdict verdict_of(const Diagnosis& diagnosis) {
 
 /// What is left after the nominal chain, the cell's own sources and each finding in turn; at last the noise.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
-                                        const LinearProblem& after, const std::vector<Finding>& findings) {
+                                        const LinearProblem& after, const std::vector<Finding>& findings,
+                                        double noise) {
   std::vector<WaterfallStep> steps;
   Eigen::Matrix3Xd nominal(3, before.poses());
   for (Index i = 0; i < before.poses(); ++i) {
@@ -104,7 +105,7 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
     if (!finding->source.empty()) square += std::pow(finding->effect_rms, 2);
   }
   steps.insert(steps.end(), tail.rbegin(), tail.rend());
-  steps.push_back({"noise of one measurement", std::sqrt(3.0) * after.noise()});
+  steps.push_back({"noise of one measurement", std::sqrt(3.0) * noise});
   return steps;
 }
 
@@ -130,8 +131,11 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   const std::vector<std::string> candidates = candidate_sources(*cell, found.batch, nullptr);
   const LinearProblem before(found.before.model, found.all, found.before.priors, candidates);
   const LinearProblem after(found.after.model, found.batch, found.after.priors, candidates);
-  const MatrixXd columns = background_columns(after, found.unnamed);
-  const Background all(columns);
+  const Background all(background_columns(after, found.unnamed));
+  // What the extended model leaves when it is fitted by itself, as a training would: nothing unnamed beside it.
+  PriorModel extended = found.after;
+  if (!found.unnamed.empty()) refine(extended, found.batch, {});
+  const LinearProblem served(extended.model, found.batch, extended.priors, {});
 
   Diagnosis diagnosis;
   diagnosis.poses = static_cast<int>(found.all.measurements.size());
@@ -141,7 +145,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
                                            merged.statistics.groups, 1e6 * merged.statistics.sigma)
                              : "the tracker's sigma and what is left";
   diagnosis.before = figures_of(before.positions(before.residual()));
-  diagnosis.after = figures_of(after.positions(after.residual()));
+  diagnosis.after = figures_of(served.positions(served.residual()));
   diagnosis.findings = findings_of(found, after);
   fill_unexplained(diagnosis, found, after, all);
   diagnosis.verdict = verdict_of(diagnosis);
@@ -151,10 +155,14 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   for (const ErrorSourcePtr& source : found.before.model.sources) diagnosis.sources_before.push_back(source->name());
   diagnosis.sources_after = diagnosis.sources_before;
   for (const Finding& finding : diagnosis.findings) {
-    if (!finding.source.empty() && finding.could_also_be.empty()) diagnosis.sources_after.push_back(finding.source);
+    // Which number of a cause it is may stay open: the cause as a whole is identified anyway.
+    const bool sure = std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
+      return other.cause == finding.cause.cause && other.joint == finding.cause.joint;
+    });
+    if (!finding.source.empty() && sure) diagnosis.sources_after.push_back(finding.source);
   }
   if (split.validation.measurements.empty()) {
-    const HeldOut held_out = held_out_of(before, after);
+    const HeldOut held_out = held_out_of(before, served);
     diagnosis.held_out_before = held_out.before;
     diagnosis.held_out_after = held_out.after;
     diagnosis.held_out_how =
@@ -169,7 +177,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
       return figures_of(e);
     };
     diagnosis.held_out_before = errors(found.before.model);
-    diagnosis.held_out_after = errors(found.after.model);
+    diagnosis.held_out_after = errors(extended.model);
     diagnosis.held_out_how = fmt::format("{} validation rows", split.validation.measurements.size());
   }
 
@@ -188,7 +196,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     lines.limit = strength_for(found.chance.limit_at(kPeriodogramLine) + chance, 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
-  diagnosis.waterfall = waterfall_of(found, before, after, diagnosis.findings);
+  diagnosis.waterfall = waterfall_of(found, before, served, diagnosis.findings, after.noise());
 
   if (!reported(options, "planning the next poses", 0.8)) return tl::make_unexpected(given_up());
   diagnosis.next_poses = next_poses_for(found, before, options);
@@ -216,7 +224,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
 
   const Matrix3 R_BW = found.before.model.X_WB.linear().transpose();
   diagnosis.batch = found.batch;
-  diagnosis.residual_after_B = R_BW * after.positions(after.residual());
+  diagnosis.residual_after_B = R_BW * served.positions(served.residual());
   const LinearProblem same_poses(found.before.model, found.batch, found.before.priors, {});
   diagnosis.residual_before_B = R_BW * same_poses.positions(same_poses.residual());
   diagnosis.batch_hash = batch_hash(batch);

@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kAmplitude = 1e-4;      // rad, prior
+constexpr double kAmplitude = 1e-3;      // rad, prior: wide, the data choose
 constexpr double kLowestOrder = 2;       // below lie eccentricity and geometry
 constexpr double kHighestOrder = 200;    // cycles a joint turn
 constexpr double kStep = 0.2;            // of what two orders differ by that the joint's range just tells apart

@@ -84,7 +84,10 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
   for (std::size_t f = 0; f < families.size(); ++f) {
     if (!families[f]->named() || !families[f]->predicts() || !contends(f)) continue;
     const Cause other = families[f]->cause(seen.best[f]);
-    if (f == place || no_rival(cause, other) || begins_at_once(other, seen.best[f], problem.poses())) continue;
+    // A more general description that is as likely says that the special one is not sure.
+    const bool only_describes = no_rival(cause, other) && !(other.cause == "joint_map" && cause.cause != "joint_map" &&
+                                                            seen.score[place] - seen.score[f] < kMargin);
+    if (f == place || only_describes || begins_at_once(other, seen.best[f], problem.poses())) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);

@@ -172,16 +172,16 @@ class Search {
     return extend(one);
   }
 
-  /// A step that a cause acting from the first pose on explains nearly as well is that cause; and so is a map of a
-  /// joint's angle that one sine explains nearly as well that sine.
+  /// A step that a cause acting from the first pose on explains nearly as well is that cause; and a map of a joint's
+  /// angle that an off-centre disc explains nearly as well is that disc.
   static std::size_t simplest(const std::vector<FamilyPtr>& families, const Scan& seen, std::size_t strongest,
                               const std::function<bool(std::size_t)>& open) {
     const Cause cause = families[strongest]->cause(seen.best[strongest]);
     const auto simpler = seen.strongest([&](std::size_t f) {
       if (!open(f) || !families[f]->named()) return false;
       const Cause other = families[f]->cause(seen.best[f]);
-      return is_whole_of(other, cause) || (cause.cause == "joint_map" && other.cause != "joint_map" &&
-                                           other.joint == cause.joint && is_description_of(cause, other));
+      return is_whole_of(other, cause) ||
+             (cause.cause == "joint_map" && other.cause == "encoder_eccentricity" && other.joint == cause.joint);
     });
     return simpler && seen.score[*simpler] > seen.score[strongest] - kSimplerMargin ? *simpler : strongest;
   }

@@ -133,6 +133,60 @@ TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
             correction.error_before);
 }
 
+/// Along joint 1 from inside to far outside (range: 15 deg), in `steps` steps.
+std::vector<ErrorPrediction> on_the_way_out(const CompensatedModel& model, int steps) {
+  std::vector<ErrorPrediction> predictions;
+  for (int k = 0; k <= steps; ++k) {
+    JointVector q = inside();
+    q(0) = from_deg(10 + 30.0 * k / steps);
+    predictions.push_back(model.predict(q, "spindle", "spindle"));
+  }
+  return predictions;
+}
+
+/// The largest change between neighbours, m.
+double largest_step(const std::vector<ErrorPrediction>& predictions, Vector3 ErrorPrediction::*what) {
+  double largest = 0;
+  for (std::size_t k = 1; k < predictions.size(); ++k) {
+    largest = std::max(largest, (predictions[k].*what - predictions[k - 1].*what).norm());
+  }
+  return largest;
+}
+
+TEST_F(Compensated, TheBiasFadesOnTheWayOutOfTheDomainWithoutAJump) {
+  const auto coarse = on_the_way_out(model(), 300);
+  const auto fine = on_the_way_out(model(), 3000);
+  EXPECT_EQ(coarse.front().bias_weight, 1);
+  EXPECT_TRUE(coarse.front().in_domain);
+  EXPECT_EQ(coarse.back().bias_weight, 0);
+  EXPECT_FALSE(coarse.back().in_domain);
+  // A tenth of the way makes a tenth of the change; a jump would stay as large as it is.
+  for (const auto what : {&ErrorPrediction::error_B, &ErrorPrediction::stddev_B}) {
+    EXPECT_LT(largest_step(fine, what), 0.2 * largest_step(coarse, what));
+  }
+}
+
+TEST_F(Compensated, TheFartherOutTheLessIsClaimed) {
+  const auto way = on_the_way_out(model(), 300);
+  for (std::size_t k = 60; k < way.size(); ++k) {  // from 16 deg on
+    EXPECT_LE(way[k].bias_weight, way[k - 1].bias_weight) << k;
+    EXPECT_GE(way[k].stddev_B.norm(), way[k - 1].stddev_B.norm()) << k;
+  }
+}
+
+TEST_F(Compensated, ACorrectionInTheFadeSettlesAndTellsHowMuchOfTheBiasItTook) {
+  JointVector q = inside();
+  q(0) = from_deg(19);
+  const double weight = model().predict(q, "spindle", "spindle").bias_weight;
+  ASSERT_GT(weight, 0.05);
+  ASSERT_LT(weight, 0.95);
+  const Correction correction = correct(target_at(q));
+  EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
+  EXPECT_LT(correction.error_after, 1e-7);
+  EXPECT_NE(correction.message.find(fmt::format("{:.0f} % of the learned bias", 100 * weight)), std::string::npos)
+      << correction.message;
+}
+
 TEST_F(Compensated, AnArmThatStandsAskewInTheTrackersWorldIsPredictedInItsOwnBase) {
   auto cell = std::make_shared<Cell>(*robot_->truth.cell);
   const Matrix3 R_WB = Eigen::AngleAxisd(2.1, Vector3(1, 2, 3).normalized()).toRotationMatrix();

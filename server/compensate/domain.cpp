@@ -1,0 +1,45 @@
+#include "server/compensate/domain.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trammel {
+
+namespace {
+
+constexpr double kRangeMargin = 0.05;  // of a joint's training range, on either side
+constexpr double kLeastMargin = 1e-9;  // rad, for a joint that stood still
+constexpr double kRangeFade = 0.20;    // of a joint's training range, from the margin to where nothing is taken
+constexpr double kLeastFade = 0.01;    // rad, for a joint that stood still: several times what a correction moves it
+constexpr double kUnknownShare = 0.5;  // half of the prior variance left: the bias says little more than nothing
+constexpr double kLeastFadeOfShare = 2.0;
+constexpr double kLeastShare = 1e-12;
+
+/// 1 up to `from`, 0 beyond `to`, smooth between.
+double fading(double x, double from, double to) {
+  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
+  return (1 - t) * (1 - t) * (1 + 2 * t);
+}
+
+}  // namespace
+
+bool Domain::in_range(const JointVector& q) const {
+  const Eigen::ArrayXd margin = kRangeMargin * (q_max - q_min).array() + kLeastMargin;
+  return (q.array() >= q_min.array() - margin).all() && (q.array() <= q_max.array() + margin).all();
+}
+
+double Domain::bias_weight(const JointVector& q, double prior_share) const {
+  double weight = 1;
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    const double range = q_max(j) - q_min(j);
+    const double beyond = std::max(q_min(j) - q(j), q(j) - q_max(j));
+    const double margin = kRangeMargin * range + kLeastMargin;
+    weight *= fading(beyond, margin, margin + kRangeFade * range + kLeastFade);
+  }
+  // Shares span decades: what counts is how many times less is known than at the edge.
+  const double limit = std::max(prior_share_limit, kLeastShare);
+  const double unknown = std::max(kUnknownShare, kLeastFadeOfShare * limit);
+  return weight * fading(std::log(std::max(prior_share, kLeastShare)), std::log(limit), std::log(unknown));
+}
+
+}  // namespace trammel

@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "server/diagnose/background.h"
+#include "server/diagnose/candidates.h"
+#include "server/diagnose/folds.h"
+#include "server/diagnose/product.h"
+#include "server/diagnose/refine.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  MatrixXd m(rows, cols);
+  for (double& value : m.reshaped()) value = normal(random);
+  return m;
+}
+
+/// The chapter 5 robot in cell 7, calibrated by the list of the cell, and a linear problem about it.
+struct Calibrated {
+  explicit Calibrated(int poses) : batch(test::measured(test::chapter_5_robot(cell), poses, 3)) {
+    batch = *check_against_cell(batch, *cell);
+    const CalibrationResult calibration = *calibrate(cell, cell->model.error_sources, batch, {});
+    model.model = calibration.model;
+    for (const IdentifiedParameter& one : calibration.parameters) model.priors.push_back(one.parameter);
+  }
+  LinearProblem problem() const { return {model.model, batch, model.priors, candidate_sources(*cell, batch, nullptr)}; }
+  std::shared_ptr<const Cell> cell = test::cell_7();
+  MeasurementBatch batch;
+  PriorModel model;
+};
+
+TEST(Product, EveryBuildThatThisProcessorRunsAgreesWithThePlainSum) {
+  for (const auto& [k, m, n] : {std::tuple{1, 1, 1}, {7, 5, 3}, {1033, 9, 6}, {64, 4, 4}}) {
+    const MatrixXd a = random_matrix(k, m, 1);
+    const MatrixXd b = random_matrix(k, n, 2);
+    const MatrixXd plain = a.transpose() * b;
+    const auto expect_equal = [&](RawProduct product) {
+      MatrixXd c = MatrixXd::Constant(m, n, -7);
+      product(k, m, a.data(), k, n, b.data(), k, c.data(), m);
+      EXPECT_LT((c - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
+    };
+    expect_equal(raw_product_baseline);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) expect_equal(raw_product_avx2);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) expect_equal(raw_product_avx512);
+    EXPECT_LT((transposed_product(a, b) - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
+  }
+}
+
+TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
+  const MatrixXd Z = 3 * random_matrix(40, 6, 4);
+  const MatrixXd y = random_matrix(40, 2, 5);
+  const MatrixXd S = MatrixXd::Identity(40, 40) + Z * Z.transpose();
+  const Background background(Z);
+  EXPECT_LT((background.project(y) - S.llt().solve(y)).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LT((background.estimate(y) - Z.transpose() * S.llt().solve(y)).cwiseAbs().maxCoeff(), 1e-10);
+}
+
+TEST(LogEvidence, IsInvertedByStrengthFor) {
+  for (const double freedom : {1.0, 2.0, 6.0, 30.0}) {
+    EXPECT_NEAR(log_evidence(strength_for(12, freedom), freedom), 12, 1e-6);
+    EXPECT_EQ(log_evidence(freedom, freedom), 0);
+  }
+}
+
+TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
+  const Calibrated calibrated(40);
+  const LinearProblem problem = calibrated.problem();
+  const Folds folds(problem, problem.nuisance());
+  const VectorXd left = folds.held_out_residual(problem.residual());
+  // What is measured at a pose does not change what the others say of it.
+  VectorXd moved = problem.residual();
+  moved.segment(problem.first_row(7), problem.row_count(7)).array() += 50;
+  const VectorXd change = folds.held_out_residual(moved) - left;
+  EXPECT_LT((change.segment(problem.first_row(7), problem.row_count(7)).array() - 50).abs().maxCoeff(), 1e-6);
+  EXPECT_GT((change.array().abs() > 1e-3).count(), 20);
+}
+
+TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRows) {
+  const Calibrated calibrated(120);
+  const LinearProblem problem = calibrated.problem();
+  const FamilyPtr gear = make_gear_family(problem, 2);
+  ASSERT_NE(gear, nullptr);
+  Best planted = gear->typical();
+  planted.at = 37.3;
+  const Background background(problem.nuisance());
+  const VectorXd effect = gear->columns(planted) * Eigen::Vector2d(0.03, -0.04);
+  const Best found = gear->scan({background}, background.project(problem.residual() + effect)).front();
+  EXPECT_NEAR(found.at, 37.3, 0.1);
+  const double strength = effect.dot(background.project(effect).col(0));
+  EXPECT_NEAR(found.strength, strength, 5 * std::sqrt(strength));
+}
+
+TEST(Refine, LeavesACalibratedModelWhereItIs) {
+  Calibrated calibrated(80);
+  const VectorXd before = calibrated.model.model.values;
+  refine(calibrated.model, calibrated.batch, {});
+  VectorXd moved = calibrated.model.model.values - before;
+  for (Index k = 0; k < moved.size(); ++k) moved(k) /= calibrated.model.priors[static_cast<std::size_t>(k)].prior_scale;
+  EXPECT_LT(moved.cwiseAbs().maxCoeff(), 0.05);
+}
+
+TEST(Refine, AddsAndRemovesASourceWithItsPriors) {
+  Calibrated calibrated(60);
+  const VectorXd before = calibrated.model.model.values;
+  const std::size_t priors = calibrated.model.priors.size();
+  ASSERT_TRUE(add_to(calibrated.model, "encoder_eccentricity:2"));
+  EXPECT_EQ(calibrated.model.priors.size(), priors + 2);
+  EXPECT_EQ(calibrated.model.priors.size(), static_cast<std::size_t>(calibrated.model.model.parameter_count()));
+  remove_from(calibrated.model, "encoder_eccentricity:2");
+  EXPECT_EQ(calibrated.model.model.values, before);
+  EXPECT_EQ(calibrated.model.priors.size(), priors);
+}
+
+TEST(Chance, LetsTheBestOfAllPassThreeTimesInAThousand) {
+  const Calibrated calibrated(40);
+  const LinearProblem problem = calibrated.problem();
+  const std::vector<FamilyPtr> families = make_families(problem);
+  const Background background(problem.nuisance());
+  const Chance chance = chance_of(families, background, 300, 1);
+  const Winners fresh = winners(families, background, draw_null(background, 300, 99), chance);
+  const auto above = [&](double limit) {
+    return std::count_if(fresh.score.begin(), fresh.score.end(), [&](double score) { return score > limit; });
+  };
+  EXPECT_LE(above(chance.limit), 5);            // 0.9 expected, 5 in 1 of 400
+  EXPECT_GE(above(chance.limit_at(0.09)), 10);  // 27 expected
+  EXPECT_LT(chance.p_value(chance.limit + 20), 1e-6);
+}
+
+}  // namespace
+}  // namespace trammel
