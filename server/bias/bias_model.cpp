@@ -9,6 +9,7 @@
 
 #include "server/base/units.h"
 #include "server/bias/hyperparameter_search.h"
+#include "server/bias/kernel_spelling.h"
 #include "server/bias/local_experts.h"
 
 namespace trammel {
@@ -54,12 +55,6 @@ Status check_numbers(const MatrixXd& q, const MatrixXd& residual_B, const Vector
 
 Status check(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
   return check_shape(q, residual_B, sigma).and_then([&] { return check_numbers(q, residual_B, sigma); });
-}
-
-Result<std::shared_ptr<const Kernel>> find_kernel(const std::string& name) {
-  std::shared_ptr<const Kernel> kernel = make_kernel(name);
-  if (!kernel) return refused("bias kernel `{}` is unknown; known are none, {}", name, kernel_names());
-  return kernel;
 }
 
 double median(VectorXd values) {
@@ -155,7 +150,7 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
     fitted->report = report_of_none(state.residual_B, fitted->stddev);
     return fitted;
   }
-  const auto kernel = find_kernel(state.kernel);
+  const auto kernel = spelled_kernel(state.kernel);
   if (!kernel) return tl::make_unexpected(kernel.error());
   const Index rows = (*kernel)->parameter_count(state.q.cols()) + 2;
   if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kOutputs)
@@ -206,7 +201,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
     return tl::make_unexpected(fine.error());
   BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kOutputs), {}};
   if (options.kernel == kNone) return restore(state);
-  const auto kernel = find_kernel(options.kernel);
+  const auto kernel = spelled_kernel(options.kernel);
   if (!kernel) return tl::make_unexpected(kernel.error());
   if (options.starts < 1) return refused("bias fit: {} starts, at least 1", options.starts);
 

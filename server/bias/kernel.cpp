@@ -1,9 +1,40 @@
 #include "server/bias/kernel.h"
 
+#include <array>
+
+#include "server/bias/kernel_spelling.h"
+
 namespace trammel {
+namespace {
 
-std::shared_ptr<const Kernel> make_kernel(std::string_view name) { return make_radial_kernel(name); }
+struct Leaf {
+  std::string_view word;
+  KernelPtr (*make)();
+};
 
-std::string kernel_names() { return "se, matern32, matern52"; }
+const std::array<Leaf, 7> kLeaves = {{{"se", [] { return make_radial_kernel("se"); }},
+                                      {"matern32", [] { return make_radial_kernel("matern32"); }},
+                                      {"matern52", [] { return make_radial_kernel("matern52"); }},
+                                      {"periodic", make_periodic_kernel},
+                                      {"rational_quadratic", make_rational_quadratic_kernel},
+                                      {"linear", make_linear_kernel},
+                                      {"white", make_white_kernel}}};
+
+}  // namespace
+
+KernelPtr make_leaf_kernel(std::string_view word) {
+  for (const Leaf& leaf : kLeaves) {
+    if (leaf.word == word) return leaf.make();
+  }
+  return nullptr;
+}
+
+KernelPtr make_kernel(std::string_view spelling) { return spelled_kernel(spelling).value_or(nullptr); }
+
+std::string kernel_names() {
+  std::string names;
+  for (const Leaf& leaf : kLeaves) names.append(names.empty() ? "" : ", ").append(leaf.word);
+  return names;
+}
 
 }  // namespace trammel

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// Covariance functions of joint vectors (source eqs. 3.18-3.24), without amplitude: σ_f² is the process', not theirs.
 namespace trammel {
@@ -22,7 +23,8 @@ struct SearchBox {
   Eigen::VectorXd high;
 };
 
-/// One covariance function: a value without state, its parameters are passed in as natural logarithms.
+/// One covariance function: a value without state, its parameters are passed in as natural logarithms, as many for each
+/// joint alike and some for all of them.
 /// Work is done in tiles, so that a sum or a product of kernels is a few lines over the tiles of its parts.
 /// Thread-safe.
 class Kernel {
@@ -51,12 +53,34 @@ class Kernel {
                             const double* weights, double* out) const = 0;
 };
 
-/// The kernel of that name, or null. `kernel_names` lists them for messages.
-[[nodiscard]] std::shared_ptr<const Kernel> make_kernel(std::string_view name);
+using KernelPtr = std::shared_ptr<const Kernel>;
+
+/// The kernel that is spelled so (kernel_spelling.h), or null. `kernel_names` lists the words for messages.
+[[nodiscard]] KernelPtr make_kernel(std::string_view spelling);
 [[nodiscard]] std::string kernel_names();
+
+/// The kernel of one word; null when there is none.
+[[nodiscard]] KernelPtr make_leaf_kernel(std::string_view word);
 
 /// Squared exponential (eq. 3.19, one length scale per joint) and Matérn 3/2, 5/2 (eq. 3.20): `se`, `matern32`,
 /// `matern52`; null otherwise. Parameters: log length scale of each joint, rad.
-[[nodiscard]] std::shared_ptr<const Kernel> make_radial_kernel(std::string_view name);
+[[nodiscard]] KernelPtr make_radial_kernel(std::string_view name);
+/// exp(-2 Σ sin²(π (q - q') / p) / l²) (MacKay 1998). Parameters: log l of each joint (no unit), then log p, rad.
+[[nodiscard]] KernelPtr make_periodic_kernel();
+/// (1 + r²/2α)^-α: squared exponentials of many scales (Rasmussen & Williams, eq. 4.19). Parameters: log length scale
+/// of each joint, rad, then log α.
+[[nodiscard]] KernelPtr make_rational_quadratic_kernel();
+/// 1 + Σ q q' / l²: affine functions. The 1 is their value at q = 0, so that they may be centred anywhere and no joint
+/// vector has a prior variance of 0. Parameters: log length scale of each joint, rad.
+[[nodiscard]] KernelPtr make_linear_kernel();
+/// 1 where the joint vectors are equal, otherwise 0: what a pose repeats and its neighbours don't know. No parameters.
+[[nodiscard]] KernelPtr make_white_kernel();
+
+/// `inner`, one of the above, on (cos q, sin q), each joint's two with the same parameters: q and q + 2π are the same.
+[[nodiscard]] KernelPtr make_sincos_kernel(KernelPtr inner);
+/// Σ a² k with a = 1 for the first part. Parameters: those of the first part; then for each other log a, and its own.
+[[nodiscard]] KernelPtr sum_of(std::vector<KernelPtr> parts);
+/// Π k. Parameters: those of the parts, one after the other.
+[[nodiscard]] KernelPtr product_of(std::vector<KernelPtr> parts);
 
 }  // namespace trammel

@@ -18,7 +18,7 @@ constexpr Index kMostExact = 5000;
 constexpr std::size_t kMostOfAnExpert = 1200;
 constexpr double kLeastShare = 1e-12;  // of the prior; keeps the precision of a point known exactly finite
 
-// Halves along the joint that spreads widest in the kernel's features, until every part is small enough.
+// Halves along the joint that spreads widest, until every part is small enough.
 void halve(const MatrixXd& features, std::vector<Index> points, std::vector<std::vector<Index>>* parts) {
   if (points.size() <= kMostOfAnExpert) {
     std::sort(points.begin(), points.end());
@@ -41,14 +41,21 @@ void halve(const MatrixXd& features, std::vector<Index> points, std::vector<std:
   halve(features, {middle, points.end()}, parts);
 }
 
+// In length scales for a kernel that has one of each joint and hardly more; for others, which tell neighbours in more
+// than one way or in none, in rad.
+MatrixXd joints_as_seen_by(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
+  MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
+  if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
+  kernel.features(parameters, q, features.data(), features.rows());
+  return features.leftCols(q.cols());
+}
+
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   std::vector<Index> all(static_cast<std::size_t>(q.rows()));
   std::iota(all.begin(), all.end(), Index{0});
   if (q.rows() <= kMostExact) return {all};
-  MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
-  kernel.features(parameters, q, features.data(), features.rows());
   std::vector<std::vector<Index>> parts;
-  halve(features.leftCols(std::min(features.cols(), q.cols())), all, &parts);
+  halve(joints_as_seen_by(kernel, parameters, q), all, &parts);
   return parts;
 }
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/diagnose/dependence.h"
+#include "server/diagnose/effect.h"
 #include "server/diagnose/findings.h"
 #include "server/diagnose/folds.h"
 #include "server/diagnose/next_poses.h"
@@ -76,7 +78,9 @@ void fill_unexplained(Diagnosis& diagnosis, const SearchResult& found, const Lin
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
   const Index count = numbers.size() - P;
-  diagnosis.unexplained.rms = problem.position_rms(all.columns().rightCols(count) * numbers.tail(count));
+  // Of it, what the model's own parameters cannot do.
+  const VectorXd function = all.columns().rightCols(count) * numbers.tail(count);
+  diagnosis.unexplained.rms = problem.position_rms(Background(problem.nuisance()).project(function));
 }
 
 Verdict verdict_of(const Diagnosis& diagnosis) {
@@ -86,10 +90,23 @@ Verdict verdict_of(const Diagnosis& diagnosis) {
   return doubt ? Verdict::kAmbiguous : Verdict::kNamed;
 }
 
+/// Poses in the order in which they were measured, where their times say another one than their rows. True where
+/// something had to be moved; what begins at a pose is then told by its pose id, not by a row.
+bool put_in_order_of_time(MeasurementBatch& batch) {
+  const auto time = [](const Measurement& m) { return m.context.time; };
+  if (!std::all_of(batch.measurements.begin(), batch.measurements.end(),
+                   [&](const auto& m) { return time(m).has_value(); }))
+    return false;
+  const auto earlier = [&](const Measurement& a, const Measurement& b) { return *time(a) < *time(b); };
+  if (std::is_sorted(batch.measurements.begin(), batch.measurements.end(), earlier)) return false;
+  std::stable_sort(batch.measurements.begin(), batch.measurements.end(), earlier);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].context.index = static_cast<int>(i);
+  return true;
+}
+
 /// What is left after the nominal chain, the cell's own sources and each finding in turn; at last the noise.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
-                                        const LinearProblem& after, const std::vector<Finding>& findings,
-                                        double noise) {
+                                        const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
   Eigen::Matrix3Xd nominal(3, before.poses());
   for (Index i = 0; i < before.poses(); ++i) {
@@ -98,11 +115,18 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   }
   steps.push_back({"nominal", figures_of(nominal).rms});
   steps.push_back({"calibrated", before.position_rms(before.residual())});
-  double square = std::pow(after.position_rms(after.residual()), 2);
+  // Each finding in turn, everything else refitted: the later ones' effects are put back into what is left.
+  VectorXd data = after.residual();
+  std::vector<Index> chosen(static_cast<std::size_t>(after.nuisance().cols()));
+  std::iota(chosen.begin(), chosen.end(), Index{0});
   std::vector<WaterfallStep> tail;
-  for (auto finding = findings.rbegin(); finding != findings.rend(); ++finding) {
-    tail.push_back({to_string(finding->cause), std::sqrt(square)});
-    if (!finding->source.empty()) square += std::pow(finding->effect_rms, 2);
+  for (auto finding = found.accepted.rbegin(); finding != found.accepted.rend(); ++finding) {
+    if (finding->source.empty()) continue;
+    const Background fitted(after.nuisance()(Eigen::all, chosen));
+    tail.push_back({to_string(finding->cause), after.position_rms(data - fitted.columns() * fitted.estimate(data))});
+    data += effect_of_source(after, finding->in_model);
+    const std::vector<Index> own = places_of_source(after.model(), finding->in_model);
+    std::erase_if(chosen, [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
   }
   steps.insert(steps.end(), tail.rbegin(), tail.rend());
   steps.push_back({"noise of one measurement", std::sqrt(3.0) * noise});
@@ -115,6 +139,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
                            const DiagnoseOptions& options) {
   Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
   if (!checked) return tl::make_unexpected(checked.error());
+  const bool sorted = put_in_order_of_time(*checked);
   fill_velocity(*checked);
   const BatchSplit split = split_batch(*checked, 0, options.seed);
   const MergedRepeats merged = merge_repeats(split.train, cell->tracker.sigma);
@@ -129,7 +154,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
 
   if (!reported(options, "measuring the gain", 0.65)) return tl::make_unexpected(given_up());
   const std::vector<std::string> candidates = candidate_sources(*cell, found.batch, nullptr);
-  const LinearProblem before(found.before.model, found.all, found.before.priors, candidates);
+  // Before and after are compared on the same poses: leaving one out is no gain.
+  const LinearProblem before(found.before.model, found.batch, found.before.priors, candidates);
   const LinearProblem after(found.after.model, found.batch, found.after.priors, candidates);
   const Background all(background_columns(after, found.unnamed));
   // What the extended model leaves when it is fitted by itself, as a training would: nothing unnamed beside it.
@@ -140,10 +166,15 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   Diagnosis diagnosis;
   diagnosis.poses = static_cast<int>(found.all.measurements.size());
   diagnosis.noise = after.noise();
-  diagnosis.noise_from = merged.statistics.degrees_of_freedom > 0
-                             ? fmt::format("{} poses measured repeatedly ({:.1f} um an axis) and what is left",
-                                           merged.statistics.groups, 1e6 * merged.statistics.sigma)
-                             : "the tracker's sigma and what is left";
+  diagnosis.instrument = after.instrument();
+  diagnosis.noise_from =
+      fmt::format("{}{:.1f} um stated for a pose, {:.1f} um beyond it",
+                  merged.statistics.degrees_of_freedom > 0
+                      ? fmt::format("one measurement {:.1f} um by {} poses measured repeatedly; ",
+                                    1e6 * merged.statistics.sigma, merged.statistics.groups)
+                      : "",
+                  1e6 * after.instrument(),
+                  1e6 * std::sqrt(std::max(0.0, std::pow(after.noise(), 2) - std::pow(after.instrument(), 2))));
   diagnosis.before = figures_of(before.positions(before.residual()));
   diagnosis.after = figures_of(served.positions(served.residual()));
   diagnosis.findings = findings_of(found, after);
@@ -166,7 +197,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     diagnosis.held_out_before = held_out.before;
     diagnosis.held_out_after = held_out.after;
     diagnosis.held_out_how =
-        fmt::format("{} folds, each predicted from the others", Folds(after, after.nuisance()).count());
+        fmt::format("{} folds, each predicted from the others; the causes were chosen on all poses",
+                    Folds(after, after.nuisance()).count());
   } else {
     const auto errors = [&](const PhysicalModel& model) {
       Eigen::Matrix3Xd e(3, static_cast<Index>(split.validation.measurements.size()));
@@ -196,7 +228,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     lines.limit = strength_for(found.chance.limit_at(kPeriodogramLine) + chance, 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
-  diagnosis.waterfall = waterfall_of(found, before, served, diagnosis.findings, after.noise());
+  diagnosis.waterfall = waterfall_of(found, before, served, after.noise());
 
   if (!reported(options, "planning the next poses", 0.8)) return tl::make_unexpected(given_up());
   diagnosis.next_poses = next_poses_for(found, before, options);
@@ -221,12 +253,14 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
   diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);
   diagnosis.limits = limits_of(found.all, merged.statistics);
+  if (sorted) diagnosis.limits.emplace_back("the rows are not in the order of their times: they were put into it");
+  if (found.too_many_outliers)
+    diagnosis.limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
 
   const Matrix3 R_BW = found.before.model.X_WB.linear().transpose();
   diagnosis.batch = found.batch;
   diagnosis.residual_after_B = R_BW * served.positions(served.residual());
-  const LinearProblem same_poses(found.before.model, found.batch, found.before.priors, {});
-  diagnosis.residual_before_B = R_BW * same_poses.positions(same_poses.residual());
+  diagnosis.residual_before_B = R_BW * before.positions(before.residual());
   diagnosis.batch_hash = batch_hash(batch);
   diagnosis.cell_hash = sha256_hex(cell->cell_yaml + cell->robot_yaml);
   diagnosis.seed = options.seed;

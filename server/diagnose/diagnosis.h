@@ -28,7 +28,7 @@ struct Estimate {
   std::string name;
   std::string unit;
   double value = 0;
-  double u95 = 0;  ///< half width of the 95 % interval, selection included
+  double u95 = 0;  ///< half width of the 95 % interval, everything else free
 };
 
 /// A cause that the simulation lacks.
@@ -36,7 +36,7 @@ struct Finding {
   Cause cause;
   std::string source;  ///< as a cell file's list of error sources would spell it; empty for an outlier
   std::vector<Estimate> parameters;
-  double effect_rms = 0;             ///< m, Euclidean, of what it does to the poses measured
+  double effect_rms = 0;             ///< m, Euclidean, over the poses: what it does that nothing else in the model can
   ErrorFigures held_out_before;      ///< without this cause, the others found in place
   ErrorFigures held_out_after;       ///< with it
   double held_out_gain = 0;          ///< m: rms before - after
@@ -119,9 +119,10 @@ struct Dependence {
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNothing;
-  std::string sentence;  ///< the verdict for people, graded by the evidence
-  int poses = 0;         ///< repeats merged
-  double noise = 0;      ///< m per axis: of one measurement, from repeats or the tracker
+  std::string sentence;   ///< the verdict for people, graded by the evidence
+  int poses = 0;          ///< repeats merged
+  double noise = 0;       ///< m per axis: of a pose, whatever its reason: what no cause explains
+  double instrument = 0;  ///< m per axis: what the measurement itself is said to be good for
   std::string noise_from;
   ErrorFigures before, after;  ///< of all poses used, before and after extension
   std::optional<ErrorFigures> held_out_before, held_out_after;

@@ -57,6 +57,17 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   } else if (cause.cause == "encoder_eccentricity") {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
   }
+  if (!cause.parameter.empty()) {
+    const OwnEstimate own = own_estimate(problem, source, estimated.change, estimated.covariance);
+    for (Index i = 0; i < values.size(); ++i) {
+      const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
+      if (parameter.name != cause.parameter) continue;
+      // The others of its source at zero: it is this one that is named.
+      const double alone = own.precision.row(i).dot(own.size) / own.precision(i, i);
+      return {
+          in_units(parameter, parameter.prior_scale * alone, parameter.prior_scale / std::sqrt(own.precision(i, i)))};
+    }
+  }
   for (Index i = 0; i < values.size(); ++i) {
     const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
     if (parameter.name.starts_with("order")) continue;
@@ -74,14 +85,15 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-Finding outlier(const Accepted& one) {
+Finding outlier(const Accepted& one, double noise, const ErrorFigures& held_out) {
   Finding finding;
   finding.cause = one.cause;
-  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), 0}};
+  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kInterval95 * noise)}};
   finding.effect_rms = one.pose.distance;
   finding.strength = one.best.strength;
   finding.p_value = one.p_value;
-  finding.action = action_for(one.cause, false);
+  finding.held_out_before = finding.held_out_after = held_out;
+  finding.action = action_for(one.cause, {});
   return finding;
 }
 
@@ -96,7 +108,7 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
   std::vector<Finding> findings;
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) {
-      findings.push_back(outlier(one));
+      findings.push_back(outlier(one, problem.noise(), figures_of(problem.positions(held_out))));
       continue;
     }
     Finding finding;
@@ -106,7 +118,8 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
     const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
     const VectorXd effect = effect_of_source(problem, one.in_model);
-    finding.effect_rms = problem.position_rms(effect);
+    const Background rest(columns(Eigen::all, all_but(columns.cols(), places)));
+    finding.effect_rms = problem.position_rms(rest.project(effect));
     finding.strength = own_estimate(problem, one.in_model, estimated.change, estimated.covariance).strength();
     finding.p_value = one.p_value;
     finding.naming_frequency = one.naming_frequency;
@@ -115,7 +128,7 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     finding.held_out_before = figures_of(
         problem.positions(folds.held_out_residual(problem.residual() + effect, all_but(columns.cols(), places))));
     finding.held_out_gain = finding.held_out_before.rms - finding.held_out_after.rms;
-    finding.action = action_for(one.cause, !one.could_also_be.empty());
+    finding.action = action_for(one.cause, one.could_also_be);
     findings.push_back(std::move(finding));
   }
   return findings;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/check.h"
+#include "server/diagnose/product.h"
 
 namespace trammel {
 
@@ -138,15 +139,18 @@ void LinearProblem::whiten() {
   const VectorXd scales = scales_of(priors_);
   // How much freedom the fit takes: the trace of its hat matrix, prior included.
   const MatrixXd scaled = weight_.cwiseInverse().asDiagonal() * nuisance_ * scales.asDiagonal();
-  const MatrixXd information = scaled.transpose() * scaled;
+  MatrixXd information = transposed_product(scaled, scaled);
   const Index P = scales.size();
-  const double freedom =
-      P == 0 ? 0
-             : static_cast<double>(P) -
-                   (information + MatrixXd::Identity(P, P)).llt().solve(MatrixXd::Identity(P, P)).trace();
+  information.diagonal().array() += 1;
+  const Eigen::LLT<MatrixXd> factor(information);
+  const double freedom = static_cast<double>(P) - factor.solve(MatrixXd::Identity(P, P)).trace();
   const double share = std::max(0.05, 1 - freedom / static_cast<double>(rows()));
-  const double surplus = robust_surplus(residual_(position), weight_(position), share);
-  const double surplus_rotation = robust_surplus(residual_(rotation), weight_(rotation), share);
+  // The noise is what no parameter explains, whether the model stands at its best fit already or not.
+  const VectorXd right = scaled.transpose() * residual_.cwiseQuotient(weight_);
+  const VectorXd left = residual_ - weight_.asDiagonal() * (scaled * factor.solve(right));
+  const double surplus = robust_surplus(left(position), weight_(position), share);
+  const double surplus_rotation = robust_surplus(left(rotation), weight_(rotation), share);
+  instrument_ = weight_(position).norm() / std::sqrt(static_cast<double>(position.size()));
   double sum = 0;
   for (const Index row : position) {
     const double sigma = std::hypot(weight_(row), surplus);

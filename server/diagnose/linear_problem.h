@@ -45,6 +45,8 @@ class LinearProblem {
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
   /// m per axis: noise of a typical position, whatever its reason.
   [[nodiscard]] double noise() const { return noise_; }
+  /// m per axis: what the measurements themselves are said to be good for.
+  [[nodiscard]] double instrument() const { return instrument_; }
 
   /// 3 x poses, m: the positions of a whitened vector.
   [[nodiscard]] Eigen::Matrix3Xd positions(const Eigen::VectorXd& whitened) const;
@@ -63,6 +65,7 @@ class LinearProblem {
   Eigen::MatrixXd nuisance_, by_joint_;
   std::vector<Effect> effects_;
   double noise_ = 0;
+  double instrument_ = 0;
 };
 
 }  // namespace trammel

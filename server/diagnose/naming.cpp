@@ -19,6 +19,7 @@ constexpr double kRelated = 0.4;        // the same of 0.63
 constexpr double kTouches = 0.1;        // less is a coincidence
 constexpr double kAsGood = 6;           // of strength
 constexpr double kContender = 0.15;     // of the best score
+constexpr double kPathStep = 0.2;       // rad
 constexpr double kAtOnce = 0.05;        // of the poses
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
@@ -60,6 +61,38 @@ bool is_description_of(const Cause& general, const Cause& special) {
   return angle && general.cause == "joint_map" && special.joint == general.joint;
 }
 
+namespace {
+
+/// Poses that follow one another closely: measured in motion, as it seems.
+bool is_path(const MeasurementBatch& batch) {
+  for (std::size_t i = 1; i < batch.measurements.size(); ++i) {
+    const JointVector step = batch.measurements[i].context.q - batch.measurements[i - 1].context.q;
+    if (step.cwiseAbs().maxCoeff() > kPathStep) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch) {
+  const auto recorded = [&](auto has) {
+    return std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                       [&](const Measurement& m) { return has(m.context); });
+  };
+  const bool in_time =
+      cause.cause == "tracker_moved" || cause.cause == "tracker_drift" || cause.cause == "thermal_growth";
+  std::vector<Cause> rivals;
+  if (in_time && cause.cause != "tracker_drift" && !recorded([](const PoseContext& c) { return c.time.has_value(); }))
+    rivals.push_back({"tracker_drift", -1, "", "", {}});
+  if (in_time && cause.cause != "thermal_growth" &&
+      !recorded([](const PoseContext& c) { return c.temperature.has_value(); }))
+    rivals.push_back({"thermal_growth", -1, "", "", {}});
+  const bool of_joints = cause.joint >= 0 || cause.cause == "geometry";
+  if (of_joints && is_path(batch) && !recorded([](const PoseContext& c) { return c.velocity.has_value(); }))
+    rivals.push_back({"time_lag", -1, "", "", {}});
+  return rivals;
+}
+
 Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
                      const Scan& seen, const Chance& chance, std::size_t place, std::uint64_t seed) {
   const Best& best = seen.best[place];
@@ -85,8 +118,9 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     if (!families[f]->named() || !families[f]->predicts() || !contends(f)) continue;
     const Cause other = families[f]->cause(seen.best[f]);
     // A more general description that is as likely says that the special one is not sure.
-    const bool only_describes = no_rival(cause, other) && !(other.cause == "joint_map" && cause.cause != "joint_map" &&
-                                                            seen.score[place] - seen.score[f] < kMargin);
+    const bool only_describes =
+        no_rival(cause, other) && !(other.cause == "joint_map" && cause.cause == "gear_transmission" &&
+                                    seen.score[place] - seen.score[f] < kMargin);
     if (f == place || only_describes || begins_at_once(other, seen.best[f], problem.poses())) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
@@ -98,6 +132,10 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     const bool wins =
         naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency && of_effect.strength > kTouches * whole;
     if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
+  }
+  for (const Cause& rival : untestable_rivals(cause, problem.batch())) {
+    if (std::find(naming.could_also_be.begin(), naming.could_also_be.end(), rival) == naming.could_also_be.end())
+      naming.could_also_be.push_back(rival);
   }
   return naming;
 }

@@ -17,6 +17,9 @@ struct Naming {
   std::vector<Cause> could_also_be;  ///< explain the data as well
 };
 
+/// Causes that the batch records nothing to test by, and that would look like `cause`.
+[[nodiscard]] std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch);
+
 /// Doubts the family at `place` in `seen`: by repeating the batch in simulation with the effect as it was fitted, and
 /// by what other named causes explain of the data and of that effect.
 [[nodiscard]] Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,

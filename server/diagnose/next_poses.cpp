@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr int kPool = 240;
 constexpr int kRandomSets = 20;
+constexpr double kWorthwhile = 0.9;
 
 /// The family of `cause` among those of `problem`, of the kinds that look the same on other poses.
 const Family* family_of(const std::vector<FamilyPtr>& families, const Cause& cause) {
@@ -161,6 +162,8 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
     next.q.push_back(pool->measurements[static_cast<std::size_t>(best)].context.q);
   }
   next.stddev_expected = std::sqrt(uncertainty.variance());
+  // What no pose tells apart needs something else, as the finding's action says.
+  if (next.stddev_expected > kWorthwhile * next.stddev_now) return {};
 
   std::mt19937_64 random(options.seed);
   double sum = 0;

@@ -12,7 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTail = 0.1;  // share of the draws that its tail is fitted to
+constexpr double kTail = 0.1;          // share of the draws that its tail is fitted to
+constexpr double kLeastChance = 1e-6;  // no tail of a few hundred draws is known further
 constexpr double kChance =
     0.003;  // of a false alarm a scan: a diagnosis scans at least twice, and 1 % is for all of it
 
@@ -53,7 +54,7 @@ double Chance::limit_at(double share) const {
 
 double Chance::p_value(double score) const {
   const Tail tail = tail_of(null_score);
-  if (score > tail.threshold) return kTail * std::exp(-(score - tail.threshold) / tail.scale);
+  if (score > tail.threshold) return std::max(kLeastChance, kTail * std::exp(-(score - tail.threshold) / tail.scale));
   const auto above = std::count_if(null_score.begin(), null_score.end(), [&](double s) { return s >= score; });
   return static_cast<double>(above + 1) / static_cast<double>(null_score.size() + 1);
 }

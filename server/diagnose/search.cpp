@@ -21,7 +21,8 @@ constexpr double kTellingColumn = 0.1;  // sigmas over all rows, that a function
 constexpr double kUnnamedMargin = 2;    // nat, by which no name must be better than a name
 constexpr double kContender = 0.3;      // of the best score, to be among those that folds choose from
 constexpr double kSimplerMargin = 5;    // nat
-constexpr int kPathLength = 3;          // named causes that together may beat one anonymous function
+constexpr int kFewestHarmonics = 4;
+constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
 
 Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
 
@@ -99,34 +100,67 @@ class Search {
     for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
       Accepted& one = result_.accepted[k];
       if (one.source.empty() || one.best.evidence > kBeyondDoubt * chance_.limit) continue;
+      const PriorModel with = result_.after;
       remove_from(result_.after, one.in_model);
       refine(result_.after, result_.batch, result_.unnamed);
-      if (const Status named = name_again(one); !named) return named;
+      const Result<bool> named = name_again(one);
+      if (!named) return tl::make_unexpected(named.error());
+      if (!*named) result_.after = with;
     }
     return {};
   }
 
   SearchResult take() {
+    const bool extended = std::any_of(result_.accepted.begin(), result_.accepted.end(),
+                                      [](const Accepted& one) { return !one.source.empty(); });
+    // What was tried and dropped leaves no trace.
+    if (!extended) {
+      result_.after = result_.before;
+      refine(result_.after, result_.batch, result_.unnamed);
+    }
     result_.chance = std::move(chance_);
     return std::move(result_);
   }
 
  private:
-  /// Adds `one`'s source, in the form that explains most, and identifies everything anew.
-  Status extend(Accepted& one) {
+  /// Sum of squares of the poses held out, each predicted from the others, in units of `weight`.
+  double held_out_square(const PriorModel& prior_model, const VectorXd& weight) const {
+    const LinearProblem problem(prior_model.model, result_.batch, prior_model.priors, {});
+    const VectorXd left =
+        Folds(problem, background_columns(problem, result_.unnamed)).held_out_residual(problem.residual());
+    return left.cwiseQuotient(problem.weight()).cwiseProduct(weight).squaredNorm();
+  }
+
+  /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
+  std::vector<std::string> spellings(const std::string& source) const {
+    if (!source.starts_with("joint_map")) return alternatives(source, *cell_);
+    const std::size_t at = source.find('@');
+    std::vector<std::string> all;
+    for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
+      all.push_back(source.substr(0, at + 1) + std::to_string(harmonics));
+    return all;
+  }
+
+  /// Adds `one`'s source, in the form that predicts best, and identifies everything anew. False, and nothing is
+  /// changed, where poses held out are predicted no better with it.
+  Result<bool> extend(Accepted& one) {
+    const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
+    double least = held_out_square(result_.after, weight);
     std::optional<PriorModel> best;
-    double least = 0;
-    for (const std::string& form : alternatives(one.source, *cell_)) {
+    for (const std::string& spelling : spellings(one.source)) {
       PriorModel extended = result_.after;
-      if (const Status added = add_to(extended, form); !added) return added;
-      const double left = refine(extended, result_.batch, result_.unnamed);
-      if (best && left >= least) continue;
-      least = left;
-      one.in_model = form;
+      if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
+      refine(extended, result_.batch, result_.unnamed);
+      const double square = held_out_square(extended, weight);
+      if (square >= least) continue;
+      least = square;
+      one.in_model = spelling;
+      if (one.source.starts_with("joint_map")) one.source = spelling;
       best = std::move(extended);
     }
+    if (!best) return false;
     result_.after = std::move(*best);
-    return {};
+    return true;
   }
 
   void renew_chance(const std::vector<FamilyPtr>& families, const Background& background) {
@@ -145,7 +179,7 @@ class Search {
   }
 
   /// The strongest cause in the place of `one`, which the model is without.
-  Status name_again(Accepted& one) {
+  Result<bool> name_again(Accepted& one) {
     const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors,
                                 candidate_sources(*cell_, result_.batch, nullptr));
     const std::vector<FamilyPtr> families = make_families(problem);
@@ -159,17 +193,20 @@ class Search {
     if (place && seen.score[*place] >= chance_.limit) {
       const Family& family = *families[*place];
       const Naming naming = name_or_doubt(problem, families, background, seen, chance_, *place, options_.seed + 1);
-      one = {family.cause(seen.best[*place]),
-             family.source(seen.best[*place]),
-             "",
-             seen.best[*place],
-             chance_.penalty_of(family),
-             chance_.p_value(seen.score[*place]),
-             naming.frequency,
-             naming.could_also_be,
-             {}};
+      Accepted again = {family.cause(seen.best[*place]),
+                        family.source(seen.best[*place]),
+                        "",
+                        seen.best[*place],
+                        chance_.penalty_of(family),
+                        chance_.p_value(seen.score[*place]),
+                        naming.frequency,
+                        naming.could_also_be,
+                        {}};
+      const Result<bool> extended = extend(again);
+      if (extended && *extended) one = again;
+      return extended;
     }
-    return extend(one);
+    return false;
   }
 
   /// A step that a cause acting from the first pose on explains nearly as well is that cause; and a map of a joint's
@@ -254,8 +291,13 @@ class Search {
     const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
     one.naming_frequency = naming.frequency;
     one.could_also_be = naming.could_also_be;
-    if (const Status extended = extend(one); !extended) return tl::make_unexpected(extended.error());
-    result_.accepted.push_back(std::move(one));
+    const Result<bool> extended = extend(one);
+    if (!extended) return extended;
+    if (*extended) {
+      result_.accepted.push_back(std::move(one));
+    } else {
+      closed_.push_back(one.cause);
+    }
     return true;
   }
 
@@ -265,6 +307,7 @@ class Search {
                                         [](const Accepted& a) { return a.source.empty(); });
     if (static_cast<double>(outliers) >= kMostOutliers * static_cast<double>(result_.all.measurements.size())) {
       closed_.push_back(one.cause);
+      result_.too_many_outliers = true;
       return true;
     }
     const Measurement& m = result_.batch.measurements[pose];

@@ -35,6 +35,7 @@ struct SearchResult {
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
   Chance chance;
+  bool too_many_outliers = false;  ///< there are more than a tenth; the rest stayed in
 };
 
 /// Forward selection, one cause at a time, each on what the model found so far leaves over: the best candidate is

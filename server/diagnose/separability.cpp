@@ -133,6 +133,9 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
       unseen.identifiable = size_for(std::max(needed, kMarginStrength / (1 - imitated * imitated)));
     else
       unseen.needs = what_it_needs(cause);
+    const bool partly = std::any_of(result.inseparable.begin(), result.inseparable.end(),
+                                    [&](const Inseparable& pair) { return pair.causes.front() == cause; });
+    if (partly && unseen.needs.empty()) unseen.needs = what_it_needs(cause);
     result.unseen.push_back(std::move(unseen));
   }
   return result;

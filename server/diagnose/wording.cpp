@@ -1,10 +1,13 @@
 #include "server/diagnose/wording.h"
 
 #include "server/base/units.h"
+#include "server/plan/separation.h"
 
 namespace trammel {
 
 namespace {
+
+constexpr double kMuchMore = 1.5;
 
 struct Words {
   const char* cause;
@@ -59,7 +62,8 @@ std::string listed(const std::vector<std::string>& words) {
 }
 
 std::string said(const Finding& finding) {
-  if (finding.cause.cause == "outlier") return fmt::format("pose {} does not belong", finding.cause.pose_id);
+  if (finding.cause.cause == "outlier")
+    return fmt::format("pose {} ({:.2f} mm)", finding.cause.pose_id, to_mm(finding.effect_rms));
   std::string text = to_string(finding.cause);
   if (finding.cause.order) text += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
   if (!finding.cause.pose_id.empty()) text += fmt::format(" from pose {}", finding.cause.pose_id);
@@ -72,11 +76,11 @@ std::string said(const Finding& finding) {
 
 }  // namespace
 
-std::string action_for(const Cause& cause, bool ambiguous) {
+std::string action_for(const Cause& cause, const std::vector<Cause>& others) {
   const Words* words = words_for(cause.cause);
   if (words == nullptr) return "";
-  if (ambiguous) return fmt::format("decide first which it is: {}", words->needs);
-  return words->action;
+  if (others.empty()) return words->action;
+  return fmt::format("decide first which it is: {}", what_would_separate(cause.cause, others.front().cause));
 }
 
 std::string what_it_needs(const Cause& cause) {
@@ -85,28 +89,32 @@ std::string what_it_needs(const Cause& cause) {
 }
 
 std::string sentence_for(const Diagnosis& d) {
-  std::vector<std::string> findings;
-  for (const Finding& finding : d.findings) findings.push_back(said(finding));
+  std::vector<std::string> sure, doubtful, bad;
+  for (const Finding& finding : d.findings) {
+    (finding.cause.cause == "outlier" ? bad : finding.could_also_be.empty() ? sure : doubtful).push_back(said(finding));
+  }
   std::string text;
-  switch (d.verdict) {
-    case Verdict::kNamed:
-      text = "The simulation lacks " + listed(findings) + ".";
-      break;
-    case Verdict::kAmbiguous:
-      text = "The simulation lacks something, but I cannot tell what: " + listed(findings) + ".";
-      break;
-    case Verdict::kUnknown:
-      text = fmt::format("Something is there ({:.0f} um rms) that depends on {}, and none of the known causes fits it.",
-                         to_mm(d.unexplained.rms) * 1e3, listed(d.unexplained.depends_on));
-      return text;
-    case Verdict::kNothing:
-      return fmt::format(
-          "Nothing found: what is left ({:.0f} um rms) is what noise of {:.0f} um an axis leaves over in {} poses.",
-          to_mm(d.after.rms) * 1e3, to_mm(d.noise) * 1e3, d.poses);
+  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : " ") + sentence; };
+  if (!sure.empty()) add("The simulation lacks " + listed(sure) + ".");
+  if (!doubtful.empty()) add("Something is lacking that I cannot tell: it may be " + listed(doubtful) + ".");
+  if (!bad.empty()) {
+    add(fmt::format("{} {} not fit the others; from single poses no cause can be told: repeat {} and {} neighbours.",
+                    listed(bad), bad.size() > 1 ? "do" : "does", bad.size() > 1 ? "them" : "it",
+                    bad.size() > 1 ? "their" : "its"));
   }
   if (d.unexplained.present) {
-    text += fmt::format(" Besides, something unknown depends on {} ({:.0f} um rms).", listed(d.unexplained.depends_on),
-                        to_mm(d.unexplained.rms) * 1e3);
+    add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it.",
+                    text.empty() ? "" : " else", listed(d.unexplained.depends_on), 1e6 * d.unexplained.rms));
+  }
+  if (sure.empty() && doubtful.empty() && !d.unexplained.present) {
+    add(fmt::format("Nothing {}found in {} poses: {:.0f} um rms are left.", bad.empty() ? "" : "else ", d.poses,
+                    1e6 * d.after.rms));
+  }
+  if (d.noise > kMuchMore * d.instrument) {
+    add(
+        fmt::format("The noise, {:.0f} um an axis, is {:.1f} times what is stated for the measurement ({:.0f} um), and "
+                    "depends on nothing I know.",
+                    1e6 * d.noise, d.noise / d.instrument, 1e6 * d.instrument));
   }
   return text;
 }

@@ -6,8 +6,8 @@
 
 namespace trammel {
 
-/// What people on the shop floor do about a cause.
-[[nodiscard]] std::string action_for(const Cause& cause, bool ambiguous);
+/// What people on the shop floor do about a cause that may also be `others`.
+[[nodiscard]] std::string action_for(const Cause& cause, const std::vector<Cause>& others);
 /// What a batch would need to show a cause that this one cannot show.
 [[nodiscard]] std::string what_it_needs(const Cause& cause);
 /// The verdict for people.

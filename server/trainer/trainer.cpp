@@ -90,12 +90,6 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
 }
 
 /// Whether trainings may take the batch.
-Status check_released(const StoredBatch& batch) {
-  if (batch.quarantine.empty()) return {};
-  return refused("batch {} of cell {} is in quarantine: {}; release it if it is good", batch.id, batch.cell,
-                 batch.quarantine);
-}
-
 Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& cell) {
   auto parsed = parse_batch(stored.csv, "batch " + stored.id);
   if (!parsed) return parsed;
@@ -188,6 +182,12 @@ JobProgress progress_of(const StoredJob& job) {
 }
 
 }  // namespace
+
+Status check_released(const StoredBatch& batch) {
+  if (batch.quarantine.empty()) return {};
+  return refused("batch {} of cell {} is in quarantine: {}; release it if it is good", batch.id, batch.cell,
+                 batch.quarantine);
+}
 
 Trainer::Trainer(std::map<std::string, std::shared_ptr<const Cell>> cells, Store& store, ModelRegistry& registry,
                  TrainerOptions options)

@@ -154,4 +154,7 @@ class Trainer {
   std::jthread worker_;
 };
 
+/// Refused while the batch is in quarantine: nothing is learned from it.
+[[nodiscard]] Status check_released(const StoredBatch& batch);
+
 }  // namespace trammel

@@ -43,6 +43,11 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     if (!stored) return tl::make_unexpected(stored.error());
     if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name);
     job.batch_ids = {batch_id.empty() ? stored->back().id : batch_id};
+    if (apply) {
+      const auto asked = store_.batch(cell_name, job.batch_ids.front());
+      if (!asked) return tl::make_unexpected(asked.error());
+      if (const Status free = check_released(*asked); !free) return tl::make_unexpected(free.error());
+    }
   } else {
     const auto sent = batch_to_diagnose(job, {csv, apply, "", ""}, **cell_found);
     if (!sent) return tl::make_unexpected(sent.error());

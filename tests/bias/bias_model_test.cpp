@@ -284,7 +284,9 @@ TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
 
   BiasOptions options;
   options.kernel = "sea";
-  expect_refused(good, options, "bias kernel `sea` is unknown; known are none, se, matern32, matern52");
+  expect_refused(good, options,
+                 "bias kernel `sea`: `sea` is unknown; known are none (alone), se, matern32, matern52, periodic, "
+                 "rational_quadratic, linear, white");
   options.kernel = "se";
   options.starts = 0;
   expect_refused(good, options, "bias fit: 0 starts, at least 1");
