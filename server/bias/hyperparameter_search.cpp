@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "server/bias/optima.h"
+#include "server/bias/seeded_random.h"
 
 namespace trammel {
 namespace {
@@ -28,30 +28,6 @@ constexpr Index kFinerPoints = 400;
 constexpr double kWideSpread = 10.0;  // in logs, of the prior on kernel parameters
 constexpr double kWorseLeaveOneOut = 1.1;
 
-// The standard library leaves its distributions and shuffles to the implementation; these give the same model anywhere.
-// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15U);
-    z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
-    return z ^ (z >> 31U);
-  }
-  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53; }
-
- private:
-  std::uint64_t state_;
-};
-
-std::vector<Index> shuffled(Index n, Random* random) {
-  std::vector<Index> order(static_cast<std::size_t>(n));
-  std::iota(order.begin(), order.end(), Index{0});
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random->next() % i]);
-  return order;
-}
-
 GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output, Index outputs) {
   GpData part{MatrixXd(count, data.q.cols()), MatrixXd(count, outputs), VectorXd(count)};
   for (Index i = 0; i < count; ++i) {
@@ -73,7 +49,7 @@ class Search {
         options_(options),
         random_(options.seed),
         box_(kernel_->search_box(data.q)) {
-    order_ = shuffled(data.q.rows(), &random_);
+    order_ = shuffled_rows(data.q.rows(), &random_);
     prior_.noise_stddev = metrology_stddev;
     prior_.parameter_centre = 0.5 * (box_.low + box_.high);
   }
@@ -260,7 +236,7 @@ class Search {
   std::shared_ptr<const Kernel> kernel_;
   const GpData& data_;
   const SearchOptions& options_;
-  Random random_;
+  SeededRandom random_;
   SearchBox box_;
   std::vector<Index> order_;
   GpPrior prior_;

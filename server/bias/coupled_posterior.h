@@ -1,0 +1,58 @@
+#pragma once
+
+#include "server/bias/coupled_likelihood.h"
+
+namespace trammel {
+
+/// At one joint vector, of D outputs.
+struct CoupledPrediction {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
+  Eigen::VectorXd prior;       ///< their variances before any data
+};
+
+/// What coupled processes know after their data. Immutable, thread-safe.
+/// At a target, with h = H(q) scaled and k_d the covariance of output d with the data: R_d = h_d - k_dᵀ M_d⁻¹ H_d and
+///   mean_d = h_d ŵ + k_dᵀ α_d,  covariance = diag(k_d** - k_dᵀ M_d⁻¹ k_d) + R A⁻¹ Rᵀ.
+/// The parts that do not mix outputs are those of a GaussianProcess conditioned on y_d - H_d ŵ.
+class CoupledPosterior {
+ public:
+  /// Empty when a covariance is not positive definite.
+  [[nodiscard]] static std::optional<CoupledPosterior> condition(std::shared_ptr<const Kernel> kernel,
+                                                                 const LinearBlocks& blocks, const CoupledData& data,
+                                                                 const CoupledHyperparameters& at,
+                                                                 VarianceForm form = VarianceForm::kCompressed);
+
+  /// At `q`, where `columns` (D x p) is H(q), not scaled.
+  [[nodiscard]] CoupledPrediction predict(const JointVector& q, const Eigen::MatrixXd& columns) const;
+
+  /// p, of the columns as they are (not scaled).
+  [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
+  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
+
+  /// A whole pose left out, all its outputs at once: mean, N x D; variances of the measurement, N x D
+  /// (blocks of C⁻¹ instead of its diagonal in Rasmussen & Williams, eqs. 5.10-5.12).
+  [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
+  [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
+
+ private:
+  CoupledPosterior() = default;
+  // R A⁻¹ Rᵀ.
+  [[nodiscard]] Eigen::MatrixXd common_covariance(const JointVector& q, const Eigen::MatrixXd& scaled) const;
+  void leave_one_out(const CoupledSolution& solution, const CoupledData& data);
+
+  std::shared_ptr<const Kernel> kernel_;
+  Eigen::Index points_ = 0;
+  std::vector<GpHyperparameters> hyperparameters_;
+  std::vector<GaussianProcess> outputs_;  // of y_d - H_d ŵ
+  std::vector<AlignedMatrix> features_;
+  std::vector<Eigen::MatrixXd> explained_;  // D: Hᵀ M⁻¹, p x N
+  Eigen::LLT<Eigen::MatrixXd> root_;        // of A
+  Eigen::VectorXd column_scale_;
+  Eigen::VectorXd weights_;
+  double log_likelihood_ = 0;
+  Eigen::MatrixXd leave_one_out_mean_;
+  Eigen::MatrixXd leave_one_out_variance_;
+};
+
+}  // namespace trammel
