@@ -29,7 +29,7 @@ double shorter(double length, double value, double slope, double new_value) {
 BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, const Eigen::MatrixXd& inverse_hessian,
                     const BfgsOptions& options) {
   BfgsResult result;
-  Evaluation here;
+  ObjectiveValue here;
   result.evaluations = 1;
   if (!objective(start, &here)) return result;
   result.defined = true;
@@ -48,7 +48,7 @@ BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, co
       break;
     }
     double length = std::min(1.0, options.max_step / direction.cwiseAbs().maxCoeff());
-    Evaluation there;
+    ObjectiveValue there;
     bool accepted = false;
     while (!accepted && result.evaluations < options.max_evaluations) {
       ++result.evaluations;

@@ -5,13 +5,13 @@
 
 namespace trammel {
 
-struct Evaluation {
+struct ObjectiveValue {
   double value = 0;
   Eigen::VectorXd gradient;
 };
 
 /// False where the function is not defined; the search then takes a shorter step.
-using Objective = std::function<bool(const Eigen::VectorXd& x, Evaluation* out)>;
+using Objective = std::function<bool(const Eigen::VectorXd& x, ObjectiveValue* out)>;
 
 struct BfgsOptions {
   int max_evaluations = 100;

@@ -148,7 +148,7 @@ VectorXd CoupledLikelihood::pack(const CoupledHyperparameters& at) const {
   return x;
 }
 
-bool CoupledLikelihood::evaluate(const VectorXd& x, Evaluation* out) const {
+bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
   if (!x.allFinite() || x.cwiseAbs().maxCoeff() > kLogMax) return false;
   const CoupledHyperparameters at = unpack(x);
   const std::optional<CoupledSolution> solution = solve(*kernel_, blocks_, data_, at);
@@ -210,7 +210,7 @@ VectorXd CoupledLikelihood::contract(const CoupledSolution& solution, const GpHy
   return gradient;
 }
 
-void CoupledLikelihood::add_prior(const VectorXd& x, Evaluation* out) const {
+void CoupledLikelihood::add_prior(const VectorXd& x, ObjectiveValue* out) const {
   const auto pull = [&](Index k, double centre, double spread) {
     const double away = (x[k] - centre) / spread;
     out->value += 0.5 * away * away;

@@ -68,7 +68,7 @@ class CoupledLikelihood {
  public:
   CoupledLikelihood(std::shared_ptr<const Kernel> kernel, LinearBlocks blocks, CoupledData data, CoupledPrior prior);
 
-  [[nodiscard]] bool evaluate(const Eigen::VectorXd& x, Evaluation* out) const;
+  [[nodiscard]] bool evaluate(const Eigen::VectorXd& x, ObjectiveValue* out) const;
 
   [[nodiscard]] CoupledHyperparameters unpack(const Eigen::VectorXd& x) const;
   [[nodiscard]] Eigen::VectorXd pack(const CoupledHyperparameters& at) const;
@@ -77,7 +77,7 @@ class CoupledLikelihood {
  private:
   [[nodiscard]] Eigen::Index outputs() const { return data_.y.cols(); }
   [[nodiscard]] Eigen::Index kernel_sets() const { return prior_.shared_scales ? 1 : outputs(); }
-  void add_prior(const Eigen::VectorXd& x, Evaluation* out) const;
+  void add_prior(const Eigen::VectorXd& x, ObjectiveValue* out) const;
   /// ½ tr((C⁻¹ - α αᵀ) dM_d) by [kernel parameters, log σ_f, log σ_n] of output d.
   [[nodiscard]] Eigen::VectorXd contract(const CoupledSolution& solution, const GpHyperparameters& at,
                                          Eigen::Index output) const;

@@ -87,7 +87,7 @@ class CoupledSearch {
   }
 
   BfgsResult improve(const CoupledLikelihood& function, const VectorXd& start, const BfgsOptions& limits) {
-    const Objective objective = [&](const VectorXd& x, Evaluation* out) {
+    const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
       return !result_.given_up && function.evaluate(x, out);
     };
     const double curvature = 0.05 * static_cast<double>(function.size());

@@ -86,7 +86,7 @@ ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpD
   work_ = {numerics().work_size(size() + data_.y.cols()), 1};
 }
 
-bool ProfiledLikelihood::evaluate(const VectorXd& parameters, Evaluation* out) {
+bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* out) {
   const Index n = size();
   const Index outputs = data_.y.cols();
   const Index count = parameters.size() - 1;

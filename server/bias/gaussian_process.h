@@ -22,8 +22,8 @@ struct GpData {
 
 /// Weak log-normal priors; they decide only what the data leave open.
 struct GpPrior {
-  double noise_stddev = 1e-5;        ///< m, from metrology; below it the noise costs ½ (log ratio / spread)², above 0
-  double noise_spread = 0.1;         ///< in logs: metrology is believed to 10 %; noise below it would be learned as bias
+  double noise_stddev = 1e-5;  ///< m, from metrology; below it the noise costs ½ (log ratio / spread)², above 0
+  double noise_spread = 0.1;   ///< in logs: metrology is believed to 10 %; noise below it would be learned as bias
   Eigen::VectorXd parameter_centre;  ///< of the kernel's log parameters
   double parameter_spread = 3.0;     ///< in logs: keeps an idle joint's length scale from running away
   double log_ratio_centre = -4.6;    ///< of log η
@@ -37,7 +37,7 @@ class ProfiledLikelihood {
   ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior);
 
   /// False when M is not positive definite or the parameters are absurd.
-  [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, Evaluation* out);
+  [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, ObjectiveValue* out);
 
   /// Of the last successful evaluation: σ_f² of each output, m²; rms over the points of the Euclidean leave-one-out
   /// error, m.

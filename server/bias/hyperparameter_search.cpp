@@ -139,7 +139,7 @@ class Search {
           improved(&medium, candidate.x, grown * candidate.inverse_hessian, {.max_evaluations = 20, .tolerance = 0.02}),
           medium);
       if (better.defined) candidate = std::move(better);
-      Evaluation unused;
+      ObjectiveValue unused;
       leave_one_out.push_back(medium.evaluate(candidate.x, &unused) ? medium.leave_one_out_rms() : HUGE_VAL);
     }
     const double least = *std::min_element(leave_one_out.begin(), leave_one_out.end());

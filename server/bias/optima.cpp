@@ -25,7 +25,7 @@ bool same(const Optimum& a, const Optimum& b) {
 Optimum improved(ProfiledLikelihood* likelihood, const VectorXd& start, const MatrixXd& inverse_hessian,
                  const BfgsOptions& options) {
   std::vector<std::pair<VectorXd, VectorXd>> visited;  // the last point tried need not be the one kept
-  const Objective objective = [&](const VectorXd& x, Evaluation* out) {
+  const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
     const bool defined = likelihood->evaluate(x, out);
     if (defined) visited.emplace_back(x, likelihood->signal_variance());
     return defined;
@@ -45,7 +45,7 @@ Optimum searched(ProfiledLikelihood* likelihood, const VectorXd& start, const Bf
 void use_curvature(ProfiledLikelihood* likelihood, double least, Optimum* now) {
   const Index count = now->x.size();
   MatrixXd hessian(count, count);
-  Evaluation there;
+  ObjectiveValue there;
   for (Index p = 0; p < count; ++p) {
     VectorXd moved = now->x;
     moved[p] += kDifference;

@@ -56,7 +56,7 @@ LikelihoodCase likelihood_case(Index count) {
 
 void likelihood_and_gradient(benchmark::State& state) {
   LikelihoodCase at = likelihood_case(state.range(0));
-  Evaluation evaluation;
+  ObjectiveValue evaluation;
   for (auto _ : state) benchmark::DoNotOptimize(at.likelihood.evaluate(at.parameters, &evaluation));
 }
 
@@ -195,7 +195,7 @@ void judge(const Table& train, const Table& test, Figures* figures) {
 
 void time_ours(Index count, Figures* figures) {
   LikelihoodCase at = likelihood_case(count);
-  Evaluation evaluation;
+  ObjectiveValue evaluation;
   (*figures)["likelihood_and_gradient_s"] =
       least_seconds(10, [&] { TRAMMEL_CHECK(at.likelihood.evaluate(at.parameters, &evaluation)); });
   (*figures)["fit_s"] = least_seconds(3, [&] { (void)fitted(count, 20); });

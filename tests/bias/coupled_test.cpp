@@ -205,7 +205,7 @@ TEST_P(EveryBlock, LeavingAPoseOutEqualsFittingWithoutIt) {
 }
 
 void expect_gradient_of_differences(const CoupledLikelihood& likelihood, const VectorXd& x) {
-  Evaluation evaluation;
+  ObjectiveValue evaluation;
   ASSERT_TRUE(likelihood.evaluate(x, &evaluation));
   const double scale = evaluation.gradient.cwiseAbs().maxCoeff();
   for (Index p = 0; p < x.size(); ++p) {
@@ -213,7 +213,7 @@ void expect_gradient_of_differences(const CoupledLikelihood& likelihood, const V
     const auto at = [&](double offset) {
       VectorXd moved = x;
       moved[p] += offset;
-      Evaluation there;
+      ObjectiveValue there;
       EXPECT_TRUE(likelihood.evaluate(moved, &there));
       return there.value;
     };

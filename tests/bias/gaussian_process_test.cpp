@@ -106,7 +106,7 @@ TEST_P(EveryKernel, ProfiledLikelihoodEqualsTheLikelihoodAtItsSignalVariance) {
   ProfiledLikelihood likelihood(make_kernel(name), d, flat_prior(joints));
   VectorXd parameters(joints + 1);
   parameters << some_scales(joints), std::log(0.02);
-  Evaluation evaluation;
+  ObjectiveValue evaluation;
   ASSERT_TRUE(likelihood.evaluate(parameters, &evaluation));
   double total = 0;
   for (Index output = 0; output < 3; ++output) {
@@ -128,7 +128,7 @@ TEST_P(EveryKernel, GradientEqualsCentralDifferences) {
   ProfiledLikelihood likelihood(make_kernel(name), data(), prior);
   VectorXd parameters(joints + 1);
   parameters << some_scales(joints), std::log(0.02);
-  Evaluation evaluation;
+  ObjectiveValue evaluation;
   ASSERT_TRUE(likelihood.evaluate(parameters, &evaluation));
   const double scale = evaluation.gradient.cwiseAbs().maxCoeff();
   for (Index p = 0; p <= joints; ++p) {
@@ -136,7 +136,7 @@ TEST_P(EveryKernel, GradientEqualsCentralDifferences) {
     const auto at = [&](double offset) {
       VectorXd moved = parameters;
       moved[p] += offset;
-      Evaluation there;
+      ObjectiveValue there;
       EXPECT_TRUE(likelihood.evaluate(moved, &there));
       return there.value;
     };

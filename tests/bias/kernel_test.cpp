@@ -99,13 +99,13 @@ TEST_P(EverySpelling, GradientOfTheLikelihoodEqualsCentralDifferences) {
   ProfiledLikelihood likelihood(kernel_, {q_, problem.residual_B, VectorXd::Ones(q_.rows())}, prior);
   VectorXd at(parameters_.size() + 1);
   at << parameters_, std::log(0.05);
-  Evaluation here;
+  ObjectiveValue here;
   ASSERT_TRUE(likelihood.evaluate(at, &here));
   for (Index p = 0; p < at.size(); ++p) {
     const auto value = [&](double offset) {
       VectorXd moved = at;
       moved[p] += offset;
-      Evaluation there;
+      ObjectiveValue there;
       EXPECT_TRUE(likelihood.evaluate(moved, &there));
       return there.value;
     };
