@@ -14,6 +14,12 @@ bool has_unknown_tool(const Cell& cell) {
   return std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
 }
 
+std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell) {
+  const auto has = [&](const char* name) { return std::find(sources.begin(), sources.end(), name) != sources.end(); };
+  if (has_unknown_tool(cell) && has("geometry") && !has("tool")) sources.emplace_back("tool");
+  return sources;
+}
+
 Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch) {
   const Cell& cell = *model.cell;
   bool base_known = cell.X_WB.has_value();

@@ -8,6 +8,8 @@
 namespace trammel {
 
 [[nodiscard]] bool has_unknown_tool(const Cell& cell);
+/// `sources`, and the tool besides the geometry where nobody knows the tool.
+[[nodiscard]] std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell);
 
 /// Where the cell says unknown: base and tools from the nominal chain and `batch`, written into the model. Refuses a
 /// batch that does not determine them.

@@ -6,6 +6,7 @@
 
 #include "server/base/hash.h"
 #include "server/base/units.h"
+#include "server/calibrate/frames.h"
 #include "server/diagnose/dependence.h"
 #include "server/diagnose/effect.h"
 #include "server/diagnose/findings.h"
@@ -34,15 +35,6 @@ Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
 
 bool reported(const DiagnoseOptions& options, const std::string& stage, double share) {
   return !options.progress || options.progress(stage, share);
-}
-
-/// The cell's sources, and the tool where nobody knows it.
-std::vector<std::string> sources_of(const Cell& cell) {
-  std::vector<std::string> sources = cell.model.error_sources;
-  const bool unknown = std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
-  const auto has = [&](const char* name) { return std::find(sources.begin(), sources.end(), name) != sources.end(); };
-  if (unknown && has("geometry") && !has("tool")) sources.emplace_back("tool");
-  return sources;
 }
 
 std::vector<std::string> limits_of(const MeasurementBatch& batch, const RepeatStatistics& repeats) {
@@ -148,7 +140,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
                    kFewestPoses);
   }
   if (!reported(options, "calibrating", 0)) return tl::make_unexpected(given_up());
-  Result<SearchResult> searched = search_causes(cell, sources_of(*cell), merged.batch, options);
+  Result<SearchResult> searched =
+      search_causes(cell, with_unknown_tool(cell->model.error_sources, *cell), merged.batch, options);
   if (!searched) return tl::make_unexpected(searched.error());
   const SearchResult& found = *searched;
 
@@ -190,7 +183,9 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     const bool sure = std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
       return other.cause == finding.cause.cause && other.joint == finding.cause.joint;
     });
-    if (!finding.source.empty() && sure) diagnosis.sources_after.push_back(finding.source);
+    // A list of sources says by its row where a cause begins; in a batch whose rows were moved that row is another.
+    const bool at_a_row = !sorted || finding.cause.pose_id.empty();
+    if (!finding.source.empty() && sure && at_a_row) diagnosis.sources_after.push_back(finding.source);
   }
   if (split.validation.measurements.empty()) {
     const HeldOut held_out = held_out_of(before, served);
@@ -253,7 +248,10 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
   diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);
   diagnosis.limits = limits_of(found.all, merged.statistics);
-  if (sorted) diagnosis.limits.emplace_back("the rows are not in the order of their times: they were put into it");
+  if (sorted)
+    diagnosis.limits.emplace_back(
+        "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
+        "applied");
   if (found.too_many_outliers)
     diagnosis.limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/calibrate/frames.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
 
@@ -26,16 +27,12 @@ BatchSplit prepared(MeasurementBatch batch, double sigma, const TrainOptions& op
   return split;
 }
 
-/// The sources to identify: as asked, and the tool besides the geometry where nobody knows the tool.
+/// The sources to identify, as asked.
 Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
   Result<std::vector<std::string>> names =
       options.level ? parse_level(*options.level) : Result<std::vector<std::string>>(cell.model.error_sources);
   if (!names) return names;
-  const auto has = [&](const char* name) { return std::find(names->begin(), names->end(), name) != names->end(); };
-  const bool unknown_tool =
-      std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
-  if (unknown_tool && has("geometry") && !has("tool")) names->emplace_back("tool");
-  return names;
+  return with_unknown_tool(std::move(*names), cell);
 }
 
 /// The physics: anew, or that of another model with the named sources refitted.

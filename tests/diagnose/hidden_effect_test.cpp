@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
@@ -39,6 +40,20 @@ Answer answer_to(const HiddenSpec& spec, const DiagnoseOptions& options = quick(
   answer.judgement = test::judge(answer.diagnosis, hidden);
   answer.shown = to_json(hidden.truth, hidden.world) + test::told(answer.diagnosis);
   return answer;
+}
+
+/// The lines of a CSV after its header, last first.
+std::string backwards(const std::string& csv) {
+  std::istringstream lines(csv);
+  std::string head, rows;
+  for (std::string line; std::getline(lines, line);) {
+    const bool is_row = head.find("q1_deg") != std::string::npos;
+    if (is_row)
+      rows = line + "\n" + rows;
+    else
+      head += line + "\n";
+  }
+  return head + rows;
 }
 
 std::string test_name(const testing::TestParamInfo<const char*>& info) {
@@ -145,6 +160,18 @@ TEST(HiddenByOneProcess, IsFoundByAnother) {
   EXPECT_EQ(said["findings"][0]["joint"], truth["joint"]);
   EXPECT_NEAR(said["findings"][0]["parameters"]["order"]["value"].get<double>(), truth["values"]["order"].get<double>(),
               0.1);
+}
+
+TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnotherOrder) {
+  hidden::HiddenCase hidden = hidden::hide({.kind = "tracker_moved", .seed = 3, .lambda = 150, .poses = 160});
+  const Diagnosis in_order = test::demand(test::diagnose_files(hidden, quick()));
+  hidden.batch_csv = backwards(hidden.batch_csv);
+  const Diagnosis moved = test::demand(test::diagnose_files(hidden, quick()));
+  ASSERT_EQ(in_order.findings.size(), 1U);
+  ASSERT_EQ(moved.findings.size(), 1U);
+  EXPECT_EQ(moved.findings[0].cause, in_order.findings[0].cause);
+  EXPECT_NE(in_order.sources_after, in_order.sources_before);
+  EXPECT_EQ(moved.sources_after, moved.sources_before);
 }
 
 }  // namespace
