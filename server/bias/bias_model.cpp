@@ -348,6 +348,14 @@ VectorXd BiasModel::leave_one_out_prior_share() const {
 
 MatrixXd BiasModel::leave_one_out_mean_B() const { return fitted_->leave_one_out_mean_B(); }
 
+MatrixXd BiasModel::leave_one_out_stddev_B() const {
+  if (fitted_->outputs.empty()) return fitted_->stddev.transpose().replicate(fitted_->state.q.rows(), 1);
+  MatrixXd stddev(fitted_->state.q.rows(), kOutputs);
+  for (Index d = 0; d < kOutputs; ++d)
+    stddev.col(d) = fitted_->outputs[static_cast<std::size_t>(d)].leave_one_out_variance().cwiseSqrt();
+  return stddev;
+}
+
 const BiasState& BiasModel::state() const { return fitted_->state; }
 
 const BiasFitReport& BiasModel::report() const { return fitted_->report; }

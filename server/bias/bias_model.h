@@ -92,6 +92,8 @@ class BiasModel {
   [[nodiscard]] Eigen::VectorXd leave_one_out_prior_share() const;
   /// N x 3: prediction of every training pose from all the others, m.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
+  /// N x 3: of the measurement of every training pose given all the others (beyond 5000, of its expert), m.
+  [[nodiscard]] Eigen::MatrixXd leave_one_out_stddev_B() const;
 
   [[nodiscard]] const BiasState& state() const;
   [[nodiscard]] const BiasFitReport& report() const;

@@ -111,6 +111,10 @@ class GaussianProcess {
   /// (Rasmussen & Williams, eqs. 5.10-5.12).
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
+  /// Variance of the measurement of every training point given all the others, m².
+  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const {
+    return signal_variance_ * inverse_diagonal_.cwiseInverse();
+  }
 
  private:
   GaussianProcess() = default;

@@ -178,6 +178,12 @@ VectorXd LocalExperts::leave_one_out_mean() const {
   return mean;
 }
 
+VectorXd LocalExperts::leave_one_out_variance() const {
+  VectorXd variance(size_);
+  for (std::size_t k = 0; k < experts_.size(); ++k) variance(members_[k]) = experts_[k].leave_one_out_variance();
+  return variance;
+}
+
 VectorXd LocalExperts::leave_one_out_share() const {
   VectorXd share(size_);
   for (std::size_t k = 0; k < experts_.size(); ++k) share(members_[k]) = experts_[k].leave_one_out_share();

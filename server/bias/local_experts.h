@@ -36,6 +36,7 @@ class LocalExperts {
   /// Of every point from the others of its own expert.
   [[nodiscard]] Eigen::VectorXd leave_one_out_mean() const;
   [[nodiscard]] Eigen::VectorXd leave_one_out_share() const;
+  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const;
 
   [[nodiscard]] Eigen::Index size() const { return size_; }
   [[nodiscard]] std::size_t experts() const { return experts_.size(); }

@@ -108,6 +108,7 @@ TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
   const BiasProblem problem = smooth_problem(60, 7, 30e-6);
   const BiasModel model = fit(problem);
   const Eigen::MatrixXd left_out = model.leave_one_out_mean_B();
+  const Eigen::MatrixXd stddev = model.leave_one_out_stddev_B();
   const Eigen::VectorXd share = model.leave_one_out_prior_share();
   for (Index i = 0; i < problem.q.rows(); i += 7) {
     BiasState state = model.state();
@@ -119,6 +120,7 @@ TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
     ASSERT_TRUE(other.has_value());
     const BiasPrediction prediction = other->predict(problem.q.row(i));
     EXPECT_LT((left_out.row(i).transpose() - prediction.mean_B).norm(), 1e-11);
+    EXPECT_LT((stddev.row(i).transpose() - prediction.measured_stddev_B).norm(), 1e-11);
     EXPECT_NEAR(share[i], prediction.prior_share, 1e-8);
   }
 }
@@ -244,6 +246,7 @@ TEST(BiasModel, WithoutAKernelSaysZeroAndTheSpreadOfTheResidual) {
   EXPECT_NEAR(prediction.stddev_B[1], std::sqrt(problem.residual_B.col(1).squaredNorm() / 50), 1e-15);
   EXPECT_EQ(prediction.prior_share, 1.0);
   EXPECT_EQ(model.leave_one_out_mean_B(), Eigen::MatrixXd::Zero(50, 3));
+  EXPECT_EQ(model.leave_one_out_stddev_B().row(49), prediction.stddev_B.transpose());
   EXPECT_TRUE(BiasModel::restore(model.state()).has_value());
 }
 
