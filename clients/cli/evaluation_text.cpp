@@ -14,6 +14,12 @@ std::string figures_line(const char* level, const ErrorFigures& figures) {
                      to_mm(figures.p997), to_mm(figures.max));
 }
 
+std::string nlpd_line(const Evaluation& evaluation) {
+  if (!evaluation.nlpd) return "";
+  return fmt::format("  {:.3f} nat: mean negative log predictive density of a coordinate, mm, compensated\n",
+                     nlpd_in_mm(*evaluation.nlpd));
+}
+
 }  // namespace
 
 std::string evaluation_table(const Evaluation& evaluation) {
@@ -21,7 +27,8 @@ std::string evaluation_table(const Evaluation& evaluation) {
          figures_line("nominal", evaluation.nominal) + figures_line("calibrated", evaluation.calibrated) +
          figures_line("compensated", evaluation.compensated) +
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
-                     evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95);
+                     evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
+         nlpd_line(evaluation);
 }
 
 ordered_json evaluation_json(const Evaluation& evaluation) {
@@ -32,6 +39,7 @@ ordered_json evaluation_json(const Evaluation& evaluation) {
                     {"compensated", figures_json(evaluation.compensated)}};
   json["coverage_95"] = evaluation.coverage_95;
   json["in_domain"] = evaluation.in_domain;
+  if (evaluation.nlpd) json["nlpd"] = nlpd_in_mm(*evaluation.nlpd);
   return json;
 }
 

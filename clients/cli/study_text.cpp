@@ -81,13 +81,14 @@ std::string served_table(const Study& study) {
   for (const StudyRow& row : study.rows) {
     if (!row.served) continue;
     if (text.empty()) {
-      text = fmt::format("\n{:<28}{:<8}{:>6}{:>16}{:>14}{:>14}\n", "as served", "model", "learnt", "rms, mm",
-                         "in domain", "inside 95 %");
+      text = fmt::format("\n{:<28}{:<8}{:>6}{:>16}{:>14}{:>14}{:>14}\n", "as served", "model", "learnt", "rms, mm",
+                         "in domain", "inside 95 %", "nlpd (mm)");
     }
     text +=
-        fmt::format("{:<28}{:<8}{:>6}{:>16.4f}{:>14}{:>12.1f} %\n", row.set, row.model, row.training_poses,
+        fmt::format("{:<28}{:<8}{:>6}{:>16.4f}{:>14}{:>12.1f} %{:>14}\n", row.set, row.model, row.training_poses,
                     to_mm(row.served->compensated.rms),
-                    fmt::format("{} of {}", row.served->in_domain, row.served->poses), 100 * row.served->coverage_95);
+                    fmt::format("{} of {}", row.served->in_domain, row.served->poses), 100 * row.served->coverage_95,
+                    number_or_dash(row.served->nlpd ? std::optional(nlpd_in_mm(*row.served->nlpd)) : std::nullopt, 3));
   }
   return text;
 }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "server/base/check.h"
+#include "server/base/units.h"
 #include "server/compensate/domain.h"
 #include "server/compensate/model_file.h"
 #include "server/robot/inverse_kinematics.h"
@@ -15,7 +17,16 @@ namespace {
 constexpr double kInterval95 = 1.959963984540;  // standard deviations
 constexpr double kRotationTolerance = 1e-7;     // rad, of a corrected target
 
+/// Mean over the coordinates of minus the log density of errors in normal distributions of these stddevs, nat.
+std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
+  const auto z = error.array() / stddev.array();
+  const double mean = (0.5 * z.square() + stddev.array().log()).mean() + 0.5 * std::log(2 * std::numbers::pi);
+  return std::isfinite(mean) ? std::optional(mean) : std::nullopt;
+}
+
 }  // namespace
+
+double nlpd_in_mm(double nlpd_in_m) { return nlpd_in_m + std::log(to_mm(1.0)); }
 
 ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
   const auto n = e_B.cols();
@@ -298,6 +309,7 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   evaluation.coverage_95 =
       (errors.compensated.array().abs() <= kInterval95 * errors.stddev.array()).cast<double>().mean();
   evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
+  evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
   return evaluation;
 }
 

@@ -67,12 +67,14 @@ ErrorFigures figures_from(const Json& json) {
 }
 
 Json to_json(const Evaluation& e) {
-  return {{"poses", e.poses},
-          {"nominal", to_json(e.nominal)},
-          {"calibrated", to_json(e.calibrated)},
-          {"compensated", to_json(e.compensated)},
-          {"coverage_95", e.coverage_95},
-          {"in_domain", e.in_domain}};
+  Json json = {{"poses", e.poses},
+               {"nominal", to_json(e.nominal)},
+               {"calibrated", to_json(e.calibrated)},
+               {"compensated", to_json(e.compensated)},
+               {"coverage_95", e.coverage_95},
+               {"in_domain", e.in_domain}};
+  if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
+  return json;
 }
 
 Evaluation evaluation_from(const Json& json) {
@@ -83,6 +85,7 @@ Evaluation evaluation_from(const Json& json) {
   e.compensated = figures_from(json.at("compensated"));
   e.coverage_95 = json.at("coverage_95");
   e.in_domain = json.at("in_domain");
+  if (json.contains("nlpd_of_m")) e.nlpd = json.at("nlpd_of_m").get<double>();
   return e;
 }
 

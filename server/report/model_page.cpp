@@ -115,6 +115,8 @@ std::string provenance_table(const CompensatedModel& model, const Evaluation& ev
          line("joints of the training", trained_ranges(model)) +
          line("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses)) +
          line("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95)) +
+         line("negative log predictive density",
+              evaluation.nlpd ? fmt::format("{:.3f} nat a coordinate, mm", nlpd_in_mm(*evaluation.nlpd)) : "-") +
          line("left over beyond the tracker's sigma",
               fmt::format("{:.4f} mm per axis, calibrated", to_mm(parts.discrepancy)));
 }

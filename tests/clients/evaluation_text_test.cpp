@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 
 #include "tests/support/small_cell.h"
@@ -14,6 +15,7 @@ Evaluation evaluation() {
   evaluation.poses = 7;
   evaluation.in_domain = 6;
   evaluation.coverage_95 = .9;
+  evaluation.nlpd = -9.25;
   evaluation.nominal.rms = 3e-3;
   evaluation.calibrated.rms = 4e-4;
   evaluation.compensated = {1e-4, 9e-5, 2e-4, 3e-4, Vector3(1e-5, 2e-5, -3e-5), Vector3(4e-5, 5e-5, 6e-5)};
@@ -27,6 +29,8 @@ TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {
   auto json = evaluation_json(evaluation());
   EXPECT_EQ(json["levels"]["nominal"]["rms_mm"], 3.0);
   EXPECT_EQ(json["levels"]["calibrated"]["rms_mm"], 0.4);
+  EXPECT_NEAR(json["nlpd"].get<double>(), -9.25 + std::log(1000.0), 1e-12);
+  json.erase("nlpd");
   json["levels"].erase("nominal");
   json["levels"].erase("calibrated");
   const auto expected = nlohmann::json::parse("{\"poses\":7," + compensated + ",\"levels\":{\"compensated\":{" +
@@ -48,6 +52,11 @@ TEST(EvaluationTable, HasALineForEachLevel) {
   EXPECT_NE(table.find("calibrated      0.4000"), std::string::npos) << table;
   EXPECT_NE(table.find("compensated     0.1000    0.0900    0.2000    0.3000"), std::string::npos) << table;
   EXPECT_NE(table.find("6 of 7 poses in domain; 90.0 %"), std::string::npos) << table;
+  EXPECT_NE(table.find("-2.342 nat"), std::string::npos) << table;
+  Evaluation old = evaluation();
+  old.nlpd.reset();  // of a model of before it was kept
+  EXPECT_EQ(evaluation_table(old).find("density"), std::string::npos);
+  EXPECT_FALSE(evaluation_json(old).contains("nlpd"));
 }
 
 TEST(ModelText, SaysWhatCouldNotBeIdentified) {

@@ -76,6 +76,32 @@ TEST_F(Compensated, PredictsTheErrorOfPosesItNeverSaw) {
   EXPECT_GE(evaluation.in_domain, 280);
 }
 
+TEST_F(Compensated, TheLogDensityOfItsErrorsIsThatOfItsOwnStddevs) {
+  const MeasurementBatch batch = test::measured(*robot_, 60, 34);
+  const CompensatedModel::LevelErrors errors = model().errors_B(batch);
+  double sum = 0;
+  for (Eigen::Index i = 0; i < errors.stddev.size(); ++i) {
+    const double s = errors.stddev(i);
+    sum += std::log(std::exp(-0.5 * std::pow(errors.compensated(i) / s, 2)) / (s * std::sqrt(8 * std::atan(1.0))));
+  }
+  const Evaluation evaluation = model().evaluate(batch);
+  EXPECT_NEAR(*evaluation.nlpd, -sum / static_cast<double>(errors.stddev.size()), 1e-9);
+  // A coordinate that spreads by s has entropy log(s sqrt(2 pi e)).
+  EXPECT_NEAR(nlpd_in_mm(*evaluation.nlpd), std::log(to_mm(evaluation.compensated.rms) / std::sqrt(3)) + 1.42, 0.4);
+}
+
+TEST_F(Compensated, AModelFileOfBeforeTheLogDensityWasKeptLoads) {
+  CompensatedModel::Parts parts = model().parts();
+  ASSERT_TRUE(parts.training.nlpd);
+  parts.training.nlpd.reset();
+  const CompensatedModel old = CompensatedModel::make(std::move(parts)).value();
+  const Result<CompensatedModel> loaded = deserialize(serialize(old), "memory");
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->provenance().hash, old.provenance().hash);
+  EXPECT_FALSE(loaded->parts().training.nlpd);
+  EXPECT_EQ(*deserialize(serialize(model()), "memory")->parts().training.nlpd, *model().parts().training.nlpd);
+}
+
 TEST_F(Compensated, CorrectedTargetsLandWhereTheyWereWanted) {
   const MeasurementBatch poses = test::measured(*robot_, 50, 33);
   for (const Measurement& m : poses.measurements) {
