@@ -77,11 +77,9 @@ Status apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& ba
   if (!extension) return tl::make_unexpected(extension.error());
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
-  if (extension->better) return write_extension(*extension, *cell, arguments);
-  return refused(
-      "cell {}: the extended model is not better on the poses held out ({:.4f} mm rms, before {:.4f} mm); "
-      "nothing was written",
-      cell->name, json["applied"]["after"]["rms_mm"].get<double>(), json["applied"]["before"]["rms_mm"].get<double>());
+  if (extension->gain.beyond_chance()) return write_extension(*extension, *cell, arguments);
+  return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
+                 to_string(extension->gain));
 }
 
 /// The batch that is diagnosed: to apply what is found, some rows must not have been seen.

@@ -57,9 +57,17 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!json.is_object()) return failure(ErrorCode::kInternal, "what job {} found is not JSON", *job);
   say(diagnosis_text(json), arguments);
   if (arguments.apply) {
-    json["applied"] = {
-        {"job", *job}, {"outcome", end->what}, {"version", end->model_version}, {"in_force", end->in_force}};
-    say(fmt::format("\nversion {}: {}\n", end->model_version, end->what), arguments);
+    const int now = found->in_force.version;
+    json["applied"] = {{"job", *job},
+                       {"outcome", end->what},
+                       {"version", end->model_version},
+                       {"in_force", end->in_force},
+                       {"version_in_force", now > 0 ? ordered_json(now) : ordered_json(nullptr)},
+                       {"error_sources_in_force", found->in_force.level}};
+    say(fmt::format("\n{}{}\nin force now: {}\n",
+                    end->model_version > 0 ? fmt::format("version {}: ", end->model_version) : "", end->what,
+                    now > 0 ? fmt::format("version {} ({})", now, found->in_force.level) : "no version"),
+        arguments);
   }
   if (const Status written = write_found(*found, json, arguments); !written) return written;
   if (!arguments.apply || end->in_force) return {};

@@ -190,11 +190,14 @@ std::string extension_text(const Extension& extension) {
   const int poses = extension.after.parts().validation->poses;
   return fmt::format("\nWith bias, on {} poses held out from diagnosis and training:\n", poses) +
          fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
-         extended_line("before", extension.before) + extended_line("extended", extension.after);
+         extended_line("before", extension.before) + extended_line("extended", extension.after) +
+         fmt::format("  {}\n", to_string(extension.gain));
 }
 
 ordered_json extension_json(const Extension& extension) {
-  return {{"better", extension.better},
+  return {{"better", extension.gain.beyond_chance()},
+          {"z", extension.gain.z},
+          {"z_limit", PairedGain::kBeyondChance},
           {"error_sources", extension.sources},
           {"of_the_cell", extension.lasting},
           {"held_out_poses", extension.after.parts().validation->poses},

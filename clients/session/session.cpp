@@ -245,7 +245,7 @@ Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t
   auto reply =
       participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), {cell, found->first, false});
   if (!reply) return tl::make_unexpected(reply.error());
-  return DiagnosisAnswer{std::move(reply->findings_json()), std::move(reply->page_html())};
+  return DiagnosisAnswer{std::move(reply->findings_json()), std::move(reply->page_html()), from_wire(reply->model())};
 }
 
 Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cell) {

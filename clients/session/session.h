@@ -86,6 +86,7 @@ struct JobStatus {
 struct DiagnosisAnswer {
   std::string findings_json;  ///< as `trammel diagnose --json` prints them
   std::string page_html;      ///< opens by itself; empty where it was not asked for, or is too old
+  ModelInfo in_force;         ///< now; empty id: none
 };
 
 /// A batch that no training takes, and why.

@@ -4,6 +4,8 @@
 #include <array>
 #include <set>
 
+#include "server/measurement/velocity.h"
+
 namespace trammel {
 
 namespace {
@@ -50,6 +52,16 @@ std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& dia
   return sources;
 }
 
+std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell,
+                                          const MeasurementBatch& batch) {
+  std::vector<std::string> sources;
+  for (const ErrorSourcePtr& source : model.parts().physics.sources) {
+    const bool chosen = source->name().starts_with("compliance") && contains(cell.model.error_sources, "compliance");
+    sources.push_back(chosen ? "compliance" : source->name());
+  }
+  return model.provenance().batch_hash == batch_hash(batch) ? sources : lasting_sources(sources);
+}
+
 MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed) {
   std::set<int> held_out;
   for (const Measurement& m : split_batch(batch, share, seed).validation.measurements) held_out.insert(m.row);
@@ -70,8 +82,11 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const Measurem
   if (!before) return tl::make_unexpected(before.error());
   auto after = trained(cell, batch, sources, 0.5, options);
   if (!after) return tl::make_unexpected(after.error());
-  const bool better = after->parts().validation->compensated.rms < before->parts().validation->compensated.rms;
-  return Extension{sources, lasting_sources(sources), std::move(*before), std::move(*after), better};
+  Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
+  if (!checked) return tl::make_unexpected(checked.error());
+  fill_velocity(*checked);
+  const PairedGain gain = paired_gain(*before, *after, split_batch(*checked, 0, options.seed).validation);
+  return Extension{sources, lasting_sources(sources), std::move(*before), std::move(*after), gain};
 }
 
 }  // namespace trammel

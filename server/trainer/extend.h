@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/diagnose/diagnosis.h"
+#include "server/trainer/paired_gain.h"
 #include "server/trainer/train.h"
 
 namespace trammel {
@@ -14,7 +15,7 @@ struct Extension {
   std::vector<std::string> sources;  ///< all that the extended model was trained with
   std::vector<std::string> lasting;  ///< of them, those that belong into the cell file
   CompensatedModel before, after;    ///< both with figures on the same poses held out
-  bool better = false;               ///< the held-out rms is smaller
+  PairedGain gain;                   ///< of the one over the other
 };
 
 /// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why not.
@@ -26,6 +27,11 @@ struct Extension {
 
 /// The cell's own list as its owner spells it, and what the diagnosis adds to it.
 [[nodiscard]] std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& diagnosis);
+
+/// The sources that `model` was trained with, a compliance as `cell` spells it; those of one batch only where it is
+/// `batch` that the model was trained from.
+[[nodiscard]] std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell,
+                                                        const MeasurementBatch& batch);
 
 /// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for validation.
 [[nodiscard]] MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed);

@@ -16,7 +16,9 @@
 #include "server/error_sources/error_source.h"
 #include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
+#include "server/measurement/velocity.h"
 #include "server/trainer/extend.h"
+#include "server/trainer/paired_gain.h"
 
 namespace trammel {
 namespace {
@@ -130,30 +132,40 @@ std::optional<std::string> level_with_additions(const Cell& cell, const Compensa
 }
 
 /// Against the nominal model: the first one of a cell, or the first with a tool that the one in force does not know.
-Acceptance judge_alone(const Evaluation& candidate) {
-  const bool better = candidate.compensated.rms < candidate.nominal.rms;
+Acceptance judge_alone(const CompensatedModel& candidate, const MeasurementBatch& held_out, Trainer::Bar bar) {
+  const CompensatedModel::LevelErrors errors = candidate.errors_B(held_out);
+  const PairedGain gain = paired_gain(errors.nominal, errors.compensated);
+  const bool better = bar == Trainer::Bar::kBetter ? gain.beyond_chance() : gain.rms_after < gain.rms_before;
   return {better,
           fmt::format("{}: held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", better ? "in force" : "not in force",
-                      to_mm(candidate.compensated.rms), to_mm(candidate.nominal.rms), candidate.poses)};
+                      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses)};
 }
 
-Acceptance judge_against(const Evaluation& candidate, const Evaluation& present, int present_version,
-                         double accept_ratio) {
-  const bool good = candidate.compensated.rms <= accept_ratio * present.compensated.rms;
+/// Against the one in force: not worse by more than `accept_ratio`, or better by more than chance brings.
+Acceptance judge_against(const CompensatedModel& candidate, const ServedModel& present,
+                         const MeasurementBatch& held_out, Trainer::Bar bar, double accept_ratio) {
+  const PairedGain gain = paired_gain(present.model, candidate, held_out);
+  if (bar == Trainer::Bar::kBetter) {
+    const bool good = gain.beyond_chance();
+    return {good, fmt::format("{}: held-out rms {}; before is version {}{}", good ? "in force" : "not in force",
+                              to_string(gain), present.version, good ? "" : ", which stays in force")};
+  }
+  const bool good = gain.rms_after <= accept_ratio * gain.rms_before;
   return {good, fmt::format("{}: held-out rms {:.4f} mm, limit {} x {:.4f} mm of version {}, {} poses",
-                            good ? "in force" : "not in force", to_mm(candidate.compensated.rms), accept_ratio,
-                            to_mm(present.compensated.rms), present_version, candidate.poses)};
+                            good ? "in force" : "not in force", to_mm(gain.rms_after), accept_ratio,
+                            to_mm(gain.rms_before), present.version, gain.poses)};
 }
 
 Acceptance judge(const CompensatedModel& candidate, const ServedModel* present, const MeasurementBatch& held_out,
-                 double accept_ratio) {
+                 Trainer::Bar bar, double accept_ratio) {
   if (held_out.measurements.empty()) {
     return {false, "not in force: no pose was held out to judge it; activate it if it is wanted"};
   }
-  const Evaluation evaluation = candidate.evaluate(held_out);
-  if (!std::isfinite(evaluation.compensated.rms)) return {false, "not in force: its held-out rms is not finite"};
-  if (present == nullptr || !fits(present->model, held_out)) return judge_alone(evaluation);
-  return judge_against(evaluation, present->model.evaluate(held_out), present->version, accept_ratio);
+  if (!std::isfinite(candidate.evaluate(held_out).compensated.rms)) {
+    return {false, "not in force: its held-out rms is not finite"};
+  }
+  if (present == nullptr || !fits(present->model, held_out)) return judge_alone(candidate, held_out, bar);
+  return judge_against(candidate, *present, held_out, bar, accept_ratio);
 }
 
 JobStage stage_of(JobState state) {
@@ -500,7 +512,7 @@ Status Trainer::attempt(std::int64_t id, const std::stop_token& stop) {
 
   const auto model = train(*cell_found, *batch, train_options(*job, **cell_found, progress, stop));
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), options_.accept_ratio, *looked_at);
+  return keep(*model, *batch, std::move(progress), Bar::kNotWorse, *looked_at);
 }
 
 std::function<bool(const std::string&, double)> Trainer::reporter(const JobProgress& progress,
@@ -550,16 +562,18 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
   return all;
 }
 
-Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress,
-                     double accept_ratio, const std::string& note) {
+Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
+                     const std::string& note) {
   progress.stage = JobStage::kStoring;
   progress.what.clear();
   progress.share = 1;
   report(progress);
   {
     const std::lock_guard lock(activation_mutex_);
-    const MeasurementBatch held_out = split_batch(batch, options_.validation_share, options_.seed).validation;
-    Acceptance verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, accept_ratio);
+    MeasurementBatch whole = batch;
+    fill_velocity(whole);
+    const MeasurementBatch held_out = split_batch(whole, options_.validation_share, options_.seed).validation;
+    Acceptance verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, bar, options_.accept_ratio);
     if (!note.empty()) verdict.message += "; the batch: " + note;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());

@@ -46,6 +46,9 @@ struct JobProgress {
 /// that the model in force and its successor are compared on poses that neither was trained on.
 class Trainer {
  public:
+  /// What a new model must be to be put in force: as TrainerOptions::accept_ratio says, or better than the one in force
+  /// beyond chance (PairedGain).
+  enum class Bar { kNotWorse, kBetter };
   /// Called by whichever thread changes the job; for one job never by two at a time.
   using ProgressListener = std::function<void(const JobProgress&)>;
   /// A model was stored (in_force: and put in force). Called in the order of the changes, while no other can happen: it
@@ -81,8 +84,9 @@ class Trainer {
   /// and what the model in force has besides. Refuses batches in quarantine.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias);
-  /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`; with `apply` trains the causes found into the
-  /// model and puts it in force only if it is better on the rows held out. Returns the job; its findings are
+  /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of the model in force
+  /// (of the cell, where there is none) do not explain. With `apply` trains the causes found beside them and puts the
+  /// model in force only if it is better on the rows held out beyond chance. Returns the job; its findings are
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply);
@@ -133,8 +137,8 @@ class Trainer {
   [[nodiscard]] TrainOptions train_options(const StoredJob& job, const Cell& cell, const JobProgress& progress,
                                            const std::stop_token& stop);
   /// Stores the model and, if it is good enough, puts it in force. `note` goes with the outcome.
-  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress,
-                            double accept_ratio, const std::string& note);
+  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
+                            const std::string& note);
   /// Ends a job that makes no model.
   [[nodiscard]] Status finish(JobProgress progress, const std::string& outcome);
   void report(const JobProgress& progress);

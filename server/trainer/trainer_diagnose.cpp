@@ -18,11 +18,19 @@ namespace trammel {
 namespace {
 
 constexpr double kDiagnosisShare = 0.7;     // of a diagnosis that is applied, the rest is the training
-constexpr double kAcceptIfBetter = 1.0;     // an extended model that is not better has named nothing of use
 constexpr std::size_t kIdOfSentBatch = 12;  // characters of its hash
 
 std::string findings_text(const Diagnosis& diagnosis) {
   return diagnosis_json(diagnosis).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+/// The cell as it is served: with the error sources of the model in force.
+std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, const ServedModel* in_force,
+                                      const MeasurementBatch& batch) {
+  if (in_force == nullptr) return cell;
+  auto served = std::make_shared<Cell>(*cell);
+  served->model.error_sources = sources_in_force(in_force->model, *cell, batch);
+  return served;
 }
 
 }  // namespace
@@ -102,25 +110,27 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   options.progress = [report = reporter(progress, stop), whole](const std::string& stage, double share) mutable {
     return report("diagnosing: " + stage, whole * share);
   };
-  const auto diagnosis = trammel::diagnose(cell_found, *batch, options);
+  const auto present = registry_.in_force(job.cell);
+  const auto served = as_served(cell_found, present.get(), *batch);
+  const auto diagnosis = trammel::diagnose(served, *batch, options);
   if (!diagnosis) return tl::make_unexpected(diagnosis.error());
-  const Status stored =
-      store_.store_findings(job.id, findings_text(*diagnosis), diagnosis_page(*diagnosis, *cell_found));
+  const Status stored = store_.store_findings(job.id, findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
   if (!stored) return stored;
   const Status can_apply = check_can_extend(*diagnosis);
   if (!asked->apply || !can_apply) {
-    return finish(std::move(progress), asked->apply ? "nothing applied: " + can_apply.error().message
+    const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
+    return finish(std::move(progress), asked->apply ? "nothing applied: " + can_apply.error().message + stays
                                                     : std::string(to_string(diagnosis->verdict)));
   }
   StoredJob extended = job;
-  extended.level = fmt::format("{}", fmt::join(extended_sources(*cell_found, *diagnosis), ","));
+  extended.level = fmt::format("{}", fmt::join(extended_sources(*served, *diagnosis), ","));
   TrainOptions training = train_options(extended, *cell_found, progress, stop);
   training.progress = [report = training.progress](const std::string& stage, double share) {
     return report(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
   };
   const auto model = train(cell_found, *batch, training);
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), kAcceptIfBetter, "");
+  return keep(*model, *batch, std::move(progress), Bar::kBetter, "");
 }
 
 Status Trainer::finish(JobProgress progress, const std::string& outcome) {

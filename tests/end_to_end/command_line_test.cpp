@@ -465,6 +465,8 @@ TEST_F(CommandLineWithService, ABatchIsDiagnosedThereAndWhatItNamesPutInForce) {
   const json found = json::parse(test::read_file(file("found.json")));
   EXPECT_EQ(found.at("findings").at(0).at("cause"), "gear_transmission");
   EXPECT_TRUE(found.at("applied").at("in_force").get<bool>());
+  EXPECT_EQ(found.at("applied").at("version_in_force"), 2);
+  EXPECT_NE(found.at("applied").at("outcome").get<std::string>().find("better beyond chance"), std::string::npos);
   EXPECT_NE(test::read_file(file("page.html")).find("</html>"), std::string::npos);
   const json models = json::parse(must_answer({"models", "--cell", "cell-7", "--json", "-"}).out).at("models");
   EXPECT_NE(models.at(1).at("level").get<std::string>().find("gear_transmission:3"), std::string::npos);

@@ -32,7 +32,8 @@ class Extend : public testing::Test {
 TEST_F(Extend, ByTheTrueCauseLowersTheErrorOnPosesHeldOut) {
   diagnosis_.sources_after = {"base", kGear};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
-  EXPECT_TRUE(extension.better);
+  EXPECT_TRUE(extension.gain.beyond_chance()) << to_string(extension.gain);
+  EXPECT_EQ(extension.gain.poses, 30);
   EXPECT_EQ(extension.after.parts().validation->poses, 30);
   EXPECT_LT(extension.after.parts().validation->compensated.rms, 0.05e-3);
   EXPECT_GT(extension.before.parts().validation->compensated.rms, 0.15e-3);
@@ -41,8 +42,7 @@ TEST_F(Extend, ByTheTrueCauseLowersTheErrorOnPosesHeldOut) {
 TEST_F(Extend, ByAnotherCauseIsNotCalledBetterThanItIs) {
   diagnosis_.sources_after = {"base", "encoder_eccentricity:6"};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
-  EXPECT_EQ(extension.better,
-            extension.after.parts().validation->compensated.rms < extension.before.parts().validation->compensated.rms);
+  EXPECT_FALSE(extension.gain.beyond_chance()) << to_string(extension.gain);
   EXPECT_GT(extension.after.parts().validation->compensated.rms, 0.15e-3);
 }
 
@@ -59,6 +59,20 @@ TEST_F(Extend, IsRefusedWithoutPosesToJudgeItBy) {
   diagnosis_.sources_after = {"base", kGear};
   for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kTrain;
   EXPECT_FALSE(extend(cell_, batch_, diagnosis_, {}));
+}
+
+TEST_F(Extend, BeginsWithWhatTheModelInForceWasTrainedWith) {
+  TrainOptions options;
+  options.level = "base,compliance,gear_transmission:3@2,tracker_moved@12";
+  Cell carrying = *cell_;
+  carrying.model.error_sources = {"base", "compliance"};
+  const CompensatedModel model = test::demand(train(cell_, batch_, options));
+  EXPECT_EQ(sources_in_force(model, carrying, batch_),
+            (std::vector<std::string>{"base", "tracker_moved@12", "gear_transmission:3@2", "compliance"}));
+  MeasurementBatch another = batch_;
+  another.source_text += "\n";
+  EXPECT_EQ(sources_in_force(model, carrying, another),
+            (std::vector<std::string>{"base", "gear_transmission:3@2", "compliance"}));
 }
 
 TEST(LastingSources, AreThoseThatBelongToTheRobotAndNotToTheBatch) {

@@ -499,6 +499,22 @@ TEST_F(TrainerTest, PutsTheExtendedModelInForceBecauseItIsBetterAndKeepsWhatWasA
   EXPECT_EQ(store_->models("cell-7")->at(2).level, level) << again.what;
 }
 
+TEST_F(TrainerTest, WhatTheModelInForceHasAlreadyIsNotFoundAgain) {
+  start();
+  const std::string oscillating = csv_of_an_oscillating_joint(cells_.at("cell-7"));
+  watch_.wait_until_finished(trainer_->submit("cell-7", "lt-07", oscillating, "client:1").value());
+  const JobProgress first = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  ASSERT_TRUE(first.in_force) << first.what;
+  EXPECT_NE(first.what.find("better beyond chance"), std::string::npos) << first.what;
+  EXPECT_NE(first.what.find("before is version 1"), std::string::npos) << first.what;
+  const JobProgress again = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  EXPECT_FALSE(again.in_force);
+  EXPECT_NE(again.what.find("nothing applied"), std::string::npos) << again.what;
+  EXPECT_NE(again.what.find("version 2 stays in force"), std::string::npos) << again.what;
+  EXPECT_EQ(in_force(), 2);
+  EXPECT_EQ(store_->models("cell-7")->size(), 2u);
+}
+
 TEST_F(TrainerTest, ADiagnosisThatNamesNothingAppliesNothing) {
   start();
   train("lt-07");
