@@ -18,11 +18,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr const char* kCellOption = "--cell-out";
 constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
-
-Status write_if_asked(const std::string& path, const std::string& text) {
-  return path.empty() ? Status() : write_output(path, text);
-}
 
 Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                                 std::uint64_t seed) {
@@ -49,37 +46,44 @@ Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const M
   return extend(cell, batch, diagnosis, options);
 }
 
-/// The extended list into the cell file, and the model where it is wanted; the cell's text is made before anything is
-/// written.
-Status write_extension(const Extension& extension, const Cell& cell, const DiagnoseArguments& arguments) {
-  const Result<std::string> text = with_error_sources(cell.cell_yaml, extension.lasting, arguments.cell);
-  if (!text) return tl::make_unexpected(text.error());
-  if (!arguments.model.empty()) {
-    if (const Status written = write_output(arguments.model, serialize(extension.after)); !written) return written;
-  }
-  const std::string& path = arguments.cell_out.empty() ? arguments.cell : arguments.cell_out;
-  if (const Status written = write_output(path, *text); !written) return written;
+/// Where the extended list goes.
+const std::string& extended_cell(const DiagnoseArguments& arguments) {
+  return arguments.cell_out.empty() ? arguments.cell : arguments.cell_out;
+}
+
+std::string extension_written(const Extension& extension, const DiagnoseArguments& arguments) {
+  const std::string& path = extended_cell(arguments);
   std::string said = fmt::format("{}: error_sources: [{}]\n", path, fmt::join(extension.lasting, ", "));
   if (extension.lasting.size() < extension.sources.size()) {
     said += "  (what began at a pose of this batch is in the model, not in the cell file)\n";
   }
+  if (const Result<Cell> readable = read_cell(path); !readable) {
+    said += fmt::format("  (it names its robot relative to itself, and is no cell file where it is: {})\n",
+                        readable.error().message);
+  }
   if (!arguments.model.empty()) {
     said += fmt::format("model {} in {}\n", extension.after.provenance().id, arguments.model);
   }
-  say(said, arguments);
-  return {};
+  return said;
 }
 
-/// Never silently worse: what does not lower the error on poses held out is not written.
-Status apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, const Diagnosis& diagnosis,
-             const DiagnoseArguments& arguments, ordered_json& json) {
-  const Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
-  if (!extension) return tl::make_unexpected(extension.error());
+/// Never silently worse: what does not lower the error on poses held out beyond chance goes into no file.
+Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                        const Diagnosis& diagnosis, const DiagnoseArguments& arguments, ordered_json& json,
+                        Outputs& outputs) {
+  Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
+  if (!extension) return extension;
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
-  if (extension->gain.beyond_chance()) return write_extension(*extension, *cell, arguments);
-  return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
-                 to_string(extension->gain));
+  if (!extension->gain.beyond_chance()) {
+    return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
+                   to_string(extension->gain));
+  }
+  Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
+  if (!text) return tl::make_unexpected(text.error());
+  outputs.put(kCellOption, std::move(*text));
+  outputs.put("--model", serialize(extension->after));
+  return extension;
 }
 
 /// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
@@ -91,6 +95,10 @@ Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
   if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
+  Outputs outputs = outputs_of(arguments);
+  if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
+  outputs.add("--model", arguments.model);
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
   Result<Cell> read = read_cell(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
@@ -100,18 +108,43 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   if (!diagnosis) return tl::make_unexpected(diagnosis.error());
   ordered_json json = diagnosis_json(*diagnosis);
   say(diagnosis_text(json), arguments);
-  Status done = write_if_asked(arguments.next_poses, next_poses_csv(json));
-  if (done && !arguments.report.empty()) done = write_output(arguments.report, diagnosis_page(*diagnosis, *cell));
-  if (!done) return done;
-  const Status applied = arguments.apply ? apply(cell, *batch, *diagnosis, arguments, json) : Status();
-  if (const Status written = write_json(arguments.json, json); !written) return written;
-  return applied;
+  std::optional<Result<Extension>> applied;
+  if (arguments.apply) applied = apply(cell, *batch, *diagnosis, arguments, json, outputs);
+  if (const Status written = write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments); !written) {
+    return written;
+  }
+  if (!applied) return {};
+  if (!*applied) return tl::make_unexpected(applied->error());
+  say(extension_written(**applied, arguments), arguments);
+  return {};
 }
 
 }  // namespace
 
 void say(const std::string& text, const DiagnoseArguments& arguments) {
   tell(text, {arguments.json, arguments.report, arguments.next_poses, arguments.cell_out});
+}
+
+Outputs outputs_of(const DiagnoseArguments& arguments) {
+  Outputs outputs;
+  outputs.add("--report", arguments.report);
+  outputs.add("--next-poses", arguments.next_poses);
+  outputs.add("--json", arguments.json);
+  return outputs;
+}
+
+Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outputs,
+                       const DiagnoseArguments& arguments) {
+  const bool poses = !json.at("next_poses").empty();
+  if (poses) outputs.put("--next-poses", next_poses_csv(json));
+  outputs.put("--report", std::move(page));
+  outputs.put("--json", json_text(json));
+  if (const Status written = outputs.write(); !written) return written;
+  if (!poses && !arguments.next_poses.empty()) {
+    fmt::print(stderr, "{}: not written, no poses are suggested: {}\n", arguments.next_poses,
+               json.at("next_poses_for").at("none_because").get<std::string>());
+  }
+  return {};
 }
 
 void add_diagnose_command(CLI::App& app, Action& chosen) {
@@ -124,11 +157,12 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
       "Measurements (CSV: deg, mm); with --service also the id of a batch that it has, else the newest");
   command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
   command
-      ->add_option("--next-poses", arguments->next_poses,
-                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot")
+      ->add_option(
+          "--next-poses", arguments->next_poses,
+          "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot; where "
+          "there are none nothing is written, the reason is said on standard error, and the exit code is 0")
       ->type_name("FILE");
-  command->add_option("--seed", arguments->seed, "Seed of the bootstrap and of the rows held out")
-      ->capture_default_str();
+  add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
   CLI::Option* apply_flag = command->add_flag(
       "--apply", arguments->apply,
       "Add what was found to the cell's error sources and train; nothing is written unless poses held out gain by it");

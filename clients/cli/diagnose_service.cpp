@@ -28,20 +28,14 @@ Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
   });
 }
 
-Status write_found(const client::DiagnosisAnswer& found, const ordered_json& json, const DiagnoseArguments& arguments) {
-  Status done = write_json(arguments.json, json);
-  if (done && !arguments.next_poses.empty()) done = write_output(arguments.next_poses, next_poses_csv(json));
-  if (!done || arguments.report.empty()) return done;
-  if (found.page_html.empty()) return refused("{}: the service has this page no more", arguments.report);
-  return write_output(arguments.report, found.page_html);
-}
-
 }  // namespace
 
 Status diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!arguments.model.empty() || !arguments.cell_out.empty()) {
     return failure(ErrorCode::kUsage, "--model and --cell-out are for files; a service keeps its models itself");
   }
+  Outputs outputs = outputs_of(arguments);
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto session = open_session(arguments.service);
@@ -51,7 +45,7 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
   const Result<client::JobStatus> end = wait(**session, *job);
   if (!end) return tl::make_unexpected(end.error());
   if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
-  const auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
+  auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
   if (!found) return tl::make_unexpected(found.error());
   ordered_json json = ordered_json::parse(found->findings_json, nullptr, false);
   if (!json.is_object()) return failure(ErrorCode::kInternal, "what job {} found is not JSON", *job);
@@ -69,7 +63,11 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
                     now > 0 ? fmt::format("version {} ({})", now, found->in_force.level) : "no version"),
         arguments);
   }
-  if (const Status written = write_found(*found, json, arguments); !written) return written;
+  if (!arguments.report.empty() && found->page_html.empty()) {
+    return refused("{}: the service has this page no more", arguments.report);
+  }
+  const Status written = write_diagnosis(json, std::move(found->page_html), outputs, arguments);
+  if (!written) return written;
   if (!arguments.apply || end->in_force) return {};
   return refused("cell {}: {}", *cell, end->what);
 }

@@ -121,7 +121,7 @@ void add_train(CLI::App& app, Action& chosen) {
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
       ->needs("--from")
       ->capture_default_str();
-  command->add_option("--seed", arguments->seed, "Seed of the search and of the rows held out")->capture_default_str();
+  add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
                    "Share of the rows to hold out, 0 to 0.9, where the batch has no set column")

@@ -1,6 +1,7 @@
 #include "clients/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 
 #include "server/robot/cell.h"
@@ -36,6 +37,18 @@ Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& opti
   session.server_ports = options.ports;
   session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
   return client::Session::open(session);
+}
+
+void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+  // Taken for an unsigned number, -1 would silently be the largest.
+  const CLI::Validator whole(
+      [](const std::string& text) {
+        const bool digits = !text.empty() &&
+                            std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
+        return digits ? std::string() : "--seed " + text + ": expected a whole number from 0";
+      },
+      "");
+  command.add_option("--seed", seed, help)->check(whole)->capture_default_str();
 }
 
 void add_json_option(CLI::App& command, std::string& path) {

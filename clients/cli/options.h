@@ -25,6 +25,8 @@ struct ServiceOptions {
 void add_service_options(CLI::App& command, ServiceOptions& options);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 
+/// `--seed`: a whole number from 0.
+void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
 void add_json_option(CLI::App& command, std::string& path);
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload);
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "server/base/result.h"
 
@@ -13,8 +15,36 @@ namespace trammel::cli {
 /// Writes `value` where --json says; nothing when it was not given (empty path).
 [[nodiscard]] Status write_json(const std::string& path, const nlohmann::ordered_json& value);
 
+[[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
+
 /// Text for people on standard output, left out when a result for programs goes there (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
+
+/// What one command reads or writes, and the option that names it.
+struct NamedFile {
+  std::string option, path;
+};
+
+/// The files of one command that belong together: looked at before the work, written after it, all or none.
+class Outputs {
+ public:
+  /// An empty path is no output. `may_replace`: the input that it may be the new state of.
+  void add(const std::string& option, const std::string& path, const std::string& may_replace = "");
+  /// Refuses as wrong usage two of them in one file or both on standard output, and one that is an input; as refused
+  /// data what cannot be written.
+  [[nodiscard]] Status check(const std::vector<NamedFile>& inputs) const;
+  /// The text of an output that was added; one that gets none is not written.
+  void put(const std::string& option, std::string text);
+  [[nodiscard]] Status write() const;
+
+ private:
+  struct Output {
+    NamedFile file;
+    std::string may_replace;
+    std::optional<std::string> text;
+  };
+  std::vector<Output> outputs_;
+};
 
 /// One line on standard error that is written over as work goes on. Silent where standard error is no terminal.
 class ProgressLine {

@@ -182,7 +182,7 @@ void add_plan_command(CLI::App& app, Action& chosen) {
       ->add_option("--from", arguments->from,
                    "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them")
       ->excludes(count);
-  command->add_option("--seed", options.seed, "Seed of the draw")->capture_default_str();
+  add_seed_option(*command, options.seed, "Seed of the draw");
   command
       ->add_option("--criterion", arguments->criterion,
                    "How poses are chosen: lhs, a Latin hypercube; observability, for the parameters of the cell's "

@@ -70,7 +70,7 @@ void add_simulate(CLI::App& app, Action& chosen) {
   what->require_option(1);
   command->add_option("--truth", arguments->truth, "Virtual robot's true parameters (YAML)")->required();
   command->add_option("--plan", arguments->plan, "Poses to measure (CSV: joints in deg, rails in mm)")->required();
-  command->add_option("--seed", arguments->seed, "Seed of the measuring noise")->capture_default_str();
+  add_seed_option(*command, arguments->seed, "Seed of the measuring noise");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Leave out orientations, as a single reflector does");
   command->add_flag("--noise-free", arguments->noise_free, "Write where the tool really is, without measuring noise");

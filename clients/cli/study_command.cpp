@@ -72,7 +72,7 @@ void add_study_command(CLI::App& app, Action& chosen) {
   command->add_option("--cell", arguments->cell, "Cell file (YAML) instead of the shipped one")->type_name("FILE");
   command->add_option("--truth", arguments->truth, "Virtual robot's true parameters (YAML) instead of the shipped ones")
       ->type_name("FILE");
-  command->add_option("--seed", arguments->seed, "Seed of all draws: poses, noise, search")->capture_default_str();
+  add_seed_option(*command, arguments->seed, "Seed of all draws: poses, noise, search");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
 }

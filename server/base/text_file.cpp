@@ -38,25 +38,72 @@ std::string write_all(const fs::path& path, const std::string& text) {
   return out ? "" : std::strerror(errno);
 }
 
+/// Renaming onto a device, a pipe or a link would put a file in its place.
+bool is_written_in_place(const std::string& path) {
+  std::error_code error;
+  return fs::exists(path, error) && !fs::is_regular_file(path, error);
+}
+
+fs::path target_of(const std::string& path) {
+  std::error_code error;
+  return fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : fs::path(path);
+}
+
+fs::path beside(const std::string& path) { return fmt::format("{}.{}.part", target_of(path).string(), ::getpid()); }
+
+void remove_parts(const std::vector<TextFile>& files) {
+  std::error_code error;
+  for (const TextFile& file : files) {
+    if (!is_written_in_place(file.path)) fs::remove(beside(file.path), error);
+  }
+}
+
+Status cannot_be_written(const std::string& path, const std::string& why) {
+  return refused("{}: cannot be written: {}", path, why);
+}
+
 }  // namespace
 
-Status write_text_file(const std::string& path, const std::string& text) {
+Status write_text_file(const std::string& path, const std::string& text) { return write_text_files({{path, text}}); }
+
+Status write_text_files(const std::vector<TextFile>& files) {
+  for (const TextFile& file : files) {
+    if (is_written_in_place(file.path)) continue;
+    if (const std::string why = write_all(beside(file.path), file.text); !why.empty()) {
+      remove_parts(files);
+      return cannot_be_written(file.path, why);
+    }
+  }
+  std::string done;
+  for (const TextFile& file : files) {
+    std::string why;
+    if (is_written_in_place(file.path)) {
+      why = write_all(file.path, file.text);
+    } else {
+      std::error_code error;
+      fs::rename(beside(file.path), target_of(file.path), error);
+      if (error) why = error.message();
+    }
+    if (!why.empty()) {
+      remove_parts(files);
+      return cannot_be_written(file.path, why + (done.empty() ? "" : "; already written:" + done));
+    }
+    done += " " + file.path;
+  }
+  return {};
+}
+
+Status check_writable(const std::string& path) {
   std::error_code error;
-  // Renaming onto a device, a pipe or a link would put a file in its place.
-  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
-    const std::string why = write_all(path, text);
-    return why.empty() ? Status() : refused("{}: cannot be written: {}", path, why);
-  }
-  const fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : fs::path(path);
-  const fs::path beside = fmt::format("{}.{}.part", target.string(), ::getpid());
-  std::string why = write_all(beside, text);
-  if (why.empty()) {
-    fs::rename(beside, target, error);
-    if (!error) return {};
-    why = error.message();
-  }
-  fs::remove(beside, error);
-  return refused("{}: cannot be written: {}", path, why);
+  if (fs::is_directory(path, error)) return cannot_be_written(path, "it is a folder");
+  const bool exists = fs::exists(path, error);
+  if (exists && ::access(path.c_str(), W_OK) != 0) return cannot_be_written(path, std::strerror(errno));
+  if (is_written_in_place(path)) return {};
+  const fs::path parent = target_of(path).parent_path();
+  const std::string folder = parent.empty() ? "." : parent.string();
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return cannot_be_written(path, std::strerror(errno));
+  if (!fs::is_directory(folder, error)) return cannot_be_written(path, folder + " is no folder");
+  return {};
 }
 
 }  // namespace trammel

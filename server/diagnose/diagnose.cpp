@@ -227,6 +227,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
 
   if (!reported(options, "planning the next poses", 0.8)) return tl::make_unexpected(given_up());
   diagnosis.next_poses = next_poses_for(found, before, options);
+  if (diagnosis.next_poses.q.empty()) diagnosis.next_poses.none_because = why_no_next_poses(diagnosis.findings);
   if (options.recovery) {
     if (!reported(options, "hiding effects in the poses", 0.85)) return tl::make_unexpected(given_up());
     std::vector<std::size_t> places;

@@ -96,7 +96,8 @@ struct SuspectedPose {
 
 /// Measuring poses that would tell apart what this batch cannot.
 struct NextPoses {
-  std::vector<JointVector> q;    ///< rad
+  std::vector<JointVector> q;    ///< rad; empty: none, for the reason in
+  std::string none_because;      ///< for people
   std::vector<Cause> separates;  ///< the causes confounded now
   double stddev_now = 0;         ///< of the confounded combination, relative to the finding's own size
   double stddev_expected = 0;    ///< with these poses

@@ -1,5 +1,7 @@
 #include "server/diagnose/wording.h"
 
+#include <algorithm>
+
 #include "server/base/units.h"
 #include "server/plan/separation.h"
 
@@ -86,6 +88,14 @@ std::string action_for(const Cause& cause, const std::vector<Cause>& others) {
 std::string what_it_needs(const Cause& cause) {
   const Words* words = words_for(cause.cause);
   return words == nullptr ? "other poses" : words->needs;
+}
+
+std::string why_no_next_poses(const std::vector<Finding>& findings) {
+  const auto doubt = std::find_if(findings.begin(), findings.end(),
+                                  [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  if (doubt == findings.end()) return "no cause that was found is in doubt";
+  return fmt::format("no poses of this cell tell {} from {}; {}", to_string(doubt->cause),
+                     to_string(doubt->could_also_be.front()), doubt->action);
 }
 
 std::string sentence_for(const Diagnosis& d) {

@@ -10,6 +10,8 @@ namespace trammel {
 [[nodiscard]] std::string action_for(const Cause& cause, const std::vector<Cause>& others);
 /// What a batch would need to show a cause that this one cannot show.
 [[nodiscard]] std::string what_it_needs(const Cause& cause);
+/// Why no poses are suggested to measure next, after no others than `findings`.
+[[nodiscard]] std::string why_no_next_poses(const std::vector<Finding>& findings);
 /// The verdict for people.
 [[nodiscard]] std::string sentence_for(const Diagnosis& diagnosis);
 

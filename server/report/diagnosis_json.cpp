@@ -122,6 +122,7 @@ ordered_json next_poses_worth_json(const Diagnosis& diagnosis) {
     columns.push_back(joint_column(static_cast<int>(j), type_of(diagnosis, j)));
   }
   return {{"columns", columns},
+          {"none_because", next.none_because},
           {"separate", causes_json(next.separates)},
           {"stddev_now", next.stddev_now},
           {"stddev_expected", next.stddev_expected},

@@ -180,7 +180,7 @@ std::string next_poses_table(const std::vector<JointVector>& poses, const Cell& 
 
 std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   const NextPoses& next = diagnosis.next_poses;
-  if (next.q.empty()) return "<p>None suggested: nothing that was found is in doubt that more poses could end.</p>\n";
+  if (next.q.empty()) return paragraph(sentence_of("None suggested: " + next.none_because));
   return fmt::format(
              "<p>They tell {} apart. The uncertainty of what is confounded, relative to the effect found: {:.3g} now, "
              "<b>{:.3g} expected with these poses</b>, {:.3g} with as many random ones.</p>\n",

@@ -393,6 +393,35 @@ TEST_F(CommandLine, ADiagnosisThatNamesNothingExtendsNothing) {
   EXPECT_EQ(json::parse(test::read_file(file("found.json"))).at("verdict"), "nothing");
 }
 
+TEST_F(CommandLine, ADiagnosisWithoutNextPosesSaysWhyAndWritesNoPlan) {
+  const Finished finished =
+      must({"diagnose", "--cell", cell_, "--batch", measure("good", 60, 1), "--next-poses", file("next.csv")});
+  EXPECT_NE(finished.err.find("no poses are suggested: no cause that was found is in doubt"), std::string::npos)
+      << finished.err;
+  EXPECT_FALSE(std::filesystem::exists(file("next.csv")));
+}
+
+TEST_F(CommandLine, ADiagnosisIsNotBegunWhereItsResultsCouldNotBeKept) {
+  const std::string batch = measure("good", 40, 1);
+  const std::string measured = test::read_file(batch);
+  const auto wrong = [&](const std::vector<std::string>& more, int exit_code, const std::string& said) {
+    std::vector<std::string> all = {"diagnose", "--cell", cell_, "--batch", batch};
+    all.insert(all.end(), more.begin(), more.end());
+    const Finished finished = trammel(all);
+    EXPECT_EQ(finished.exit_code, exit_code) << finished.err;
+    EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
+    EXPECT_EQ(finished.out, "");
+  };
+  wrong({"--json", "-", "--report", "-"}, kWrongUsage, "both go to standard output");
+  wrong({"--json", file("a"), "--report", file("a")}, kWrongUsage, "--report and --json both go to");
+  wrong({"--report", batch}, kWrongUsage, "would overwrite --batch");
+  wrong({"--report", cell_, "--apply", "--cell-out", file("cell.yaml")}, kWrongUsage, "would overwrite --cell");
+  wrong({"--report", file("no/folder/page.html")}, kRefusedData, "cannot be written");
+  wrong({"--apply", "--cell-out", file("out.yaml"), "--model", file("no/folder/m")}, kRefusedData, "cannot be written");
+  for (const char* seed : {"-1", "1.5", "x", ""}) wrong({"--seed", seed}, kWrongUsage, "--seed");
+  EXPECT_EQ(test::read_file(batch), measured);
+}
+
 TEST_F(CommandLine, AServiceThatIsNotThereEndsWith4) {
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"status"}, {"models", "--cell", "cell-7"}, {"rollback", "--cell", "cell-7"}}) {
