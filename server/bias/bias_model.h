@@ -8,22 +8,24 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/bias/linear_block.h"
 #include "server/robot/pose.h"
 
 /// What the physics leaves over, learned: joints -> residual of the tool position, with its uncertainty.
 namespace trammel {
 
-class LocalExperts;
+class BiasOutputs;
 
 /// N observations of the residual measured - calibrated.
 struct BiasProblem {
-  Eigen::MatrixXd q;           ///< N x n, rad
-  Eigen::MatrixXd residual_B;  ///< N x 3, m, expressed in B
-  Eigen::VectorXd sigma;       ///< N, m: what metrology says of one coordinate of each observation
+  Eigen::MatrixXd q;                        ///< N x n, rad
+  Eigen::MatrixXd residual_B;               ///< N x 3, m, expressed in B
+  Eigen::VectorXd sigma;                    ///< N, m: what metrology says of one coordinate of each observation
+  std::vector<BiasFeatures> features = {};  ///< N; none where the kernel has no blocks
 };
 
 struct BiasOptions {
-  std::string kernel = "se";  ///< `se`, `matern52`, `none`, ... as spelled in the cell file
+  std::string kernel = "se";  ///< `se`, `matern52 + joint_map`, `none`, ... as spelled in the cell file
   int starts = 20;            ///< of the hyperparameter search, log-uniform
   std::uint64_t seed = 1;
   /// Called between steps with the share done in [0, 1]; return false to give up.
@@ -35,11 +37,14 @@ struct BiasPrediction {
   Vector3 mean_B = Vector3::Zero();             ///< m
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one noisy measurement of it
-  double prior_share =
-      1.0;  ///< posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not
+  Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
+  /// Posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not. The prior of `parameters`
+  /// does not count: beside it every pose would be known.
+  double prior_share = 1.0;
 };
 
-/// All that must be kept to restore a fitted model exactly: no factor, no table.
+/// All that must be kept to restore a fitted model exactly: no factor, no table. Who knows the physics need not keep
+/// `features`, but must give the same ones again.
 struct BiasState {
   std::string kernel;
   Eigen::MatrixXd q;                ///< N x n, rad
@@ -47,45 +52,54 @@ struct BiasState {
   Eigen::VectorXd sigma;            ///< N, m
   Eigen::VectorXd offset;           ///< per output, m: the mean residual, what the model says far from all data
   Eigen::MatrixXd hyperparameters;  ///< one column per output; rows as the kernel orders them, natural logarithms
+  Eigen::VectorXd block_hyperparameters = {};  ///< of the blocks one after the other, natural logarithms
+  std::vector<BiasFeatures> features = {};     ///< N; none where the kernel has no blocks
 };
 
 /// How the fit went, for the report.
 struct BiasFitReport {
-  Eigen::Vector3d log_likelihood = Eigen::Vector3d::Zero();  ///< nat, per output
-  Eigen::Vector3d noise_stddev = Eigen::Vector3d::Zero();    ///< m
-  double leave_one_out_rms = 0;                              ///< m, Euclidean
-  int starts_at_best = 0;  ///< how many starts reached the best optimum of the subset within 0.1 nat
-  int evaluations = 0;     ///< of the full likelihood and gradient
+  Eigen::VectorXd log_likelihood;  ///< nat: of each output, or one number where blocks couple them
+  Eigen::VectorXd noise_stddev;    ///< m, of each output
+  double leave_one_out_rms = 0;    ///< m, Euclidean
+  int starts_at_best = 0;          ///< how many starts reached the best optimum of the subset within 0.1 nat
+  int evaluations = 0;             ///< of the full likelihood and gradient
 };
 
-/// A fitted Gaussian process for each coordinate (source section 3.4, eqs. 3.15-3.26). An immutable value;
-/// copies share their tables. Thread-safe.
+/// A fitted Gaussian process for each coordinate (source section 3.4, eqs. 3.15-3.26); where the kernel has blocks
+/// (kernel_spelling.h) the coordinates share their weights, and whoever asks says the features of each pose. An
+/// immutable value; copies share their tables. Thread-safe.
 class BiasModel {
  public:
   /// Same problem, options and build of numerics.h, same model bit for bit. `none` predicts zero, with the rms of the
   /// residual as its stddev. The noise of observation i has variance σ_n² sigma_i²/median(sigma²), the ratio kept
   /// within [1/4, 4]; σ_n is learned for each output, with a weak prior against values below metrology's. Refuses fewer
-  /// than 10 observations, non-finite numbers, an unknown kernel name, and to go on when told to stop.
+  /// than 10 observations, non-finite numbers, a kernel that cannot be spelled, more than 4000 observations or missing
+  /// features where it has blocks, and to go on when told to stop.
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
   /// Same state, same predictions, bit for bit on processors that run the same build of numerics.h (the last bits
   /// differ between AVX2 and AVX-512). Refuses what fit refuses, and hyperparameters of the wrong shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
   /// More observations with the hyperparameters as they are: N² operations for each where the median sigma stays what
-  /// it was, N³ otherwise. Equal to restoring the longer state, to rounding. Refuses what fit refuses.
+  /// it was and the kernel has no blocks, N³ otherwise. Equal to restoring the longer state, to rounding. Refuses what
+  /// fit refuses.
   [[nodiscard]] Result<BiasModel> with(const BiasProblem& more) const;
   /// Without these observations (rising indices), likewise; refuses to keep fewer than 10.
   [[nodiscard]] Result<BiasModel> without(const std::vector<Eigen::Index>& observations) const;
   /// Fitted to its own observations again, from where the last fit ended: a few evaluations, no new starts.
   [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
 
-  [[nodiscard]] BiasPrediction predict(const JointVector& q) const;
+  /// Whether the kernel has blocks, so that features must be given; otherwise they are ignored.
+  [[nodiscard]] bool needs_features() const;
+  [[nodiscard]] BiasPrediction predict(const JointVector& q, const BiasFeatures& features = {}) const;
   /// The mean alone: what an iteration needs.
-  [[nodiscard]] Vector3 mean_B(const JointVector& q) const;
+  [[nodiscard]] Vector3 mean_B(const JointVector& q, const BiasFeatures& features = {}) const;
   /// M x 3, m: the means alone of many; rows of `q` are joint vectors.
-  [[nodiscard]] Eigen::MatrixXd mean_all_B(const Eigen::MatrixXd& q) const;
+  [[nodiscard]] Eigen::MatrixXd mean_all_B(const Eigen::MatrixXd& q,
+                                           const std::vector<BiasFeatures>& features = {}) const;
   /// Many at once; rows of `q` are joint vectors.
-  [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q) const;
+  [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q,
+                                                        const std::vector<BiasFeatures>& features = {}) const;
 
   /// N, in [0, 1]: `prior_share` of every training pose when it is left out: what "known" looks like. A target whose
   /// own share is above, say, the 99 % quantile of these is farther from the data than they are from each other.
@@ -102,7 +116,7 @@ class BiasModel {
   struct Fitted;
   [[nodiscard]] static Result<BiasModel> fit_from(const BiasProblem& problem, const BiasOptions& options,
                                                   const BiasState* last);
-  [[nodiscard]] Result<BiasModel> regrown(BiasState state, std::vector<LocalExperts> outputs) const;
+  [[nodiscard]] Result<BiasModel> regrown(BiasState state, std::shared_ptr<const BiasOutputs> outputs) const;
   explicit BiasModel(std::shared_ptr<const Fitted> fitted) : fitted_(std::move(fitted)) {}
   std::shared_ptr<const Fitted> fitted_;
 };

@@ -1,5 +1,6 @@
 #include "server/bias/coupled_posterior.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,12 @@ namespace trammel {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index kTargets = 64;  // at once: the matrices pass through the cache once for all of them
+
+}  // namespace
 
 std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<const Kernel> kernel,
                                                             const LinearBlocks& blocks, const CoupledData& data,
@@ -26,6 +33,10 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   }
   posterior.leave_one_out(*solution, data);
   posterior.column_scale_ = solution->column_scale;
+  posterior.open_ = VectorXd::Zero(p);
+  if (solution->variance_slope.cols() > 0)
+    posterior.open_ = (solution->variance_slope.rowwise().squaredNorm().array() > 0).cast<double>();
+  posterior.open_prior_.resize(n, data.y.cols());
   posterior.weights_ = solution->weights.cwiseProduct(solution->column_scale);
   posterior.log_likelihood_ = solution->log_likelihood;
   for (Index d = 0; d < data.y.cols(); ++d) {
@@ -34,6 +45,12 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
     auto process = GaussianProcess::condition(kernel, data.q, own, data.noise_shape, at.outputs[output], form);
     if (!process) return std::nullopt;
     posterior.outputs_.push_back(std::move(*process));
+    VectorXd prior(n);
+    kernel->diagonal(at.outputs[output].kernel,
+                     {solution->features[output].data(), n, solution->features[output].rows()}, prior.data());
+    const VectorXd learned = posterior.open_.cwiseProduct(posterior.column_scale_.cwiseAbs2());
+    posterior.open_prior_.col(d) = std::exp(2 * at.outputs[output].log_signal_stddev) * prior;
+    posterior.open_prior_.col(d).noalias() += data.columns[output].cwiseAbs2() * learned;
   }
   posterior.kernel_ = std::move(kernel);
   posterior.root_ = std::move(solution->root);
@@ -61,35 +78,66 @@ void CoupledPosterior::leave_one_out(const CoupledSolution& solution, const Coup
   }
 }
 
-CoupledPrediction CoupledPosterior::predict(const JointVector& q, const MatrixXd& columns) const {
-  const MatrixXd scaled = columns * column_scale_.asDiagonal();
-  CoupledPrediction at{columns * weights_, common_covariance(q, scaled), scaled.rowwise().squaredNorm()};
-  for (Index d = 0; d < columns.rows(); ++d) {
-    const GaussianProcess& own = outputs_[static_cast<std::size_t>(d)];
-    double mean = 0;
-    own.mean(q.transpose(), &mean);
-    const PosteriorVariance variance = own.variance(q.transpose()).front();
-    at.mean[d] += mean;
-    at.covariance(d, d) += variance.posterior;
-    at.prior[d] += variance.prior;
+MatrixXd CoupledPosterior::mean(const MatrixXd& q, const std::vector<MatrixXd>& columns) const {
+  MatrixXd mean(q.rows(), static_cast<Index>(columns.size()));
+  for (Index d = 0; d < mean.cols(); ++d) {
+    const auto output = static_cast<std::size_t>(d);
+    outputs_[output].mean(q, mean.col(d).data());
+    mean.col(d).noalias() += columns[output] * weights_;
   }
-  return at;
+  return mean;
 }
 
-MatrixXd CoupledPosterior::common_covariance(const JointVector& q, const MatrixXd& scaled) const {
-  MatrixXd R = scaled.transpose();  // p x D
-  AlignedMatrix cross(padded_rows(points_), 1);
-  for (Index d = 0; d < scaled.rows(); ++d) {
-    const auto output = static_cast<std::size_t>(d);
-    const GpHyperparameters& at = hyperparameters_[output];
-    MatrixXd target(1, kernel_->feature_count(q.size()));
-    kernel_->features(at.kernel, q.transpose(), target.data(), 1);
-    kernel_->tile(at.kernel, {features_[output].data(), points_, features_[output].rows()}, {target.data(), 1, 1},
-                  cross.data(), cross.rows());
-    R.col(d).noalias() -= std::exp(2 * at.log_signal_stddev) * (explained_[output] * cross.map().col(0).head(points_));
+std::vector<CoupledPrediction> CoupledPosterior::predict(const MatrixXd& q,
+                                                         const std::vector<MatrixXd>& columns) const {
+  std::vector<CoupledPrediction> predictions;
+  for (Index first = 0; first < q.rows(); first += kTargets) {
+    const Index count = std::min(kTargets, q.rows() - first);
+    std::vector<MatrixXd> few;
+    for (const MatrixXd& all : columns) few.emplace_back(all.middleRows(first, count));
+    predict_few(q.middleRows(first, count), few, &predictions);
   }
-  const MatrixXd half = root_.matrixL().solve(R);
-  return half.transpose() * half;
+  return predictions;
+}
+
+void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd>& columns,
+                                   std::vector<CoupledPrediction>* out) const {
+  const auto outputs = static_cast<Index>(columns.size());
+  const std::size_t before = out->size();
+  const MatrixXd means = mean(q, columns);
+  std::vector<MatrixXd> halves;
+  for (Index i = 0; i < q.rows(); ++i)
+    out->push_back({means.row(i).transpose(), MatrixXd(outputs, outputs), VectorXd(outputs), VectorXd(outputs)});
+  for (Index d = 0; d < outputs; ++d) {
+    const auto output = static_cast<std::size_t>(d);
+    const MatrixXd scaled = columns[output] * column_scale_.asDiagonal();
+    halves.push_back(half_covariance(q, scaled, d));
+    const std::vector<PosteriorVariance> own = outputs_[output].variance(q);
+    for (Index i = 0; i < q.rows(); ++i) {
+      CoupledPrediction& at = (*out)[before + static_cast<std::size_t>(i)];
+      const PosteriorVariance& variance = own[static_cast<std::size_t>(i)];
+      for (Index e = 0; e <= d; ++e)
+        at.covariance(d, e) = at.covariance(e, d) =
+            halves[output].col(i).dot(halves[static_cast<std::size_t>(e)].col(i));
+      at.covariance(d, d) += variance.posterior;
+      at.prior[d] = scaled.row(i).squaredNorm() + variance.prior;
+      at.open_prior[d] = scaled.row(i).cwiseAbs2() * open_ + variance.prior;
+    }
+  }
+}
+
+MatrixXd CoupledPosterior::half_covariance(const MatrixXd& q, const MatrixXd& scaled, Index d) const {
+  const auto output = static_cast<std::size_t>(d);
+  const GpHyperparameters& at = hyperparameters_[output];
+  MatrixXd targets(q.rows(), kernel_->feature_count(q.cols()));
+  kernel_->features(at.kernel, q, targets.data(), q.rows());
+  AlignedMatrix cross(padded_rows(points_), q.rows());
+  kernel_->tile(at.kernel, {features_[output].data(), points_, features_[output].rows()},
+                {targets.data(), q.rows(), q.rows()}, cross.data(), cross.rows());
+  MatrixXd R = scaled.transpose();
+  R.noalias() -= std::exp(2 * at.log_signal_stddev) * (explained_[output] * cross.map().topRows(points_));
+  root_.matrixL().solveInPlace(R);
+  return R;
 }
 
 }  // namespace trammel

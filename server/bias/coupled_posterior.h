@@ -9,6 +9,7 @@ struct CoupledPrediction {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
   Eigen::VectorXd prior;       ///< their variances before any data
+  Eigen::VectorXd open_prior;  ///< the same without the columns whose weights' variance is given, not learned
 };
 
 /// What coupled processes know after their data. Immutable, thread-safe.
@@ -23,8 +24,12 @@ class CoupledPosterior {
                                                                  const CoupledHyperparameters& at,
                                                                  VarianceForm form = VarianceForm::kCompressed);
 
-  /// At `q`, where `columns` (D x p) is H(q), not scaled.
-  [[nodiscard]] CoupledPrediction predict(const JointVector& q, const Eigen::MatrixXd& columns) const;
+  /// At the rows of `q`; `columns`: H there, not scaled, as CoupledData has it. Many at once cost a tenth of one by
+  /// one.
+  [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
+                                                       const std::vector<Eigen::MatrixXd>& columns) const;
+  /// The means alone, M x D.
+  [[nodiscard]] Eigen::MatrixXd mean(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns) const;
 
   /// p, of the columns as they are (not scaled).
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
@@ -34,12 +39,18 @@ class CoupledPosterior {
   /// (blocks of C⁻¹ instead of its diagonal in Rasmussen & Williams, eqs. 5.10-5.12).
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
+  /// N x D: as CoupledPrediction has it, at the data.
+  [[nodiscard]] const Eigen::MatrixXd& open_prior() const { return open_prior_; }
 
  private:
   CoupledPosterior() = default;
-  // R A⁻¹ Rᵀ.
-  [[nodiscard]] Eigen::MatrixXd common_covariance(const JointVector& q, const Eigen::MatrixXd& scaled) const;
   void leave_one_out(const CoupledSolution& solution, const CoupledData& data);
+  // L⁻¹ R_dᵀ, p x M.
+  [[nodiscard]] Eigen::MatrixXd half_covariance(const Eigen::MatrixXd& q, const Eigen::MatrixXd& scaled,
+                                                Eigen::Index d) const;
+  // Of a few targets at once.
+  void predict_few(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns,
+                   std::vector<CoupledPrediction>* out) const;
 
   std::shared_ptr<const Kernel> kernel_;
   Eigen::Index points_ = 0;
@@ -49,10 +60,12 @@ class CoupledPosterior {
   std::vector<Eigen::MatrixXd> explained_;  // D: Hᵀ M⁻¹, p x N
   Eigen::LLT<Eigen::MatrixXd> root_;        // of A
   Eigen::VectorXd column_scale_;
+  Eigen::VectorXd open_;  // p: 1 for columns whose weights' variance was learned, else 0
   Eigen::VectorXd weights_;
   double log_likelihood_ = 0;
   Eigen::MatrixXd leave_one_out_mean_;
   Eigen::MatrixXd leave_one_out_variance_;
+  Eigen::MatrixXd open_prior_;
 };
 
 }  // namespace trammel

@@ -50,7 +50,12 @@ class CoupledSearch {
     prior_.signal_centre.array() -= 1.0;  // the blocks explain the larger part
   }
 
-  std::optional<CoupledSearchResult> run() {
+  std::optional<CoupledSearchResult> run(const CoupledHyperparameters* last) {
+    if (last != nullptr) {
+      result_.starts_at_best = 1;
+      result_.found = improved(*last, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0);
+      return result_;
+    }
     std::optional<CoupledHyperparameters> best = from_several_starts();
     if (result_.given_up) return result_;
     if (!best) return std::nullopt;
@@ -58,6 +63,7 @@ class CoupledSearch {
     if (medium > kStartPoints) best = improved(*best, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
     if (all() > medium) best = improved(*best, all(), true, {.max_evaluations = 8, .tolerance = 0.3}, 0.7);
     if (!shared_scales_) best = improved(*best, all(), false, {.max_evaluations = 10, .tolerance = 0.3}, 0.95);
+    report(1.0);
     result_.found = *best;
     return result_;
   }
@@ -137,8 +143,8 @@ class CoupledSearch {
 std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel,
                                                   const LinearBlocks& blocks, const CoupledData& data,
                                                   const VectorXd& metrology_stddev, bool shared_scales,
-                                                  const SearchOptions& options) {
-  return CoupledSearch(kernel, blocks, data, metrology_stddev, shared_scales, options).run();
+                                                  const SearchOptions& options, const CoupledHyperparameters* last) {
+  return CoupledSearch(kernel, blocks, data, metrology_stddev, shared_scales, options).run(last);
 }
 
 }  // namespace trammel

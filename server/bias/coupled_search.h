@@ -14,11 +14,12 @@ struct CoupledSearchResult {
 
 /// Most probable hyperparameters of coupled processes: several starts on a small subset with one set of kernel
 /// parameters for all outputs, the best carried to growing subsets and to all points; unless `shared_scales`, each
-/// output then gets its own. Same seed, same answer, bit for bit. Empty when no start gave a positive definite
-/// covariance.
+/// output then gets its own. From `last`, where given, on all points and from nowhere else. Same seed, same answer, bit
+/// for bit. Empty when no start gave a positive definite covariance.
 [[nodiscard]] std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel,
                                                                 const LinearBlocks& blocks, const CoupledData& data,
                                                                 const Eigen::VectorXd& metrology_stddev,
-                                                                bool shared_scales, const SearchOptions& options);
+                                                                bool shared_scales, const SearchOptions& options,
+                                                                const CoupledHyperparameters* last = nullptr);
 
 }  // namespace trammel

@@ -1,6 +1,7 @@
 #include "server/bias/kernel_spelling.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <utility>
 #include <vector>
@@ -10,8 +11,21 @@ namespace {
 
 constexpr int kMostDepth = 20;  // of parentheses; nobody means more, and the stack ends somewhere
 
+struct Block {
+  std::string_view word;
+  LinearBlockPtr (*make)();
+};
+
+const std::array<Block, 2> kBlocks = {{{"joint_map", make_joint_map_block}, {"parameters", make_parameter_block}}};
+
+const Block* find_block(std::string_view word) {
+  const auto* found = std::find_if(kBlocks.begin(), kBlocks.end(), [&](const Block& b) { return b.word == word; });
+  return found == kBlocks.end() ? nullptr : found;
+}
+
 bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
+// bias = term {"+" term};  term = block | product;
 // sum = product {"+" product};  product = factor {"*" factor};  factor = "(" sum ")" | word ["(" "sincos" ")"].
 class Reader {
  public:
@@ -23,6 +37,35 @@ class Reader {
     skip_space();
     if (kernel && !rest_.empty()) return expected("`+`, `*` or the end");
     return kernel;
+  }
+
+  Result<SpelledBias> bias() {
+    std::vector<KernelPtr> parts;
+    std::vector<std::string_view> named;
+    SpelledBias bias;
+    do {
+      const std::string_view before = rest_;
+      const Block* block = find_block(word());
+      if (block == nullptr) {
+        rest_ = before;
+        auto part = product();
+        if (!part) return tl::make_unexpected(part.error());
+        parts.push_back(*std::move(part));
+        continue;
+      }
+      if (std::find(named.begin(), named.end(), block->word) != named.end())
+        return refused("bias kernel `{}`: `{}` is named twice", all_, block->word);
+      if (take('*') || take('(')) return misplaced(block->word);
+      named.push_back(block->word);
+      bias.blocks.push_back(block->make());
+    } while (take('+'));
+    skip_space();
+    if (!rest_.empty()) return expected("`+`, `*` or the end");
+    if (parts.empty())
+      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, named.front(),
+                     named.front());
+    bias.kernel = parts.size() == 1 ? parts.front() : sum_of(std::move(parts));
+    return bias;
   }
 
  private:
@@ -55,12 +98,20 @@ class Reader {
   Result<KernelPtr> leaf() {
     const std::string_view name = word();
     if (name.empty()) return expected("a kernel");
+    if (find_block(name) != nullptr) return misplaced(name);
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
-      return refused("bias kernel `{}`: `{}` is unknown; known are none (alone), {}", all_, name, kernel_names());
+      return refused(
+          "bias kernel `{}`: `{}` is unknown; known are none (alone), {}, and to be added joint_map, "
+          "parameters",
+          all_, name, kernel_names());
     if (!take('(')) return kernel;
     if (word() != "sincos" || !take(')')) return expected(fmt::format("`{}(sincos)`", name));
     return make_sincos_kernel(std::move(kernel));
+  }
+
+  tl::unexpected<Error> misplaced(std::string_view block) const {
+    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", all_, block, block);
   }
 
   tl::unexpected<Error> expected(std::string_view what) const {
@@ -92,5 +143,12 @@ class Reader {
 }  // namespace
 
 Result<KernelPtr> spelled_kernel(std::string_view spelling) { return Reader(spelling).whole(); }
+
+Result<SpelledBias> spelled_bias(std::string_view spelling) { return Reader(spelling).bias(); }
+
+Status check_bias_spelling(std::string_view spelling) {
+  if (spelling == "none") return {};
+  return spelled_bias(spelling).map([](const SpelledBias&) {});
+}
 
 }  // namespace trammel

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <string_view>
+#include <vector>
 
 #include "server/base/result.h"
 #include "server/bias/kernel.h"
+#include "server/bias/linear_block.h"
 
 namespace trammel {
 
@@ -11,5 +13,18 @@ namespace trammel {
 /// binds before `+`. One word alone is that kernel itself. Refuses other words, naming them and those that are known,
 /// and what is not such a sum.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
+
+/// What a bias is made of: what each coordinate has by itself, and what they share.
+struct SpelledBias {
+  KernelPtr kernel;
+  std::vector<LinearBlockPtr> blocks;
+};
+
+/// A kernel as above and, added to it once each at most, `joint_map` and `parameters`: `matern52 + joint_map`. Refuses
+/// what spelled_kernel() refuses, a block in a product or in parentheses, twice, or without a kernel beside it.
+[[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
+
+/// Whether a bias can be spelled so; `none` can.
+[[nodiscard]] Status check_bias_spelling(std::string_view spelling);
 
 }  // namespace trammel

@@ -289,7 +289,7 @@ TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
   options.kernel = "sea";
   expect_refused(good, options,
                  "bias kernel `sea`: `sea` is unknown; known are none (alone), se, matern32, matern52, periodic, "
-                 "rational_quadratic, linear, white");
+                 "rational_quadratic, linear, white, and to be added joint_map, parameters");
   options.kernel = "se";
   options.starts = 0;
   expect_refused(good, options, "bias fit: 0 starts, at least 1");

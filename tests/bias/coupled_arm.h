@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/bias/coupled_likelihood.h"
+#include "server/bias/coupled_posterior.h"
 #include "tests/bias/bias_data.h"
 
 /// An arm of three joints (one turns it, two bend it) with 0.5 m and 0.4 m links, for the tests of coupled processes.
@@ -64,6 +64,14 @@ inline CoupledData arm_data(const LinearBlocks& blocks, const Eigen::MatrixXd& q
     for (std::size_t d = 0; d < 3; ++d) data.columns[d].row(i) = H.row(static_cast<Eigen::Index>(d));
   }
   return data;
+}
+
+/// At one joint vector, with H(q) as arm_columns() gives it.
+inline CoupledPrediction predict_one(const CoupledPosterior& posterior, const JointVector& q,
+                                     const Eigen::MatrixXd& H) {
+  std::vector<Eigen::MatrixXd> columns;
+  for (const auto& row : H.rowwise()) columns.emplace_back(row);
+  return posterior.predict(q.transpose(), columns).front();
 }
 
 /// Gear errors of the three joints, rad: each of a slow and a fast harmonic.

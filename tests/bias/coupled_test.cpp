@@ -169,7 +169,7 @@ TEST_P(EveryBlock, MeanAndJointCovarianceOfTheAxesEqualTheDenseFormula) {
   const MatrixXd targets = turns(9, 43);
   for (Index i = 0; i < targets.rows(); ++i) {
     const JointVector q = targets.row(i);
-    const CoupledPrediction found = posterior->predict(q, arm_columns(blocks, q));
+    const CoupledPrediction found = predict_one(*posterior, q, arm_columns(blocks, q));
     const Matrix3 prior = dense.prior(q);
     const double scale = prior.trace();
     EXPECT_LT((found.mean - dense.mean(q)).norm(), 1e-9 * std::sqrt(scale));
@@ -194,7 +194,7 @@ TEST_P(EveryBlock, LeavingAPoseOutEqualsFittingWithoutIt) {
     const auto without = CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
     ASSERT_TRUE(without.has_value());
     const JointVector q = data.q.row(out);
-    const CoupledPrediction expected = without->predict(q, arm_columns(blocks, q));
+    const CoupledPrediction expected = predict_one(*without, q, arm_columns(blocks, q));
     for (Index d = 0; d < 3; ++d) {
       const double noise = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
       const double variance = expected.covariance(d, d) + noise * data.noise_shape[out];
@@ -256,7 +256,7 @@ TEST(CoupledPosterior, SaysThatAnErrorOfTheFirstJointIsAcrossTheArmAndNotAlongIt
       make_kernel("se"), blocks, arm_data(blocks, q, gear_residual(q, kNoise, 52), VectorXd::Ones(40)), at);
   ASSERT_TRUE(posterior.has_value());
   const JointVector target = Eigen::Vector3d(0.7, 0.4, -0.9);
-  const Matrix3 covariance = posterior->predict(target, arm_columns(blocks, target)).covariance;
+  const Matrix3 covariance = predict_one(*posterior, target, arm_columns(blocks, target)).covariance;
   const Vector3 along_B(std::cos(target[0]), std::sin(target[0]), 0);
   const Vector3 across_B = Vector3::UnitZ().cross(along_B);
   EXPECT_LT(std::sqrt(along_B.dot(covariance * along_B)), 2e-7);
@@ -309,7 +309,7 @@ TEST(CoupledSearch, LearnsGearErrorsThatAPlainProcessCannot) {
   double normalised = 0;
   for (Index i = 0; i < task.targets.rows(); ++i) {
     const JointVector q = task.targets.row(i);
-    const CoupledPrediction at = posterior->predict(q, arm_columns(task.blocks, q));
+    const CoupledPrediction at = predict_one(*posterior, q, arm_columns(task.blocks, q));
     const VectorXd error = at.mean - task.truth.row(i).transpose();
     total += error.squaredNorm();
     normalised += error.dot(at.covariance.llt().solve(error)) / 3;
@@ -362,8 +362,8 @@ TEST(CoupledSearch, GivesTheSameModelBitForBitFromTheSameSeed) {
   const MatrixXd columns = arm_columns(task.blocks, q);
   const auto before = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, first->found);
   const auto restored = CoupledPosterior::condition(make_kernel("se"), task.blocks, task.data, second->found);
-  EXPECT_EQ(before->predict(q, columns).mean, restored->predict(q, columns).mean);
-  EXPECT_EQ(before->predict(q, columns).covariance, restored->predict(q, columns).covariance);
+  EXPECT_EQ(predict_one(*before, q, columns).mean, predict_one(*restored, q, columns).mean);
+  EXPECT_EQ(predict_one(*before, q, columns).covariance, predict_one(*restored, q, columns).covariance);
 }
 
 TEST(CoupledSearch, StopsWhenTold) {

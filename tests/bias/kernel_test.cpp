@@ -217,7 +217,8 @@ TEST(Kernel, ALoneWordIsThatKernelItself) {
 
 TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
   const std::string known =
-      "known are none (alone), se, matern32, matern52, periodic, rational_quadratic, linear, white";
+      "known are none (alone), se, matern32, matern52, periodic, rational_quadratic, linear, white, and to be added "
+      "joint_map, parameters";
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"se + gauss", "bias kernel `se + gauss`: `gauss` is unknown; " + known},
       {"none + se", "bias kernel `none + se`: `none` is unknown; " + known},
@@ -234,6 +235,43 @@ TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
     EXPECT_EQ(kernel.error().message, message);
   }
   EXPECT_FALSE(spelled_kernel(std::string(100000, '(')).has_value());
+}
+
+TEST(Kernel, ABiasIsSpelledAsAKernelAndTheBlocksAddedToIt) {
+  const auto both = spelled_bias("matern52 + joint_map + white + parameters");
+  ASSERT_TRUE(both.has_value()) << both.error().message;
+  EXPECT_EQ(both->blocks.size(), 2u);
+  EXPECT_EQ(both->kernel->parameter_count(6), make_kernel("matern52 + white")->parameter_count(6));
+  const auto plain = spelled_bias("se * (linear + white)");
+  ASSERT_TRUE(plain.has_value()) << plain.error().message;
+  EXPECT_TRUE(plain->blocks.empty());
+  EXPECT_EQ(spelled_bias("parameters + se")->kernel->name(), "se");
+  EXPECT_TRUE(check_bias_spelling("none").has_value());
+}
+
+TEST(Kernel, ABlockThatIsNotASummandOfTheWholeBiasIsRefused) {
+  const auto misplaced = [](const std::string& spelling, const std::string& block) {
+    return std::pair{spelling, "bias kernel `" + spelling + "`: `" + block +
+                                   "` can only be added to a whole bias, as in `se + " + block + "`"};
+  };
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      misplaced("se * joint_map", "joint_map"),
+      misplaced("joint_map * se", "joint_map"),
+      misplaced("(se + parameters)", "parameters"),
+      misplaced("se + joint_map(sincos)", "joint_map"),
+      {"joint_map", "bias kernel `joint_map`: a kernel is expected beside `joint_map`, for instance `se + joint_map`"},
+      {"parameters + joint_map",
+       "bias kernel `parameters + joint_map`: a kernel is expected beside `parameters`, for instance `se + "
+       "parameters`"},
+      {"se + joint_map + joint_map", "bias kernel `se + joint_map + joint_map`: `joint_map` is named twice"},
+      {"se + joint_map white", "bias kernel `se + joint_map white`, character 16: `+`, `*` or the end is expected"},
+      {"se + joint_map +", "bias kernel `se + joint_map +`, character 17: a kernel is expected"}};
+  for (const auto& [spelling, message] : cases) {
+    const Status fine = check_bias_spelling(spelling);
+    ASSERT_FALSE(fine.has_value()) << spelling;
+    EXPECT_EQ(fine.error().message, message);
+  }
+  EXPECT_FALSE(spelled_kernel("se + joint_map").has_value()) << "a kernel has no blocks";
 }
 
 // A gear's error: 60 µm, some five periods within the range of two joints, 5 µm of noise.

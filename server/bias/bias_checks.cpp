@@ -1,0 +1,88 @@
+#include "server/bias/bias_checks.h"
+
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kOutputs = 3;
+constexpr Index kFewestObservations = 10;
+constexpr Index kMostCoupled = 4000;  // observations: half a gigabyte while they are learned from
+constexpr std::string_view kAxis[] = {"x", "y", "z"};
+
+Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
+  const Index n = q.rows();
+  if (n < kFewestObservations) return refused("bias data: {} observations, at least {}", n, kFewestObservations);
+  if (q.cols() < 1) return refused("bias data: 0 joints, at least 1");
+  if (residual_B.rows() != n || residual_B.cols() != kOutputs)
+    return refused("bias data: residual is {} x {}, should be {} x 3", residual_B.rows(), residual_B.cols(), n);
+  if (sigma.size() != n) return refused("bias data: {} sigmas for {} observations", sigma.size(), n);
+  return {};
+}
+
+Status check_numbers(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
+  for (Index i = 0; i < q.rows(); ++i) {
+    for (Index j = 0; j < q.cols(); ++j) {
+      if (!std::isfinite(q(i, j)))
+        return refused("bias data row {}: joint {} is {}, not finite", i + 1, j + 1, q(i, j));
+    }
+    for (Index d = 0; d < kOutputs; ++d) {
+      if (!std::isfinite(residual_B(i, d)))
+        return refused("bias data row {}: residual {} is {}, not finite", i + 1, kAxis[d], residual_B(i, d));
+    }
+    if (!std::isfinite(sigma[i]) || sigma[i] < 0)
+      return refused("bias data row {}: sigma is {} mm, should be finite and not negative", i + 1, to_mm(sigma[i]));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_observations(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
+  return check_shape(q, residual_B, sigma).and_then([&] { return check_numbers(q, residual_B, sigma); });
+}
+
+Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features, Index n) {
+  if (n > kMostCoupled)
+    return refused("bias kernel `{}`: {} observations, at most {} with joint_map or parameters", kernel, n,
+                   kMostCoupled);
+  if (static_cast<Index>(features.size()) != n)
+    return refused("bias data: features of {} poses for {} observations, kernel `{}` needs them", features.size(), n,
+                   kernel);
+  const BiasFeatures& first = features.front();
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const BiasFeatures& at = features[i];
+    if (at.by_joint.rows() != 6 || at.by_joint.cols() != first.by_joint.cols() || at.by_parameter.rows() != 6 ||
+        at.by_parameter.cols() != first.by_parameter.cols())
+      return refused("bias data row {}: features are {} x {} and {} x {}, should be 6 x {} and 6 x {}", i + 1,
+                     at.by_joint.rows(), at.by_joint.cols(), at.by_parameter.rows(), at.by_parameter.cols(),
+                     first.by_joint.cols(), first.by_parameter.cols());
+    if (!at.by_joint.allFinite() || !at.by_parameter.allFinite())
+      return refused("bias data row {}: a feature is not finite", i + 1);
+  }
+  return {};
+}
+
+Status check_hyperparameters(const BiasState& state, const SpelledBias& bias) {
+  const Index rows = bias.kernel->parameter_count(state.q.cols()) + 2;
+  if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kOutputs)
+    return refused("bias state: hyperparameters are {} x {}, should be {} x 3 for kernel `{}`",
+                   state.hyperparameters.rows(), state.hyperparameters.cols(), rows, state.kernel);
+  if (state.offset.size() != kOutputs) return refused("bias state: {} offsets, should be 3", state.offset.size());
+  Index of_blocks = 0;
+  for (const LinearBlockPtr& block : bias.blocks) of_blocks += block->parameter_count(state.features.front());
+  if (state.block_hyperparameters.size() != of_blocks)
+    return refused("bias state: {} hyperparameters of blocks, should be {} for kernel `{}`",
+                   state.block_hyperparameters.size(), of_blocks, state.kernel);
+  if (!state.hyperparameters.allFinite() || !state.offset.allFinite() || !state.block_hyperparameters.allFinite())
+    return refused("bias state: a hyperparameter or offset is not finite");
+  return {};
+}
+
+}  // namespace trammel

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/bias/bias_model.h"
+#include "server/bias/kernel_spelling.h"
+
+/// What a bias cannot be learned or restored from, in sentences that name row, value and limit.
+namespace trammel {
+
+[[nodiscard]] Status check_observations(const Eigen::MatrixXd& q, const Eigen::MatrixXd& residual_B,
+                                        const Eigen::VectorXd& sigma);
+/// Of a kernel with blocks and `n` observations.
+[[nodiscard]] Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features,
+                                    Eigen::Index n);
+/// Against what `bias` and, where it has blocks, the state's own features ask for.
+[[nodiscard]] Status check_hyperparameters(const BiasState& state, const SpelledBias& bias);
+
+}  // namespace trammel

@@ -1,0 +1,104 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/base/check.h"
+#include "server/bias/bias_outputs.h"
+#include "server/bias/coupled_posterior.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kOfOneUnit = 3;
+
+// D times M x p: H before it is scaled, output by output.
+std::vector<MatrixXd> columns_of(const LinearBlocks& blocks, const MatrixXd& q,
+                                 const std::vector<BiasFeatures>& features, Index outputs) {
+  TRAMMEL_CHECK(static_cast<Index>(features.size()) == q.rows());
+  std::vector<MatrixXd> columns(static_cast<std::size_t>(outputs), MatrixXd(q.rows(), blocks.column_count()));
+  for (Index i = 0; i < q.rows(); ++i) {
+    const MatrixXd H = blocks.columns(q.row(i).transpose(), features[static_cast<std::size_t>(i)]);
+    for (Index d = 0; d < outputs; ++d) columns[static_cast<std::size_t>(d)].row(i) = H.row(d);
+  }
+  return columns;
+}
+
+LinearBlocks blocks_of(const SpelledBias& bias, const OutputData& data) { return {bias.blocks, data.features.front()}; }
+
+CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
+  return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, data.y.cols())};
+}
+
+class CoupledOutputs final : public BiasOutputs {
+ public:
+  CoupledOutputs(LinearBlocks blocks, CoupledPosterior posterior, const CoupledHyperparameters& at,
+                 const VectorXd& noise_shape)
+      : blocks_(std::move(blocks)), posterior_(std::move(posterior)), noise_shape_(noise_shape) {
+    noise_variance_.resize(static_cast<Index>(at.outputs.size()));
+    for (Index d = 0; d < count(); ++d)
+      noise_variance_[d] = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+  }
+
+  MatrixXd mean(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
+    return posterior_.mean(q, columns_of(blocks_, q, features, count()));
+  }
+
+  std::vector<OutputPrediction> predict(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
+    std::vector<OutputPrediction> predictions;
+    for (CoupledPrediction& at : posterior_.predict(q, columns_of(blocks_, q, features, count()))) {
+      const double share = share_of(at.covariance.diagonal(), at.open_prior);
+      predictions.push_back({std::move(at.mean), std::move(at.covariance), share});
+    }
+    return predictions;
+  }
+
+  VectorXd noise_variance() const override { return noise_variance_; }
+  VectorXd log_likelihood() const override { return VectorXd::Constant(1, posterior_.log_likelihood()); }
+  MatrixXd leave_one_out_mean() const override { return posterior_.leave_one_out_mean(); }
+  MatrixXd leave_one_out_variance() const override { return posterior_.leave_one_out_variance(); }
+  VectorXd leave_one_out_share() const override {
+    const MatrixXd& variance = posterior_.leave_one_out_variance();
+    VectorXd share(variance.rows());
+    for (Index i = 0; i < share.size(); ++i) {
+      const VectorXd known = variance.row(i).transpose() - noise_shape_[i] * noise_variance_;
+      share[i] = share_of(known, posterior_.open_prior().row(i).transpose());
+    }
+    return share;
+  }
+
+ private:
+  Index count() const { return noise_variance_.size(); }
+  // Against what the kernel and the learned blocks leave open: beside the prior of parameters, millimetres, every pose
+  // would be known.
+  static double share_of(const VectorXd& known, const VectorXd& open_prior) {
+    return known.cwiseQuotient(open_prior).head(kOfOneUnit).cwiseMax(0.0).cwiseMin(1.0).maxCoeff();
+  }
+
+  LinearBlocks blocks_;
+  CoupledPosterior posterior_;
+  VectorXd noise_shape_;
+  VectorXd noise_variance_;
+};
+
+}  // namespace
+
+BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at) {
+  LinearBlocks blocks = blocks_of(bias, data);
+  auto posterior = CoupledPosterior::condition(bias.kernel, blocks, coupled(blocks, data), at);
+  if (!posterior) return nullptr;
+  return std::make_shared<CoupledOutputs>(std::move(blocks), *std::move(posterior), at, data.noise_shape);
+}
+
+std::optional<CoupledSearchResult> search_coupled_outputs(const SpelledBias& bias, const OutputData& data,
+                                                          const VectorXd& metrology_stddev,
+                                                          const SearchOptions& options,
+                                                          const CoupledHyperparameters* last) {
+  const LinearBlocks blocks = blocks_of(bias, data);
+  return search_coupled(bias.kernel, blocks, coupled(blocks, data), metrology_stddev, false, options, last);
+}
+
+}  // namespace trammel

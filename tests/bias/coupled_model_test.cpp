@@ -1,0 +1,165 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "server/bias/bias_model.h"
+#include "tests/bias/coupled_arm.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double kNoise = 10e-6;  // m
+
+/// Gear errors of the three joints and a little of what they do not explain; whole turns.
+BiasProblem gear_problem(Index count, std::uint64_t seed) {
+  BiasProblem problem{random_joints(count, seed, 3) * (std::numbers::pi / 1.2), MatrixXd(count, 3),
+                      Eigen::VectorXd::Constant(count, kNoise)};
+  std::mt19937_64 random(seed + 500);
+  for (Index i = 0; i < count; ++i) {
+    const JointVector q = problem.q.row(i);
+    problem.features.push_back(arm_features(q));
+    const Vector3 error_B = problem.features.back().by_joint.topRows(3) * gear_errors(q) +
+                            3e-5 * Vector3(std::sin(q[1]), std::cos(q[0] + q[1]), std::sin(q[2]));
+    for (Index d = 0; d < 3; ++d) problem.residual_B(i, d) = error_B[d] + kNoise * normal(&random);
+  }
+  return problem;
+}
+
+BiasProblem part_of(const BiasProblem& problem, Index first, Index count) {
+  return {problem.q.middleRows(first, count),
+          problem.residual_B.middleRows(first, count),
+          problem.sigma.segment(first, count),
+          {problem.features.begin() + first, problem.features.begin() + first + count}};
+}
+
+BiasOptions spelled(const std::string& kernel) {
+  BiasOptions options;
+  options.kernel = kernel;
+  options.starts = 2;
+  return options;
+}
+
+BiasModel fit(const BiasProblem& problem, const std::string& kernel) {
+  auto model = BiasModel::fit(problem, spelled(kernel));
+  if (!model) throw std::runtime_error(model.error().message);
+  return *std::move(model);
+}
+
+void expect_same_predictions(const BiasModel& a, const BiasModel& b) {
+  const BiasProblem targets = gear_problem(70, 99);
+  const auto from_a = a.predict_all(targets.q, targets.features);
+  const auto from_b = b.predict_all(targets.q, targets.features);
+  for (std::size_t i = 0; i < from_a.size(); ++i) {
+    EXPECT_EQ(from_a[i].mean_B, from_b[i].mean_B);
+    EXPECT_EQ(from_a[i].covariance_B, from_b[i].covariance_B);
+    EXPECT_EQ(from_a[i].measured_stddev_B, from_b[i].measured_stddev_B);
+    EXPECT_EQ(from_a[i].prior_share, from_b[i].prior_share);
+  }
+}
+
+/// Fitted once for the tests that only look.
+const BiasModel& fitted() {
+  static const BiasModel model = fit(gear_problem(150, 1), "se + joint_map + parameters");
+  return model;
+}
+
+TEST(CoupledModel, LearnsTheJointsErrorsThatAPlainKernelCannotAndItsIntervalsCover) {
+  const BiasModel plain = fit(gear_problem(150, 1), "se");
+  const BiasProblem fresh = gear_problem(400, 2);
+  const auto predictions = fitted().predict_all(fresh.q, fresh.features);
+  const MatrixXd left = fresh.residual_B - fitted().mean_all_B(fresh.q, fresh.features);
+  const MatrixXd left_by_plain = fresh.residual_B - plain.mean_all_B(fresh.q);
+  EXPECT_LT(left.norm(), 0.5 * left_by_plain.norm());
+  int inside = 0;
+  for (Index i = 0; i < 400; ++i) {
+    const auto& at = predictions[static_cast<std::size_t>(i)];
+    for (Index d = 0; d < 3; ++d) inside += std::abs(left(i, d)) < 1.96 * at.measured_stddev_B[d];
+    EXPECT_EQ(at.stddev_B, Vector3(at.covariance_B.diagonal().cwiseSqrt()));
+    EXPECT_EQ(at.covariance_B, Matrix3(at.covariance_B.transpose()));
+  }
+  EXPECT_NEAR(inside / 1200.0, 0.95, 0.03);
+  EXPECT_GT(std::abs(predictions[0].covariance_B(0, 1)), 1e-3 * predictions[0].covariance_B.trace());
+}
+
+TEST(CoupledModel, ManyTargetsSayWhatOneSays) {
+  const BiasProblem targets = gear_problem(70, 3);
+  const auto many = fitted().predict_all(targets.q, targets.features);
+  for (const std::size_t i : {0u, 63u, 64u, 69u}) {
+    const JointVector q = targets.q.row(static_cast<Index>(i));
+    const BiasPrediction one = fitted().predict(q, targets.features[i]);
+    EXPECT_LT((one.mean_B - many[i].mean_B).norm(), 1e-14);
+    EXPECT_LT((one.covariance_B - many[i].covariance_B).norm(), 1e-10 * one.covariance_B.norm());
+    EXPECT_EQ(one.mean_B, fitted().mean_B(q, targets.features[i]));
+  }
+}
+
+TEST(CoupledModel, RestoresBitForBit) {
+  const auto restored = BiasModel::restore(fitted().state());
+  ASSERT_TRUE(restored.has_value()) << restored.error().message;
+  expect_same_predictions(fitted(), *restored);
+  EXPECT_EQ(fitted().leave_one_out_mean_B(), restored->leave_one_out_mean_B());
+  EXPECT_EQ(fitted().report().noise_stddev, restored->report().noise_stddev);
+}
+
+TEST(CoupledModel, LeaveOneOutEqualsRestoringWithoutThePose) {
+  const auto rest = fitted().without({40});
+  ASSERT_TRUE(rest.has_value()) << rest.error().message;
+  const BiasState& all = fitted().state();
+  const BiasPrediction expected = rest->predict(all.q.row(40).transpose(), all.features[40]);
+  EXPECT_LT((fitted().leave_one_out_mean_B().row(40).transpose() - expected.mean_B).norm(), 1e-6 * kNoise);
+  EXPECT_LT((fitted().leave_one_out_stddev_B().row(40).transpose() - expected.measured_stddev_B).norm(), 1e-3 * kNoise);
+  EXPECT_NEAR(fitted().leave_one_out_prior_share()[40], expected.prior_share, 1e-3);
+}
+
+TEST(CoupledModel, GrowsAsIfConditionedAnewAndRefitsFromWhereItWas) {
+  const BiasProblem all = gear_problem(150, 1);
+  const BiasModel few = fit(part_of(all, 0, 120), "se + joint_map");
+  const auto grown = few.with(part_of(all, 120, 30));
+  ASSERT_TRUE(grown.has_value()) << grown.error().message;
+  expect_same_predictions(*grown, *BiasModel::restore(grown->state()));
+  const auto refitted = grown->refit({});
+  ASSERT_TRUE(refitted.has_value()) << refitted.error().message;
+  EXPECT_LE(refitted->report().evaluations, 15);
+  EXPECT_GE(refitted->report().log_likelihood.sum(), grown->report().log_likelihood.sum() - 0.1);
+}
+
+TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
+  const auto message = [](const BiasProblem& problem, const std::string& kernel) {
+    const auto model = BiasModel::fit(problem, spelled(kernel));
+    return model ? "" : model.error().message;
+  };
+  BiasProblem problem = gear_problem(20, 5);
+  problem.features.pop_back();
+  EXPECT_EQ(message(problem, "se + joint_map"),
+            "bias data: features of 19 poses for 20 observations, kernel `se + joint_map` needs them");
+  problem = gear_problem(20, 5);
+  problem.features[7].by_parameter.resize(6, 1);
+  EXPECT_EQ(message(problem, "se + parameters"),
+            "bias data row 8: features are 6 x 3 and 6 x 1, should be 6 x 3 and 6 x 2");
+  problem = gear_problem(20, 5);
+  problem.features[7].by_joint(2, 2) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(message(problem, "se + parameters"), "bias data row 8: a feature is not finite");
+  EXPECT_EQ(message(gear_problem(4001, 5), "se + joint_map"),
+            "bias kernel `se + joint_map`: 4001 observations, at most 4000 with joint_map or parameters");
+  EXPECT_EQ(message(gear_problem(20, 5), "se * joint_map"),
+            "bias kernel `se * joint_map`: `joint_map` can only be added to a whole bias, as in `se + joint_map`");
+
+  BiasState state = fitted().state();
+  state.block_hyperparameters.conservativeResize(4);
+  EXPECT_EQ(BiasModel::restore(state).error().message,
+            "bias state: 4 hyperparameters of blocks, should be 6 for kernel `se + joint_map + parameters`");
+}
+
+TEST(CoupledModel, StopsWhenTold) {
+  BiasOptions options = spelled("se + joint_map");
+  options.progress = [](double share) { return share < 0.2; };
+  const auto model = BiasModel::fit(gear_problem(60, 6), options);
+  ASSERT_FALSE(model.has_value());
+  EXPECT_EQ(model.error().message, "bias fit: given up on request");
+}
+
+}  // namespace
+}  // namespace trammel
