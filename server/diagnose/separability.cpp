@@ -73,6 +73,17 @@ std::optional<Cause> absorbing(const LinearProblem& problem, const VectorXd& eff
   return std::nullopt;
 }
 
+/// Once a pair, in whichever order it is met.
+void add_pair(std::vector<Inseparable>& pairs, const Cause& one, const Cause& other, double correlation) {
+  for (Inseparable& known : pairs) {
+    const auto& causes = known.causes;
+    if (causes != std::vector<Cause>{one, other} && causes != std::vector<Cause>{other, one}) continue;
+    known.correlation = std::max(known.correlation, correlation);
+    return;
+  }
+  pairs.push_back({{one, other}, correlation});
+}
+
 /// Single numbers of a cause that the model's own parameters take over whole.
 void add_absorbed(const LinearProblem& problem, const Background& background, const MatrixXd& columns,
                   const Cause& cause, std::vector<Inseparable>& inseparable) {
@@ -83,11 +94,7 @@ void add_absorbed(const LinearProblem& problem, const Background& background, co
     const double left = column.dot(background.project(column).col(0)) / whole;
     if (left > kAbsorbedShare * kAbsorbedShare) continue;
     const std::optional<Cause> absorber = absorbing(problem, column);
-    if (!absorber) continue;
-    const std::vector<Cause> pair = {cause, *absorber};
-    const bool known = std::any_of(inseparable.begin(), inseparable.end(),
-                                   [&](const Inseparable& other) { return other.causes == pair; });
-    if (!known) inseparable.push_back({pair, std::sqrt(1 - std::clamp(left, 0.0, 1.0))});
+    if (absorber) add_pair(inseparable, cause, *absorber, std::sqrt(1 - std::clamp(left, 0.0, 1.0)));
   }
 }
 
@@ -122,7 +129,7 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
       if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
       const double correlation = imitation(own, averages[j], background);
       imitated = std::max(imitated, correlation);
-      if (correlation > kSameEffect) result.inseparable.push_back({{cause, other}, correlation});
+      if (correlation > kSameEffect) add_pair(result.inseparable, cause, other, correlation);
     }
     const int freedom = std::max(1, families[places[i]]->typical().freedom);
     const double needed =
@@ -134,7 +141,8 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
     else
       unseen.needs = what_it_needs(cause);
     const bool partly = std::any_of(result.inseparable.begin(), result.inseparable.end(),
-                                    [&](const Inseparable& pair) { return pair.causes.front() == cause; });
+                                    [&](const Inseparable& pair) { return pair.causes.front() == cause; }) ||
+                        imitated > kSameEffect;
     if (partly && unseen.needs.empty()) unseen.needs = what_it_needs(cause);
     result.unseen.push_back(std::move(unseen));
   }

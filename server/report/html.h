@@ -16,7 +16,7 @@ namespace trammel {
 [[nodiscard]] std::string fill_in(std::string_view page,
                                   const std::map<std::string, std::string, std::less<>>& contents);
 
-/// A value and its U(k=2), both rounded to what U is worth: two digits of it.
+/// A value and the half width of its interval, both rounded to what the width is worth: two digits of it.
 struct ShownValue {
   std::string value, expanded;
 };

@@ -13,9 +13,9 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
   const std::string text = diagnosis_text(diagnosis_json(test::made_up_diagnosis(test::cell_7())));
   for (const char* part :
        {"ambiguous: The gear of joint 3", "gear_transmission of joint 3", "order = 48.503 ± 0.040",
-        "could also be: geometry d6", "Have the gear of joint 3 looked at", "9 um rms that depend on q4",
-        "pose p28 (row 29)", "would not have shown: backlash: needs both approach directions (joints 2)",
-        "uncertainty 2.4 now, 0.3"}) {
+        "half of the 95 % interval", "could also be: geometry d6", "Have the gear of joint 3 looked at",
+        "9 um rms that depend on q4", "pose p28 (row 29)",
+        "would not have shown: backlash: needs both approach directions (joints 2)", "uncertainty 2.4 now, 0.3"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }

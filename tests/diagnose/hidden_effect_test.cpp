@@ -112,6 +112,29 @@ INSTANTIATE_TEST_SUITE_P(Undecidables, HiddenUndecidable,
                                          "joint1_or_tracker", "joint6_or_tool", "constant_warmth"),
                          test_name);
 
+TEST(HiddenEffectInterval, IsOf1_96StandardDeviations) {
+  const hidden::HiddenCase hidden = hidden::hide({.kind = "replica_p28", .seed = 1});
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  const Estimate& distance = diagnosis.findings[0].parameters.at(0);
+  EXPECT_NEAR(distance.u95, 1.96 * 1e3 * diagnosis.noise, 1e-4 * distance.u95);
+}
+
+TEST(WhatCannotBeTold, IsListedOnceAPair) {
+  for (const char* kind : {"payload_alone", "tool_absorbed", "joint6_or_tool"}) {
+    const Answer answer = answer_to({.kind = kind, .seed = 2, .lambda = 150, .poses = 140});
+    const std::vector<Inseparable>& pairs = answer.diagnosis.not_separable;
+    EXPECT_FALSE(pairs.empty()) << kind;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const std::vector<Cause> turned(pairs[k].causes.rbegin(), pairs[k].causes.rend());
+      for (std::size_t i = 0; i < k; ++i) {
+        EXPECT_FALSE(pairs[i].causes == pairs[k].causes || pairs[i].causes == turned)
+            << to_string(turned.front()) << " and " << to_string(turned.back());
+      }
+    }
+  }
+}
+
 TEST(HiddenEffectOnPositions, IsNamedWithoutOrientations) {
   const Answer answer =
       answer_to({.kind = "gear_transmission", .seed = 4, .lambda = 150, .poses = 160, .orientation = false});
