@@ -63,7 +63,9 @@ class Laboratory {
   Result<CompensatedModel> learn(const std::string& level, const CompensatedModel& calibrated,
                                  const MeasurementBatch& batch) {
     const std::string stage = fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
-    return learn_bias(calibrated, batch, options(stage));
+    TrainOptions train_options = options(stage);
+    train_options.bias = options_.bias;
+    return learn_bias(calibrated, batch, train_options);
   }
 
  private:
@@ -92,20 +94,22 @@ void add_calibrated(const std::string& level, const CompensatedModel& model, con
 }
 
 /// What is left where the bias is applied at every pose, in domain or not. 3 x N, m.
-Result<Eigen::Matrix3Xd> left_by_bias(const CompensatedModel& model, const MeasurementBatch& batch) {
-  TRAMMEL_CHECK(model.parts().bias.has_value());
-  const Result<BiasModel> bias = BiasModel::restore(*model.parts().bias);
-  if (!bias) return tl::make_unexpected(bias.error());
+Eigen::Matrix3Xd left_by_bias(const CompensatedModel& model, const MeasurementBatch& batch) {
+  TRAMMEL_CHECK(model.bias().has_value());
+  const BiasModel& bias = *model.bias();
   const BiasProblem error = leftover(model.parts().physics, batch);
-  return Eigen::Matrix3Xd((error.residual_B - bias->mean_all_B(error.q)).transpose());
+  std::vector<BiasFeatures> features;
+  for (const Measurement& m : batch.measurements) {
+    if (bias.needs_features()) features.push_back(model.features(m.context));
+  }
+  return (error.residual_B - bias.mean_all_B(error.q, features)).transpose();
 }
 
 Status add_learned(const std::string& level, const CompensatedModel& model, const std::string& set,
                    const MeasurementBatch& batch, Study& study) {
-  const Result<Eigen::Matrix3Xd> left = left_by_bias(model, batch);
-  if (!left) return tl::make_unexpected(left.error());
+  const Eigen::Matrix3Xd left = left_by_bias(model, batch);
   study.rows.push_back({set, level + "+GP", model.provenance().training_poses,
-                        static_cast<int>(batch.measurements.size()), figures_of(*left), model.evaluate(batch)});
+                        static_cast<int>(batch.measurements.size()), figures_of(left), model.evaluate(batch)});
   return {};
 }
 
@@ -274,10 +278,9 @@ Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal, c
     for (const auto& [batch, all, some] : {std::tuple{&training, &training_errors, &training_without},
                                            std::tuple{&validation, &validation_errors, &validation_without}}) {
       const Eigen::Matrix3Xd calibrated = leftover(nominal.parts().physics, *batch).residual_B.transpose();
-      const Result<Eigen::Matrix3Xd> left = left_by_bias(*learned, *batch);
-      if (!left) return tl::make_unexpected(left.error());
-      all->add(calibrated, *left);
-      if (without) some->add(calibrated, *left);
+      const Eigen::Matrix3Xd left = left_by_bias(*learned, *batch);
+      all->add(calibrated, left);
+      if (without) some->add(calibrated, left);
     }
   }
   training_errors.add_rows(kTraining, training_poses, study);

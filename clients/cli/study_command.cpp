@@ -13,6 +13,7 @@ namespace {
 struct StudyArguments {
   std::string name, json;
   std::string cell, truth;  // empty: what ships
+  std::optional<std::string> bias;
   std::uint64_t seed = 1;
 };
 
@@ -44,6 +45,7 @@ Status run(const StudyArguments& arguments) {
   if (!robot) return tl::make_unexpected(robot.error());
   StudyOptions options;
   options.seed = arguments.seed;
+  options.bias = arguments.bias;
   if (arguments.name == "drilling") {
     Result<std::vector<TargetRow>> holes = holes_to_drill(robot->truth.cell->robot);
     if (!holes) return tl::make_unexpected(holes.error());
@@ -73,6 +75,7 @@ void add_study_command(CLI::App& app, Action& chosen) {
   command->add_option("--truth", arguments->truth, "Virtual robot's true parameters (YAML) instead of the shipped ones")
       ->type_name("FILE");
   add_seed_option(*command, arguments->seed, "Seed of all draws: poses, noise, search");
+  command->add_option("--bias", arguments->bias, "Kernel of the learned bias instead of the cell's, see train");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
 }

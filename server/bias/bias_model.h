@@ -38,9 +38,8 @@ struct BiasPrediction {
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one noisy measurement of it
   Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
-  /// Posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not. The prior of `parameters`
-  /// does not count: beside it every pose would be known.
-  double prior_share = 1.0;
+  double prior_share =
+      1.0;  ///< posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not
 };
 
 /// All that must be kept to restore a fitted model exactly: no factor, no table. Who knows the physics need not keep

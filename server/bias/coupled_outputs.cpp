@@ -14,14 +14,15 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kOfOneUnit = 3;
+constexpr Index kTargets = 256;  // at once: their columns of H are a few megabytes
 
-// D times M x p: H before it is scaled, output by output.
+// D times `many` x p: H from row `first` on before it is scaled, output by output.
 std::vector<MatrixXd> columns_of(const LinearBlocks& blocks, const MatrixXd& q,
-                                 const std::vector<BiasFeatures>& features, Index outputs) {
+                                 const std::vector<BiasFeatures>& features, Index first, Index many, Index outputs) {
   TRAMMEL_CHECK(static_cast<Index>(features.size()) == q.rows());
-  std::vector<MatrixXd> columns(static_cast<std::size_t>(outputs), MatrixXd(q.rows(), blocks.column_count()));
-  for (Index i = 0; i < q.rows(); ++i) {
-    const MatrixXd H = blocks.columns(q.row(i).transpose(), features[static_cast<std::size_t>(i)]);
+  std::vector<MatrixXd> columns(static_cast<std::size_t>(outputs), MatrixXd(many, blocks.column_count()));
+  for (Index i = 0; i < many; ++i) {
+    const MatrixXd H = blocks.columns(q.row(first + i).transpose(), features[static_cast<std::size_t>(first + i)]);
     for (Index d = 0; d < outputs; ++d) columns[static_cast<std::size_t>(d)].row(i) = H.row(d);
   }
   return columns;
@@ -30,7 +31,7 @@ std::vector<MatrixXd> columns_of(const LinearBlocks& blocks, const MatrixXd& q,
 LinearBlocks blocks_of(const SpelledBias& bias, const OutputData& data) { return {bias.blocks, data.features.front()}; }
 
 CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
-  return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, data.y.cols())};
+  return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, 0, data.q.rows(), data.y.cols())};
 }
 
 class CoupledOutputs final : public BiasOutputs {
@@ -44,14 +45,24 @@ class CoupledOutputs final : public BiasOutputs {
   }
 
   MatrixXd mean(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
-    return posterior_.mean(q, columns_of(blocks_, q, features, count()));
+    MatrixXd mean(q.rows(), count());
+    for (Index first = 0; first < q.rows(); first += kTargets) {
+      const Index many = std::min(kTargets, q.rows() - first);
+      mean.middleRows(first, many) =
+          posterior_.mean(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()));
+    }
+    return mean;
   }
 
   std::vector<OutputPrediction> predict(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
     std::vector<OutputPrediction> predictions;
-    for (CoupledPrediction& at : posterior_.predict(q, columns_of(blocks_, q, features, count()))) {
-      const double share = share_of(at.covariance.diagonal(), at.open_prior);
-      predictions.push_back({std::move(at.mean), std::move(at.covariance), share});
+    for (Index first = 0; first < q.rows(); first += kTargets) {
+      const Index many = std::min(kTargets, q.rows() - first);
+      for (CoupledPrediction& at :
+           posterior_.predict(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()))) {
+        const double share = share_of(at.covariance.diagonal(), at.prior);
+        predictions.push_back({std::move(at.mean), std::move(at.covariance), share});
+      }
     }
     return predictions;
   }
@@ -65,17 +76,15 @@ class CoupledOutputs final : public BiasOutputs {
     VectorXd share(variance.rows());
     for (Index i = 0; i < share.size(); ++i) {
       const VectorXd known = variance.row(i).transpose() - noise_shape_[i] * noise_variance_;
-      share[i] = share_of(known, posterior_.open_prior().row(i).transpose());
+      share[i] = share_of(known, posterior_.prior().row(i).transpose());
     }
     return share;
   }
 
  private:
   Index count() const { return noise_variance_.size(); }
-  // Against what the kernel and the learned blocks leave open: beside the prior of parameters, millimetres, every pose
-  // would be known.
-  static double share_of(const VectorXd& known, const VectorXd& open_prior) {
-    return known.cwiseQuotient(open_prior).head(kOfOneUnit).cwiseMax(0.0).cwiseMin(1.0).maxCoeff();
+  static double share_of(const VectorXd& known, const VectorXd& prior) {
+    return known.cwiseQuotient(prior).head(kOfOneUnit).cwiseMax(0.0).cwiseMin(1.0).maxCoeff();
   }
 
   LinearBlocks blocks_;

@@ -33,10 +33,7 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   }
   posterior.leave_one_out(*solution, data);
   posterior.column_scale_ = solution->column_scale;
-  posterior.open_ = VectorXd::Zero(p);
-  if (solution->variance_slope.cols() > 0)
-    posterior.open_ = (solution->variance_slope.rowwise().squaredNorm().array() > 0).cast<double>();
-  posterior.open_prior_.resize(n, data.y.cols());
+  posterior.prior_.resize(n, data.y.cols());
   posterior.weights_ = solution->weights.cwiseProduct(solution->column_scale);
   posterior.log_likelihood_ = solution->log_likelihood;
   for (Index d = 0; d < data.y.cols(); ++d) {
@@ -48,9 +45,8 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
     VectorXd prior(n);
     kernel->diagonal(at.outputs[output].kernel,
                      {solution->features[output].data(), n, solution->features[output].rows()}, prior.data());
-    const VectorXd learned = posterior.open_.cwiseProduct(posterior.column_scale_.cwiseAbs2());
-    posterior.open_prior_.col(d) = std::exp(2 * at.outputs[output].log_signal_stddev) * prior;
-    posterior.open_prior_.col(d).noalias() += data.columns[output].cwiseAbs2() * learned;
+    posterior.prior_.col(d) = std::exp(2 * at.outputs[output].log_signal_stddev) * prior;
+    posterior.prior_.col(d).noalias() += data.columns[output].cwiseAbs2() * posterior.column_scale_.cwiseAbs2();
   }
   posterior.kernel_ = std::move(kernel);
   posterior.root_ = std::move(solution->root);
@@ -107,7 +103,7 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
   const MatrixXd means = mean(q, columns);
   std::vector<MatrixXd> halves;
   for (Index i = 0; i < q.rows(); ++i)
-    out->push_back({means.row(i).transpose(), MatrixXd(outputs, outputs), VectorXd(outputs), VectorXd(outputs)});
+    out->push_back({means.row(i).transpose(), MatrixXd(outputs, outputs), VectorXd(outputs)});
   for (Index d = 0; d < outputs; ++d) {
     const auto output = static_cast<std::size_t>(d);
     const MatrixXd scaled = columns[output] * column_scale_.asDiagonal();
@@ -121,7 +117,6 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
             halves[output].col(i).dot(halves[static_cast<std::size_t>(e)].col(i));
       at.covariance(d, d) += variance.posterior;
       at.prior[d] = scaled.row(i).squaredNorm() + variance.prior;
-      at.open_prior[d] = scaled.row(i).cwiseAbs2() * open_ + variance.prior;
     }
   }
 }

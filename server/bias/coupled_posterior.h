@@ -9,7 +9,6 @@ struct CoupledPrediction {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
   Eigen::VectorXd prior;       ///< their variances before any data
-  Eigen::VectorXd open_prior;  ///< the same without the columns whose weights' variance is given, not learned
 };
 
 /// What coupled processes know after their data. Immutable, thread-safe.
@@ -39,8 +38,8 @@ class CoupledPosterior {
   /// (blocks of C⁻¹ instead of its diagonal in Rasmussen & Williams, eqs. 5.10-5.12).
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
-  /// N x D: as CoupledPrediction has it, at the data.
-  [[nodiscard]] const Eigen::MatrixXd& open_prior() const { return open_prior_; }
+  /// N x D: variances at the data before any.
+  [[nodiscard]] const Eigen::MatrixXd& prior() const { return prior_; }
 
  private:
   CoupledPosterior() = default;
@@ -60,12 +59,11 @@ class CoupledPosterior {
   std::vector<Eigen::MatrixXd> explained_;  // D: Hᵀ M⁻¹, p x N
   Eigen::LLT<Eigen::MatrixXd> root_;        // of A
   Eigen::VectorXd column_scale_;
-  Eigen::VectorXd open_;  // p: 1 for columns whose weights' variance was learned, else 0
   Eigen::VectorXd weights_;
   double log_likelihood_ = 0;
   Eigen::MatrixXd leave_one_out_mean_;
   Eigen::MatrixXd leave_one_out_variance_;
-  Eigen::MatrixXd open_prior_;
+  Eigen::MatrixXd prior_;
 };
 
 }  // namespace trammel

@@ -29,6 +29,7 @@ double density_slope(Index harmonic, double knee) {
 
 class JointMapBlock final : public LinearBlock {
  public:
+  std::string_view name() const override { return "joint_map"; }
   Index column_count(const BiasFeatures& shape) const override { return kColumns * shape.by_joint.cols(); }
   Index parameter_count(const BiasFeatures& shape) const override { return 2 * shape.by_joint.cols(); }
   VectorXd start(const BiasFeatures& shape) const override {

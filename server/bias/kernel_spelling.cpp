@@ -11,16 +11,16 @@ namespace {
 
 constexpr int kMostDepth = 20;  // of parentheses; nobody means more, and the stack ends somewhere
 
-struct Block {
-  std::string_view word;
-  LinearBlockPtr (*make)();
-};
+const std::array<LinearBlockPtr, 2>& known_blocks() {
+  static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
+  return known;
+}
 
-const std::array<Block, 2> kBlocks = {{{"joint_map", make_joint_map_block}, {"parameters", make_parameter_block}}};
-
-const Block* find_block(std::string_view word) {
-  const auto* found = std::find_if(kBlocks.begin(), kBlocks.end(), [&](const Block& b) { return b.word == word; });
-  return found == kBlocks.end() ? nullptr : found;
+LinearBlockPtr find_block(std::string_view word) {
+  for (const LinearBlockPtr& block : known_blocks()) {
+    if (block->name() == word) return block;
+  }
+  return nullptr;
 }
 
 bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
@@ -41,29 +41,27 @@ class Reader {
 
   Result<SpelledBias> bias() {
     std::vector<KernelPtr> parts;
-    std::vector<std::string_view> named;
     SpelledBias bias;
     do {
       const std::string_view before = rest_;
-      const Block* block = find_block(word());
-      if (block == nullptr) {
+      const LinearBlockPtr block = find_block(word());
+      if (!block) {
         rest_ = before;
         auto part = product();
         if (!part) return tl::make_unexpected(part.error());
         parts.push_back(*std::move(part));
         continue;
       }
-      if (std::find(named.begin(), named.end(), block->word) != named.end())
-        return refused("bias kernel `{}`: `{}` is named twice", all_, block->word);
-      if (take('*') || take('(')) return misplaced(block->word);
-      named.push_back(block->word);
-      bias.blocks.push_back(block->make());
+      if (bias.has(block->name())) return refused("bias kernel `{}`: `{}` is named twice", all_, block->name());
+      if (take('*') || take('(')) return misplaced(block->name());
+      bias.blocks.push_back(block);
     } while (take('+'));
     skip_space();
     if (!rest_.empty()) return expected("`+`, `*` or the end");
-    if (parts.empty())
-      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, named.front(),
-                     named.front());
+    if (parts.empty()) {
+      const std::string_view block = bias.blocks.front()->name();
+      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, block, block);
+    }
     bias.kernel = parts.size() == 1 ? parts.front() : sum_of(std::move(parts));
     return bias;
   }
@@ -98,7 +96,7 @@ class Reader {
   Result<KernelPtr> leaf() {
     const std::string_view name = word();
     if (name.empty()) return expected("a kernel");
-    if (find_block(name) != nullptr) return misplaced(name);
+    if (find_block(name)) return misplaced(name);
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
       return refused(
@@ -143,6 +141,10 @@ class Reader {
 }  // namespace
 
 Result<KernelPtr> spelled_kernel(std::string_view spelling) { return Reader(spelling).whole(); }
+
+bool SpelledBias::has(std::string_view block) const {
+  return std::any_of(blocks.begin(), blocks.end(), [&](const LinearBlockPtr& one) { return one->name() == block; });
+}
 
 Result<SpelledBias> spelled_bias(std::string_view spelling) { return Reader(spelling).bias(); }
 

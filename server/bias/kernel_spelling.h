@@ -18,6 +18,7 @@ namespace trammel {
 struct SpelledBias {
   KernelPtr kernel;
   std::vector<LinearBlockPtr> blocks;
+  [[nodiscard]] bool has(std::string_view block) const;
 };
 
 /// A kernel as above and, added to it once each at most, `joint_map` and `parameters`: `matern52 + joint_map`. Refuses

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "server/robot/pose.h"
@@ -20,6 +21,8 @@ class LinearBlock {
  public:
   virtual ~LinearBlock() = default;
 
+  /// As it is spelled.
+  [[nodiscard]] virtual std::string_view name() const = 0;
   /// Of the weights w, for features of that shape.
   [[nodiscard]] virtual Eigen::Index column_count(const BiasFeatures& shape) const = 0;
   [[nodiscard]] virtual Eigen::Index parameter_count(const BiasFeatures& shape) const = 0;
@@ -40,8 +43,9 @@ using LinearBlockPtr = std::shared_ptr<const LinearBlock>;
 /// angle alone, k_j periodic and once differentiable (Matérn 3/2 on the circle) in a Fourier basis.
 /// Hyperparameters of each joint: log amplitude, rad; log of the harmonic at which the spectrum begins to fall.
 [[nodiscard]] LinearBlockPtr make_joint_map_block();
-/// H = J_θ(q), the identified parameters' own uncertainty. No hyperparameter: the weights have the variance that the
-/// parameters had before any data, and what the calibration found is counted as found from the same data.
+/// H = J_θ(q): what physical parameters, identified or not, leave uncertain. No hyperparameter: the weights have the
+/// variance that the parameters had before any data, and what the calibration found is counted as found from the same
+/// data.
 [[nodiscard]] LinearBlockPtr make_parameter_block();
 
 /// Several blocks side by side.

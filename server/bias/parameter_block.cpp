@@ -5,6 +5,7 @@ namespace {
 
 class ParameterBlock final : public LinearBlock {
  public:
+  std::string_view name() const override { return "parameters"; }
   Eigen::Index column_count(const BiasFeatures& shape) const override { return shape.by_parameter.cols(); }
   Eigen::Index parameter_count(const BiasFeatures& /*shape*/) const override { return 0; }
   Eigen::VectorXd start(const BiasFeatures& /*shape*/) const override { return {}; }

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "server/base/check.h"
+#include "server/bias/kernel_spelling.h"
 #include "server/base/units.h"
-#include "server/compensate/domain.h"
 #include "server/compensate/model_file.h"
 #include "server/robot/inverse_kinematics.h"
 
@@ -69,6 +69,31 @@ std::string_view to_string(CorrectionStatus status) {
   return "refused";
 }
 
+namespace {
+
+/// At the observations of a bias with blocks.
+Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& parts, const BiasPhysics& physics) {
+  const BiasState& bias = *parts.bias;
+  if (static_cast<Eigen::Index>(parts.bias_contexts.size()) != bias.q.rows()) {
+    return refused("model: {} poses are described for {} observations of the bias", parts.bias_contexts.size(),
+                   bias.q.rows());
+  }
+  std::vector<BiasFeatures> features;
+  for (std::size_t i = 0; i < parts.bias_contexts.size(); ++i) {
+    PoseContext context = parts.bias_contexts[i];
+    context.q = bias.q.row(static_cast<Eigen::Index>(i)).transpose();
+    const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
+    if (!parts.physics.tools.contains(context.tool) || !known_payload) {
+      return refused("model: the bias learned at tool '{}' and payload '{}', which its cell does not have",
+                     context.tool, context.payload);
+    }
+    features.push_back(physics.at(context));
+  }
+  return features;
+}
+
+}  // namespace
+
 Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   const int n = parts.physics.cell->robot.size();
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
@@ -80,11 +105,19 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
     return refused("model: a parameter is not finite");
   }
-  auto inside = std::make_shared<Inside>();
+  auto inside = std::make_shared<Inside>(parts.physics);
   if (parts.bias) {
     if (parts.bias->q.cols() != n)
       return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
-    Result<BiasModel> bias = BiasModel::restore(*parts.bias);
+    BiasState state = *parts.bias;
+    const Result<SpelledBias> spelled = spelled_bias(state.kernel);
+    if (spelled && !spelled->blocks.empty()) {
+      Result<std::vector<BiasFeatures>> features = features_of(parts, inside->bias_physics);
+      if (!features) return tl::make_unexpected(features.error());
+      state.features = std::move(*features);
+      inside->bias_has_parameters = spelled->has("parameters");
+    }
+    Result<BiasModel> bias = BiasModel::restore(state);
     if (!bias) return tl::make_unexpected(bias.error());
     inside->bias = std::move(*bias);
     const Eigen::MatrixXd& residual_B = parts.bias->residual_B;
@@ -104,80 +137,6 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
   }
   return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
                  cell().name, tool, payload, known);
-}
-
-ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::string& tool,
-                                          const std::string& payload) const {
-  PoseContext context;
-  context.q = q;
-  context.tool = tool;
-  context.payload = payload;
-  context.served = true;
-  return predict(context, std::nullopt);
-}
-
-Vector3 CompensatedModel::variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
-                                             const Vector3& p_B) const {
-  const PhysicalModel& physics = parts().physics;
-  const Pose X_BW = physics.X_WB.inverse();
-  Vector3 variance = Vector3::Zero();
-  const auto add = [&](const PoseContext& other) {
-    variance += (X_BW * physics.pose_W(other).translation() - p_B).cwiseAbs2();
-  };
-  bool warm = false;
-  for (const ErrorSourcePtr& source : physics.sources) {
-    const ContextNeeds needs = source->needs();
-    warm = warm || needs.temperature;
-    if (!needs.direction || !context.direction.empty()) continue;
-    PoseContext approached = context;
-    approached.direction.assign(static_cast<std::size_t>(context.q.size()), 0);
-    approached.direction[static_cast<std::size_t>(source->joint())] = 1;
-    add(approached);
-  }
-  if (warm && temperature_unsaid && context.temperature) {
-    PoseContext warmer = context;
-    *warmer.temperature += parts().temperature_stddev;
-    add(warmer);
-  }
-  return variance;
-}
-
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optional<double> bias_weight) const {
-  PoseContext context = asked;
-  if (!context.temperature) context.temperature = parts().temperature_mean;
-  const PhysicalModel& physics = parts().physics;
-  const Pose X_BW = physics.X_WB.inverse();
-  Eigen::MatrixXd J_W;
-  ErrorPrediction prediction;
-  prediction.X_BT_nominal = X_BW * physics.nominal_pose_W(context);
-  prediction.X_BT_predicted = X_BW * physics.pose_W(context, physics.values, &J_W);
-  const Vector3 unsaid = variance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
-  const Eigen::MatrixXd J_B = X_BW.linear() * J_W.topRows<3>();
-  const Vector3 identified = (J_B * parts().covariance * J_B.transpose()).diagonal();
-  const double sigma = cell().tracker.sigma;
-
-  Vector3 variance = Vector3::Constant(sigma * sigma + parts().discrepancy * parts().discrepancy) + identified;
-  const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
-  const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
-  prediction.in_domain = trained_with && domain.in_range(context.q);
-  if (inside_->bias) {
-    const BiasPrediction bias = inside_->bias->predict(context.q);
-    prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
-    const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias.prior_share) : 0.0);
-    prediction.bias_weight = weight;
-    prediction.X_BT_predicted.translation() += weight * bias.mean_B;
-    // Noise is never less than the tracker's: a fit to few poses takes some of it for signal. What the parameters
-    // leave uncertain is corrected by the bias as far as the bias knows anything, and counts in full where it does
-    // not. What of the bias is not taken may be missing: as much as it is there, and as it was at the training poses.
-    const Vector3 known = bias.stddev_B.cwiseAbs2();
-    const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(sigma * sigma);
-    const Vector3 untaken = bias.mean_B.cwiseAbs2().cwiseMax(inside_->bias_size_B.cwiseAbs2());
-    variance = weight * (noise + bias.prior_share * identified) + (1 - weight) * variance.cwiseMax(noise + identified) +
-               known + (1 - weight) * (1 - weight) * untaken;
-  }
-  prediction.stddev_B = (variance + unsaid).cwiseSqrt();
-  prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
-  return prediction;
 }
 
 Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
@@ -283,15 +242,18 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
   LevelErrors errors{
       Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
   const bool own = is_own(batch);
+  std::vector<PoseContext> poses;
+  for (const Measurement& m : batch.measurements) {
+    poses.push_back(m.context);
+    poses.back().served = !own;
+  }
+  const std::vector<ErrorPrediction> predictions = predict_all(poses);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
-    PoseContext context = m.context;
-    context.served = !own;
-    const Vector3 p_B = X_BW * m.p_W;
-    const ErrorPrediction prediction = predict(context, std::nullopt);
+    const auto pose = static_cast<std::size_t>(i);
+    const Vector3 p_B = X_BW * batch.measurements[pose].p_W;
+    const ErrorPrediction& prediction = predictions[pose];
     errors.nominal.col(i) = p_B - prediction.X_BT_nominal.translation();
-    if (!context.temperature) context.temperature = parts().temperature_mean;
-    errors.calibrated.col(i) = p_B - X_BW * physics.pose_W(context).translation();
+    errors.calibrated.col(i) = p_B - X_BW * physics.pose_W(completed(poses[pose])).translation();
     errors.compensated.col(i) = p_B - prediction.X_BT_predicted.translation();
     errors.stddev.col(i) = prediction.stddev_B;
     errors.in_domain.push_back(prediction.in_domain);

@@ -11,6 +11,7 @@
 #include "server/base/result.h"
 #include "server/bias/bias_model.h"
 #include "server/calibrate/calibrate.h"
+#include "server/compensate/bias_physics.h"
 
 namespace trammel {
 
@@ -41,8 +42,12 @@ struct ErrorPrediction {
   Pose X_BT_predicted;                 ///< where it will be
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
-  bool in_domain = false;              ///< false: the learned bias is not, or not fully, in error_B
-  double bias_weight = 0;              ///< how much of the learned bias is, in [0, 1]: 1 in domain, 0 well outside
+  /// Of the true error: the same without what the tracker's own sigma adds, m.
+  Vector3 true_stddev_B = Vector3::Zero();
+  /// Of one measurement, m^2, the three axes together: stddev_B is the root of its diagonal.
+  Matrix3 covariance_B = Matrix3::Zero();
+  bool in_domain = false;  ///< false: the learned bias is not, or not fully, in error_B
+  double bias_weight = 0;  ///< how much of the learned bias is, in [0, 1]: 1 in domain, 0 well outside
 };
 
 enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
@@ -101,8 +106,9 @@ class CompensatedModel {
     double observability_index = 0;  ///< see CalibrationResult, as the next two
     std::vector<SuspectPose> suspects;
     std::vector<double> cost_record;
-    double discrepancy = 0;  ///< m per axis, see CalibrationResult
-    std::optional<BiasState> bias;
+    double discrepancy = 0;                  ///< m per axis, see CalibrationResult
+    std::optional<BiasState> bias;           ///< without features: they follow from the physics and bias_contexts
+    std::vector<PoseContext> bias_contexts;  ///< of the bias' observations, in their order; empty without blocks
     std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
     double temperature_stddev = 0;           ///< K
     JointVector q_min, q_max;                ///< range of the training poses, rad
@@ -124,6 +130,11 @@ class CompensatedModel {
   /// q is checked by the caller for size; tool and payload as resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
                                         const std::string& payload) const;
+  /// The same at many poses: in less time where the bias has blocks.
+  [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
+  /// The learned bias, if any, and what it is told of a pose where it asks for features.
+  [[nodiscard]] const std::optional<BiasModel>& bias() const { return inside_->bias; }
+  [[nodiscard]] BiasFeatures features(const PoseContext& context) const { return inside_->bias_physics.at(context); }
   /// Target correction, source section 3.4.1.
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
@@ -141,16 +152,23 @@ class CompensatedModel {
 
  private:
   struct Inside {
+    explicit Inside(const PhysicalModel& physics) : bias_physics(physics) {}
     Parts parts;
+    BiasPhysics bias_physics;
     std::optional<BiasModel> bias;
+    bool bias_has_parameters = false;
     Vector3 bias_size_B = Vector3::Zero();  // m, rms over the training poses
   };
+  /// With the temperature to take where nobody says it.
+  [[nodiscard]] PoseContext completed(PoseContext asked) const;
   /// `bias_weight`: to take instead of what the pose's place in the domain says.
-  [[nodiscard]] ErrorPrediction predict(const PoseContext& context, std::optional<double> bias_weight) const;
-  /// Variance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const BiasPrediction* bias,
+                                        std::optional<double> bias_weight) const;
+  /// Covariance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
   /// approached, how warm the arm is.
-  [[nodiscard]] Vector3 variance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
-                                           const Vector3& p_B) const;
+  [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
+                                             const Vector3& p_B) const;
   [[nodiscard]] bool is_own(const MeasurementBatch& batch) const;
   explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
   std::shared_ptr<const Inside> inside_;

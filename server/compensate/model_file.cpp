@@ -90,12 +90,16 @@ Evaluation evaluation_from(const Json& json) {
 }
 
 Json to_json(const BiasState& bias) {
-  return {{"kernel", bias.kernel},
-          {"q", to_json(bias.q)},
-          {"residual_B", to_json(bias.residual_B)},
-          {"sigma", to_json(Eigen::MatrixXd(bias.sigma))},
-          {"offset", to_json(Eigen::MatrixXd(bias.offset))},
-          {"hyperparameters", to_json(bias.hyperparameters)}};
+  Json json = {{"kernel", bias.kernel},
+               {"q", to_json(bias.q)},
+               {"residual_B", to_json(bias.residual_B)},
+               {"sigma", to_json(Eigen::MatrixXd(bias.sigma))},
+               {"offset", to_json(Eigen::MatrixXd(bias.offset))},
+               {"hyperparameters", to_json(bias.hyperparameters)}};
+  if (bias.block_hyperparameters.size() > 0) {
+    json["block_hyperparameters"] = to_json(Eigen::MatrixXd(bias.block_hyperparameters));
+  }
+  return json;
 }
 
 BiasState bias_from(const Json& json) {
@@ -106,7 +110,32 @@ BiasState bias_from(const Json& json) {
   bias.sigma = matrix_from(json.at("sigma"));
   bias.offset = matrix_from(json.at("offset"));
   bias.hyperparameters = matrix_from(json.at("hyperparameters"));
+  if (json.contains("block_hyperparameters")) {
+    bias.block_hyperparameters = matrix_from(json.at("block_hyperparameters"));
+  }
   return bias;
+}
+
+/// Of one observation of a bias with blocks: all but its joints, and only what was recorded.
+Json to_json(const PoseContext& context) {
+  Json json = {{"tool", context.tool}, {"payload", context.payload}, {"index", context.index}};
+  if (context.time) json["time_s"] = *context.time;
+  if (context.temperature) json["temperature_c"] = *context.temperature;
+  if (context.velocity) json["velocity"] = to_json(Eigen::MatrixXd(*context.velocity));
+  if (!context.direction.empty()) json["direction"] = context.direction;
+  return json;
+}
+
+PoseContext context_from(const Json& json) {
+  PoseContext context;
+  context.tool = json.at("tool");
+  context.payload = json.at("payload");
+  context.index = json.at("index");
+  if (json.contains("time_s")) context.time = json.at("time_s").get<double>();
+  if (json.contains("temperature_c")) context.temperature = json.at("temperature_c").get<double>();
+  if (json.contains("velocity")) context.velocity = matrix_from(json.at("velocity"));
+  if (json.contains("direction")) json.at("direction").get_to(context.direction);
+  return context;
 }
 
 /// All but the stamp.
@@ -160,7 +189,10 @@ Json content_of(const CompensatedModel::Parts& parts) {
   if (parts.temperature_mean) {
     content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
   }
-  if (parts.bias) content["bias"] = to_json(*parts.bias);
+  if (parts.bias) {
+    content["bias"] = to_json(*parts.bias);
+    for (const PoseContext& context : parts.bias_contexts) content["bias"]["poses"].push_back(to_json(context));
+  }
   if (parts.validation) content["validation"] = to_json(*parts.validation);
   return content;
 }
@@ -213,7 +245,13 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
     parts.temperature_mean = content.at("temperature_c").at("mean").get<double>();
     parts.temperature_stddev = content.at("temperature_c").at("stddev");
   }
-  if (content.contains("bias")) parts.bias = bias_from(content.at("bias"));
+  if (content.contains("bias")) {
+    const Json& bias = content.at("bias");
+    parts.bias = bias_from(bias);
+    if (bias.contains("poses")) {
+      for (const Json& context : bias.at("poses")) parts.bias_contexts.push_back(context_from(context));
+    }
+  }
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   const Json& provenance = content.at("provenance");
   parts.provenance.level = provenance.at("level");

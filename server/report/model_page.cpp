@@ -188,11 +188,10 @@ PoseErrors errors_of(const CompensatedModel& model, const MeasurementBatch& batc
 }
 
 /// What each training pose would show if it were new: the bias predicts it from all the others.
-PoseErrors errors_of_training(const BiasState& state) {
+PoseErrors errors_of_training(const BiasModel& bias) {
   PoseErrors errors{{}, {}, "Training poses by their error, each left out of the bias"};
-  const Result<BiasModel> bias = BiasModel::restore(state);
-  if (!bias) return errors;
-  const Eigen::MatrixXd left = state.residual_B - bias->leave_one_out_mean_B();
+  const BiasState& state = bias.state();
+  const Eigen::MatrixXd left = state.residual_B - bias.leave_one_out_mean_B();
   for (Eigen::Index i = 0; i < left.rows(); ++i) {
     errors.calibrated.push_back(to_mm(state.residual_B.row(i).norm()));
     errors.compensated.push_back(to_mm(left.row(i).norm()));
@@ -237,7 +236,7 @@ std::string chart_data(const CompensatedModel& model, const std::optional<Measur
   for (const auto& [level, figures] : levels_of(evaluation)) {
     data["levels"][level] = {to_mm(figures->rms), to_mm(figures->mean), to_mm(figures->p997), to_mm(figures->max)};
   }
-  const auto& bias = model.parts().bias;
+  const auto& bias = model.bias();
   if (batch) {
     data["histogram"] = histogram_json(errors_of(model, *batch));
   } else if (bias) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/bias/kernel_spelling.h"
 #include "server/calibrate/frames.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
@@ -70,6 +71,7 @@ double domain_limit(const BiasModel& bias) {
 Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, const std::string& kernel,
                 std::uint64_t seed, const std::function<bool(double)>& progress) {
   parts.bias.reset();
+  parts.bias_contexts.clear();
   parts.prior_share_limit = 0;
   if (kernel == "none") return {};
   // What does not fit the others is not learned: a smooth function would spread it over its neighbours.
@@ -87,9 +89,20 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   options.kernel = kernel;
   options.seed = seed;
   options.progress = progress;
-  const Result<BiasModel> bias = BiasModel::fit(leftover(parts.physics, batch), options);
+  BiasProblem problem = leftover(parts.physics, batch);
+  const Result<SpelledBias> spelled = spelled_bias(kernel);
+  if (!spelled) return tl::make_unexpected(spelled.error());
+  if (!spelled->blocks.empty()) {
+    const BiasPhysics physics(parts.physics);
+    for (const Measurement& m : batch.measurements) {
+      problem.features.push_back(physics.at(m.context));
+      parts.bias_contexts.push_back(m.context);
+    }
+  }
+  const Result<BiasModel> bias = BiasModel::fit(problem, options);
   if (!bias) return tl::make_unexpected(bias.error());
   parts.bias = bias->state();
+  parts.bias->features.clear();
   parts.prior_share_limit = domain_limit(*bias);
   return {};
 }

@@ -12,7 +12,7 @@
 #include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
-#include "server/bias/kernel.h"
+#include "server/bias/kernel_spelling.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
@@ -331,8 +331,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
       if (auto source = make_error_source(spec, **cell_found); !source) return tl::make_unexpected(source.error());
     }
   }
-  if (!bias.empty() && bias != "none" && !make_kernel(bias)) {
-    return refused("bias {}: unknown; known are none {}", bias, kernel_names());
+  if (!bias.empty()) {
+    if (const Status spelled = check_bias_spelling(bias); !spelled) return tl::make_unexpected(spelled.error());
   }
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());

@@ -1,0 +1,58 @@
+#include "server/compensate/bias_physics.h"
+
+#include <algorithm>
+
+#include "server/base/check.h"
+#include "server/calibrate/frames.h"
+
+namespace trammel {
+
+namespace {
+
+/// `compliance` has three forms; any of them will do.
+bool has_source(const PhysicalModel& physics, const std::string& name) {
+  return std::any_of(physics.sources.begin(), physics.sources.end(), [&](const ErrorSourcePtr& source) {
+    return source->name() == name || source->name().starts_with(name + "_");
+  });
+}
+
+PhysicalModel with_standard_sources(PhysicalModel physics) {
+  for (const std::string& name : with_unknown_tool({"base", "geometry", "compliance"}, *physics.cell)) {
+    if (has_source(physics, name)) continue;
+    Result<ErrorSourcePtr> source = make_error_source(name, *physics.cell);
+    TRAMMEL_CHECK(source.has_value());
+    const auto count = static_cast<Eigen::Index>((*source)->parameters().size());
+    const Eigen::Index first = add_source(physics, *std::move(source));
+    physics.values.segment(first, count).setZero();  // not at their priors: the residual was measured without them
+  }
+  return physics;
+}
+
+}  // namespace
+
+BiasPhysics::BiasPhysics(const PhysicalModel& physics) : whole_(with_standard_sources(physics)) {
+  const std::vector<Parameter> parameters = whole_.parameters();
+  prior_stddev_.resize(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    prior_stddev_(static_cast<Eigen::Index>(k)) = parameters[k].prior_scale;
+}
+
+BiasFeatures BiasPhysics::at(const PoseContext& context) const {
+  Eigen::MatrixXd J_W;
+  whole_.pose_W(context, whole_.values, &J_W);
+  const Eigen::MatrixXd by_deflection_W = ArmKinematics(whole_.state(context)).deflection_jacobian();
+  const Matrix3 R_BW = whole_.X_WB.linear().transpose();
+  const auto in_B = [&](const Eigen::MatrixXd& of_W) {
+    Eigen::MatrixXd of_B(6, of_W.cols());
+    of_B.topRows<3>() = R_BW * of_W.topRows<3>();
+    of_B.bottomRows<3>() = R_BW * of_W.bottomRows<3>();
+    return of_B;
+  };
+  BiasFeatures features{in_B(by_deflection_W), in_B(J_W * prior_stddev_.asDiagonal())};
+  for (int j = 0; j < whole_.cell->robot.size(); ++j) {
+    if (whole_.cell->robot.joint(j).type != JointType::kRevolute) features.by_joint.col(j).setZero();
+  }
+  return features;
+}
+
+}  // namespace trammel
