@@ -102,6 +102,9 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     return refused("model: {} parameters and {} joint ranges do not fit a robot of {} joints with {} parameters",
                    parts.physics.values.size(), parts.q_min.size(), n, P);
   }
+  if (parts.extrapolation_slope.size() != 0 && parts.extrapolation_slope.size() != n) {
+    return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(), n);
+  }
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
     return refused("model: a parameter is not finite");
   }

@@ -112,6 +112,7 @@ class CompensatedModel {
     std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
     double temperature_stddev = 0;           ///< K
     JointVector q_min, q_max;                ///< range of the training poses, rad
+    JointVector extrapolation_slope;         ///< see Domain::growth(); empty in models of before it was learned
     double prior_share_limit = 0;            ///< in domain: prior share not above this
     std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
     ModelProvenance provenance;                                  ///< id and hash are filled in by make()

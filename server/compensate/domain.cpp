@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace trammel {
 
@@ -40,6 +41,20 @@ double Domain::bias_weight(const JointVector& q, double prior_share) const {
   const double limit = std::max(prior_share_limit, kLeastShare);
   const double unknown = std::max(kUnknownShare, kLeastFadeOfShare * limit);
   return weight * fading(std::log(std::max(prior_share, kLeastShare)), std::log(limit), std::log(unknown));
+}
+
+double Domain::growth(const JointVector& q, const JointVector& slope, const Chain& robot) const {
+  double variance = 0;
+  for (Eigen::Index j = 0; j < slope.size(); ++j) {
+    const double beyond = std::max(q_min(j) - q(j), q(j) - q_max(j));
+    if (beyond > 0) variance += std::pow(slope(j) * distance_beyond(robot.joint(static_cast<int>(j)), beyond), 2);
+  }
+  return variance;
+}
+
+double distance_beyond(const Joint& joint, double beyond) {
+  if (joint.type == JointType::kPrismatic) return beyond;
+  return 2 * std::sin(std::min(beyond, std::numbers::pi) / 2);
 }
 
 }  // namespace trammel

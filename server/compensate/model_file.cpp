@@ -186,6 +186,9 @@ Json content_of(const CompensatedModel::Parts& parts) {
                     {"batch_hash", parts.provenance.batch_hash},
                     {"training_poses", parts.provenance.training_poses},
                     {"seed", parts.provenance.seed}}}};
+  if (parts.extrapolation_slope.size() > 0) {
+    content["extrapolation_slope"] = to_json(Eigen::MatrixXd(parts.extrapolation_slope));
+  }
   if (parts.temperature_mean) {
     content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
   }
@@ -239,6 +242,9 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.q_min = matrix_from(content.at("q_min"));
   parts.q_max = matrix_from(content.at("q_max"));
   parts.prior_share_limit = content.at("prior_share_limit");
+  if (content.contains("extrapolation_slope")) {
+    parts.extrapolation_slope = matrix_from(content.at("extrapolation_slope"));
+  }
   content.at("trained_with").get_to(parts.trained_with);
   parts.training = evaluation_from(content.at("training"));
   if (content.contains("temperature_c")) {

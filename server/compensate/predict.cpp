@@ -90,7 +90,8 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const BiasPr
   const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
   prediction.in_domain = trained_with && domain.in_range(context.q);
   const double metrology = cell().tracker.sigma * cell().tracker.sigma;
-  const double unlearned = metrology + parts().discrepancy * parts().discrepancy;
+  const double unlearned = metrology + parts().discrepancy * parts().discrepancy +
+                           domain.growth(context.q, parts().extrapolation_slope, cell().robot);
   Matrix3 covariance = identified + unsaid;
   if (bias == nullptr) {
     covariance.diagonal().array() += unlearned;

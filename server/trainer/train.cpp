@@ -8,6 +8,7 @@
 #include "server/calibrate/frames.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
+#include "server/trainer/extrapolation.h"
 
 namespace trammel {
 
@@ -181,6 +182,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   Result<CalibrationResult> calibration = identify(cell, split.train, options);
   if (!calibration) return tl::make_unexpected(calibration.error());
   CompensatedModel::Parts parts;
+  parts.extrapolation_slope = extrapolation_slope(*calibration, split.train);
   parts.physics = std::move(calibration->model);
   parts.parameters = std::move(calibration->parameters);
   parts.unidentifiable = std::move(calibration->unidentifiable);
@@ -210,6 +212,11 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Me
   if (!checked) return tl::make_unexpected(checked.error());
   if (checked->measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
   CompensatedModel::Parts parts = calibrated.parts();
+  CalibrationResult as_it_is;
+  as_it_is.model = parts.physics;
+  as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());
+  as_it_is.suspects = parts.suspects;
+  parts.extrapolation_slope = extrapolation_slope(as_it_is, *checked);
   const Status learned =
       add_bias(parts, *checked, options.bias.value_or(cell.model.bias), options.seed,
                [&](double share) { return !options.progress || options.progress("learning the bias", share); });

@@ -1,0 +1,123 @@
+#include "server/trainer/extrapolation.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "server/compensate/domain.h"
+#include "tests/support/demand.h"
+#include "tests/support/outside.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+/// The 6 dim (s) range of Table 5.3.
+JointRanges small_box() {
+  JointRanges box;
+  for (const auto& [low, high] : {std::pair{-15, 15}, {-15, 15}, {-15, 30}, {-30, 30}, {-30, 30}, {-30, 30}}) {
+    box.emplace_back(from_deg(low), from_deg(high));
+  }
+  return box;
+}
+
+CalibrationResult identified(const std::shared_ptr<const Cell>& cell, const std::string& level,
+                             const MeasurementBatch& batch) {
+  return test::demand(calibrate(cell, test::demand(parse_level(level)), batch, {}));
+}
+
+/// Nothing is identified anew.
+CalibrationResult as_it_is(CalibrationResult found) {
+  found.covariance.setZero();
+  found.suspects.clear();
+  return found;
+}
+
+TEST(Extrapolation, FarFromItsPosesAModelClaimsNoMoreThanItKnows) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const test::OutsideFigures figures = test::asked_outside(robot, small_box(), "M2", "se", 300, 3);
+  for (const test::OutsideBand& band : figures.bands) {
+    ASSERT_GT(band.poses, 300) << band.from;
+    EXPECT_GT(band.coverage_95, band.to == 0 ? 0.93 : 0.90) << band.from << " to " << band.to;
+    EXPECT_LT(band.stddev, 3 * band.rms) << band.from << " to " << band.to;
+  }
+  EXPECT_LT(figures.bands.front().coverage_95, 0.97);
+  EXPECT_GT(to_mm(figures.bands.back().rms), 50 * to_mm(figures.bands.front().rms));
+  EXPECT_GT(figures.caught, 0.97 * figures.outsiders);
+  EXPECT_LT(figures.refused, 0.02 * figures.insiders);
+}
+
+TEST(Extrapolation, ACompletePhysicsIsTrustedFarOut) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const test::OutsideFigures figures = test::asked_outside(robot, small_box(), "M3", "se", 300, 2);
+  EXPECT_GT(figures.bands.back().coverage_95, 0.93);
+  EXPECT_LT(to_mm(figures.bands.back().stddev), 0.2);
+}
+
+TEST(Extrapolation, IsOfTheJointThatThePhysicsLacks) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 300, 7);
+  const CalibrationResult found = identified(cell, "M3", batch);
+  const JointVector complete = extrapolation_slope(found, batch);
+  // Something that grows with joint 4 across the arm: its slope from 20 to 30 deg is 1.7 mm/rad.
+  for (Measurement& m : batch.measurements) m.p_W.x() += 2e-3 * m.context.q(3) * std::abs(m.context.q(3));
+  const JointVector lacking = extrapolation_slope(as_it_is(found), batch);
+  for (int j = 0; j < 6; ++j) {
+    EXPECT_LT(complete(j), 0.15e-3) << j;
+    EXPECT_LE(lacking(j), j == 3 ? 3e-3 : 0.6 * lacking(3)) << j;  // what joint 4 did there
+  }
+  EXPECT_GT(lacking(3), 1e-3);
+}
+
+TEST(Extrapolation, ToFirstOrderIsWhatIdentifyingAnewFinds) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 200, 10);
+  const CalibrationResult found = identified(cell, "M2", batch);
+  MeasurementBatch rest = batch;
+  const auto upper = [](const Measurement& m) { return m.context.q(1) > from_deg(5); };
+  std::erase_if(rest.measurements, upper);
+  const CalibrationResult anew = identified(cell, "M2", rest);
+  double square = 0;
+  double distance = 0;
+  for (const Measurement& m : batch.measurements) {
+    if (!upper(m)) continue;
+    square += (m.p_W - anew.model.pose_W(m.context).translation()).squaredNorm() / 3;
+    distance += std::pow(m.context.q(1) - from_deg(5), 2);
+  }
+  EXPECT_NEAR(extrapolation_slope(found, batch)(1), std::sqrt(square / distance), 0.35 * std::sqrt(square / distance));
+}
+
+TEST(Extrapolation, ASuspectIsNotAsked) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 60, 8);
+  CalibrationResult found = as_it_is(identified(cell, "M3", batch));
+  const JointVector clean = extrapolation_slope(found, batch);
+  Measurement& bad = batch.measurements[5];
+  bad.p_W.x() += 0.05;
+  EXPECT_GT(extrapolation_slope(found, batch).maxCoeff(), 10 * clean.maxCoeff());
+  found.suspects = {{bad.pose_id, bad.row, 0.05, 1000}};
+  EXPECT_LT(extrapolation_slope(found, batch).maxCoeff(), 2 * clean.maxCoeff());
+}
+
+TEST(Extrapolation, AJointThatStoodStillIsTrustedNoMoreThanTheWorstOfTheOthers) {
+  const auto cell = test::cell_7();
+  JointRanges box = small_box();
+  box[5] = {0.3, 0.3};
+  const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), box, 100, 9);
+  const JointVector slope = extrapolation_slope(identified(cell, "M1", batch), batch);
+  EXPECT_GT(slope.maxCoeff(), 0.5e-3);
+  EXPECT_EQ(slope(5), slope.head(5).maxCoeff());
+  // A model without parameters has nothing to identify anew, but what it lacks grows all the same.
+  EXPECT_GT(extrapolation_slope(identified(cell, "M0", batch), batch).head(3).minCoeff(), 1e-3);
+}
+
+TEST(Extrapolation, GrowsWithTheChordAndStaysAtItsLargestBeyondHalfATurn) {
+  Joint joint;
+  EXPECT_NEAR(distance_beyond(joint, 0.01), 0.01, 1e-6);
+  EXPECT_NEAR(distance_beyond(joint, from_deg(180)), 2, 1e-12);
+  EXPECT_EQ(distance_beyond(joint, from_deg(300)), distance_beyond(joint, from_deg(180)));
+  joint.type = JointType::kPrismatic;
+  EXPECT_EQ(distance_beyond(joint, 7.5), 7.5);
+}
+
+}  // namespace
+}  // namespace trammel
