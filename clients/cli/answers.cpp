@@ -93,15 +93,30 @@ client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joi
           target.joint_target};
 }
 
+JointUncertainty joint_uncertainty(const ErrorPrediction& prediction) {
+  const Matrix3 covariance_mm2 = to_mm(1) * to_mm(1) * prediction.covariance_B;
+  const Vector3 stddev_mm = to_mm(1) * prediction.true_stddev_B;
+  return {covariance_mm2(0, 1), covariance_mm2(0, 2), covariance_mm2(1, 2),
+          stddev_mm.x(),        stddev_mm.y(),        stddev_mm.z()};
+}
+
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
-  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id\n", kPoseColumns);
+  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id", kPoseColumns);
+  if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2,slx_mm,sly_mm,slz_mm";
+  text += "\n";
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
     const client::PredictedError& item = predictions.items[i];
     for (const double value : {item.dx_mm, item.dy_mm, item.dz_mm, item.sx_mm, item.sy_mm, item.sz_mm}) {
       text += csv_number(value) + ",";
     }
-    text += fmt::format("{},{},{},{}\n", item.in_domain ? 1 : 0, pose_fields(item.predicted),
+    text += fmt::format("{},{},{},{}", item.in_domain ? 1 : 0, pose_fields(item.predicted),
                         csv_field(list.poses[i].pose_id), predictions.model_id);
+    if (!predictions.together.empty()) {
+      const JointUncertainty& u = predictions.together[i];
+      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2, u.slx_mm, u.sly_mm, u.slz_mm})
+        text += fmt::format(",{:.9g}", value);
+    }
+    text += "\n";
   }
   return text;
 }
@@ -120,6 +135,14 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
                      {"in_domain", item.in_domain},
                      {"nominal", pose_json(item.nominal)},
                      {"predicted", pose_json(item.predicted)}});
+    if (predictions.together.empty()) continue;
+    const JointUncertainty& u = predictions.together[i];
+    items.back().update({{"cxy_mm2", u.cxy_mm2},
+                         {"cxz_mm2", u.cxz_mm2},
+                         {"cyz_mm2", u.cyz_mm2},
+                         {"slx_mm", u.slx_mm},
+                         {"sly_mm", u.sly_mm},
+                         {"slz_mm", u.slz_mm}});
   }
   return {{"model", predictions.model_id}, {"predictions", items}};
 }

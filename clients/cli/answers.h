@@ -19,10 +19,18 @@ namespace trammel::cli {
 [[nodiscard]] std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types);
 [[nodiscard]] client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types);
 
+/// What the wire does not carry of a prediction's uncertainty.
+struct JointUncertainty {
+  double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
+  double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error: without the tracker's own sigma
+};
+[[nodiscard]] JointUncertainty joint_uncertainty(const ErrorPrediction& prediction);
+
 /// Answers with the id of the one model that gave them.
 struct Predictions {
   std::string model_id;
-  std::vector<client::PredictedError> items;  ///< one a pose of the list
+  std::vector<client::PredictedError> items;    ///< one a pose of the list
+  std::vector<JointUncertainty> together = {};  ///< likewise where it was asked for, else none
 };
 struct Corrections {
   std::string model_id;
@@ -30,7 +38,7 @@ struct Corrections {
   std::vector<client::CorrectedTarget> items;  ///< one a target
 };
 
-/// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`.
+/// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for, `cxy_mm2` ... `slz_mm`.
 [[nodiscard]] std::string predictions_csv(const JointList& list, const Predictions& predictions);
 [[nodiscard]] nlohmann::ordered_json predictions_json(const JointList& list, const Predictions& predictions);
 

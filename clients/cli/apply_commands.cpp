@@ -18,6 +18,7 @@ constexpr std::size_t kItemsOfOneCall = 1000;  // keeps answers of a service sma
 struct ApplyArguments {
   std::string model, input, tool, payload, output, json;
   ServiceOptions service;
+  bool covariance = false;
 };
 
 /// Tool and payload of each pose: the file's, else the command line's.
@@ -70,19 +71,35 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   Result<JointList> checked = check_against_cell(std::move(list), model->cell());
   if (!checked) return tl::make_unexpected(checked.error());
   list = std::move(*checked);
-  Predictions predictions{model->provenance().id, {}};
-  ProgressLine progress;
+  std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
     if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
       return refused("{} row {}: {}", list.where, pose.row, known.error().message);
     }
-    progress.show("predicting", static_cast<double>(predictions.items.size()) / static_cast<double>(list.poses.size()));
-    predictions.items.push_back(to_wire(model->predict(pose.context.q, pose.context.tool, pose.context.payload)));
+    PoseContext asked;
+    asked.q = pose.context.q;
+    asked.tool = pose.context.tool;
+    asked.payload = pose.context.payload;
+    asked.served = true;
+    poses.push_back(std::move(asked));
+  }
+  Predictions predictions{model->provenance().id, {}};
+  ProgressLine progress;
+  for (std::size_t from = 0; from < poses.size(); from += kItemsOfOneCall) {
+    progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
+    const std::size_t to = std::min(from + kItemsOfOneCall, poses.size());
+    const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
+    for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
+      predictions.items.push_back(to_wire(prediction));
+      if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
+    }
   }
   return predictions;
 }
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
+  if (arguments.covariance)
+    return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
@@ -190,6 +207,10 @@ void add_predict(CLI::App& app, Action& chosen) {
       ->add_option("-o,--output", arguments->output,
                    "Predicted errors, standard deviations and poses in the robot's base (CSV: mm)")
       ->required();
+  command->add_flag(
+      "--covariance", arguments->covariance,
+      "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
+      "of the true error, without the tracker's own (slx_mm ...)");
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
 }

@@ -73,6 +73,25 @@ TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["dx_mm"], .5);
 }
 
+TEST(Answers, CovariancesAndTheTrueErrorsStddevAreAppendedWhereAskedFor) {
+  ErrorPrediction prediction;
+  prediction.covariance_B << 4e-8, 1e-8, -2e-8, 1e-8, 9e-8, 3e-8, -2e-8, 3e-8, 16e-8;
+  prediction.true_stddev_B = Vector3(1e-4, 2e-4, 3e-4);
+  JointList list;
+  list.poses.push_back(CommandedPose{});
+  const Predictions with{"abc", {client::PredictedError{}}, {joint_uncertainty(prediction)}};
+  const CsvTable table = CsvTable::parse(predictions_csv(list, with), "p.csv").value();
+  const std::string without = predictions_csv(list, {"abc", {client::PredictedError{}}});
+  EXPECT_EQ(without.find("cxy_mm2"), std::string::npos) << "the pinned columns stand alone unless more is asked for";
+  const auto number = [&](const char* column) { return std::stod(table.field(0, table.require(column).value())); };
+  EXPECT_NEAR(number("cxy_mm2"), 0.01, 1e-12);
+  EXPECT_NEAR(number("cxz_mm2"), -0.02, 1e-12);
+  EXPECT_NEAR(number("cyz_mm2"), 0.03, 1e-12);
+  EXPECT_NEAR(number("slx_mm"), 0.1, 1e-12);
+  EXPECT_NEAR(number("slz_mm"), 0.3, 1e-12);
+  EXPECT_EQ(predictions_json(list, with)["predictions"][0]["sly_mm"], 0.2);
+}
+
 TEST(Answers, TheWireHasMillimetresAndRadians) {
   Pose X_BT = Pose::Identity();
   X_BT.translation() = Vector3(.001, -.002, 3);

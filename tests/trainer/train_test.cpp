@@ -158,6 +158,31 @@ TEST(Train, RefusesUnknownSourcesKernelsAndTooFewPoses) {
   EXPECT_FALSE(train(cell, test::measured(robot, 9, 45), quick("M1", "se")));
 }
 
+TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointMap) {
+  const auto cell = test::cell_7();
+  VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const char* spec : {"joint_map:1@9", "joint_map:2@7", "joint_map:3@8"}) {
+    const ErrorSourcePtr map = test::demand(make_error_source(spec, *cell));
+    const Eigen::Index first = add_source(robot.truth, map);
+    robot.truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size())).setConstant(4e-5);
+  }
+  const MeasurementBatch batch = test::measured(robot, 200, 61);
+  const MeasurementBatch fresh = test::measured(robot, 400, 62);
+  const Evaluation plain = test::demand(train(cell, batch, quick("M3", "se"))).evaluate(fresh);
+  const Evaluation mapped = test::demand(train(cell, batch, quick("M3", "se + joint_map"))).evaluate(fresh);
+  EXPECT_GT(to_mm(plain.compensated.rms), 0.15);
+  EXPECT_LT(mapped.compensated.rms, 0.5 * plain.compensated.rms);
+  EXPECT_GT(mapped.coverage_95, 0.91);
+  EXPECT_LT(mapped.coverage_95, 0.985);
+}
+
+TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 63);
+  EXPECT_EQ(train(cell, batch, quick("M1", "se * joint_map")).error().message,
+            "bias kernel `se * joint_map`: `joint_map` can only be added to a whole bias, as in `se + joint_map`");
+}
+
 /// A real robot with base and tool unknown: ../shared/data, where it is at hand.
 class RealRobot : public testing::Test {
  protected:
@@ -224,6 +249,16 @@ TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
 TEST_F(RealRobot, JointMapsLearnFromTwoHundredPoses) {
   const CompensatedModel c = test::demand(train(cell(), series("c", 200), quick(kJointMaps, "none")));
   EXPECT_LE(to_mm(c.parts().validation->calibrated.rms), 0.20);
+}
+
+TEST_F(RealRobot, ABiasWithJointMapsAndParametersTakesUr10ToATenthOfAMillimetre) {
+  for (const char* name : {"c", "d"}) {
+    const auto model = train(cell(), series(name), quick("M3", "matern52 + joint_map + parameters"));
+    const Evaluation evaluation = *test::demand(model).parts().validation;
+    RecordProperty(fmt::format("series_{}_mm", name), fmt::format("{:.4f}", to_mm(evaluation.compensated.rms)));
+    EXPECT_LE(to_mm(evaluation.compensated.rms), 0.105) << name;
+    EXPECT_GE(evaluation.coverage_95, 0.90) << name;
+  }
 }
 
 TEST_F(RealRobot, Ur10SeriesDIsExplainedAndCompensated) {

@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/base/hash.h"
+#include "server/base/units.h"
+#include "server/compensate/bias_physics.h"
+#include "server/compensate/compensated_model.h"
+#include "server/trainer/train.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+PoseContext posed(const JointVector& q) {
+  PoseContext context;
+  context.q = q;
+  context.tool = context.payload = "spindle";
+  context.served = true;
+  return context;
+}
+
+JointVector inside() {
+  JointVector q(6);
+  q << 0.1, -0.1, 0.2, 0.2, 0.8, -0.1;
+  return q;
+}
+
+/// M2 on a robot whose joints give way, with a bias that may learn the missing compliance in the shape of compliance.
+class CoupledBias : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    robot_ = new VirtualRobot(test::chapter_5_robot(test::cell_7()));
+    model_ = new CompensatedModel(trained("M2", "se + joint_map + parameters", 120));
+  }
+  static void TearDownTestSuite() {
+    delete robot_;
+    delete model_;
+  }
+  static CompensatedModel trained(const std::string& level, const std::string& bias, int poses) {
+    TrainOptions options;
+    options.level = level;
+    options.bias = bias;
+    return test::demand(train(robot_->truth.cell, test::measured(*robot_, poses, 31), options));
+  }
+
+  static VirtualRobot* robot_;
+  static CompensatedModel* model_;
+};
+
+VirtualRobot* CoupledBias::robot_ = nullptr;
+CompensatedModel* CoupledBias::model_ = nullptr;
+
+void expect_same(const ErrorPrediction& a, const ErrorPrediction& b) {
+  EXPECT_EQ(a.X_BT_predicted.matrix(), b.X_BT_predicted.matrix());
+  EXPECT_EQ(a.covariance_B, b.covariance_B);
+  EXPECT_EQ(a.true_stddev_B, b.true_stddev_B);
+  EXPECT_EQ(a.in_domain, b.in_domain);
+}
+
+TEST_F(CoupledBias, IsTheSameAfterItWasStoredBitForBit) {
+  const std::string text = serialize(*model_);
+  const Result<CompensatedModel> again = deserialize(text, "memory");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->provenance().hash, model_->provenance().hash);
+  EXPECT_EQ(serialize(*again), text);
+  const MeasurementBatch fresh = test::measured(*robot_, 20, 32);
+  for (const Measurement& m : fresh.measurements) {
+    expect_same(model_->predict(m.context.q, "spindle", "spindle"), again->predict(m.context.q, "spindle", "spindle"));
+  }
+}
+
+TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThem) {
+  const auto content_of = [](const CompensatedModel& model) {
+    return nlohmann::json::parse(serialize(model)).at("content").at("bias");
+  };
+  const nlohmann::json plain = content_of(trained("M2", "se", 60));
+  EXPECT_FALSE(plain.contains("poses"));
+  EXPECT_FALSE(plain.contains("block_hyperparameters"));
+  EXPECT_EQ(content_of(*model_).at("poses").size(), 120u);
+
+  nlohmann::json file = nlohmann::json::parse(serialize(*model_));
+  file["content"]["bias"]["poses"][3]["payload"] = "feather";
+  EXPECT_NE(deserialize(file.dump(), "cell.model").error().message.find("damaged"), std::string::npos);
+  // Even with a fitting hash a pose that the cell cannot have is refused, and so are too few of them.
+  file["hash"] = sha256_hex(file["content"].dump());
+  EXPECT_EQ(
+      deserialize(file.dump(), "cell.model").error().message,
+      "cell.model: model: the bias learned at tool 'spindle' and payload 'feather', which its cell does not have");
+  file["content"]["bias"].erase("poses");
+  file["hash"] = sha256_hex(file["content"].dump());
+  EXPECT_EQ(deserialize(file.dump(), "cell.model").error().message,
+            "cell.model: model: 0 poses are described for 120 observations of the bias");
+}
+
+TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {
+  const MeasurementBatch fresh = test::measured(*robot_, 300, 33);
+  const Evaluation evaluation = model_->evaluate(fresh);
+  EXPECT_GT(to_mm(evaluation.calibrated.rms), 1.0);
+  EXPECT_LT(to_mm(evaluation.compensated.rms), 0.028) << "the floor is 0.0225";
+  EXPECT_GT(evaluation.coverage_95, 0.92);
+  EXPECT_LT(evaluation.coverage_95, 0.98);
+}
+
+TEST_F(CoupledBias, ManyPosesSayWhatOneSays) {
+  std::vector<PoseContext> poses;
+  for (const Measurement& m : test::measured(*robot_, 30, 34).measurements) poses.push_back(posed(m.context.q));
+  const std::vector<ErrorPrediction> many = model_->predict_all(poses);
+  for (const std::size_t i : {0u, 17u, 29u}) {
+    const ErrorPrediction one = model_->predict(poses[i].q, "spindle", "spindle");
+    EXPECT_LT((one.error_B - many[i].error_B).norm(), 1e-13);
+    EXPECT_LT((one.covariance_B - many[i].covariance_B).norm(), 1e-9 * one.covariance_B.norm());
+  }
+}
+
+TEST_F(CoupledBias, TheCovarianceOfAPredictionIsTheBiasOwnAndTheNoise) {
+  const ErrorPrediction at = model_->predict(inside(), "spindle", "spindle");
+  ASSERT_TRUE(at.in_domain);
+  const BiasPrediction bias = model_->bias()->predict(inside(), model_->features(posed(inside())));
+  const double sigma = model_->cell().tracker.sigma;
+  Matrix3 expected = bias.covariance_B;
+  expected.diagonal() += (bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2()).cwiseMax(sigma * sigma);
+  // The identified parameters' covariance is part of the bias': not added a second time.
+  EXPECT_LT((at.covariance_B - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_GT(std::abs(at.covariance_B(0, 2)), 1e-4 * at.covariance_B.trace());
+  for (int d = 0; d < 3; ++d) {
+    EXPECT_NEAR(at.stddev_B[d], std::sqrt(at.covariance_B(d, d)), 1e-15);
+    EXPECT_NEAR(std::pow(at.stddev_B[d], 2) - std::pow(at.true_stddev_B[d], 2), sigma * sigma, 1e-15);
+  }
+}
+
+TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
+  const PhysicalModel& physics = model_->parts().physics;
+  const BiasFeatures features = model_->features(posed(inside()));
+  ASSERT_EQ(features.by_joint.cols(), 6);
+  ASSERT_EQ(features.by_parameter.cols(), 36) << "base, geometry, and compliance, which the model lacks";
+  const auto pose_B = [&](const JointVector& q) { return physics.X_WB.inverse() * physics.pose_W(posed(q)); };
+  const double h = 1e-5;
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    JointVector up = inside(), down = inside();
+    up(j) += h;
+    down(j) -= h;
+    const Vector6 moved = pose_difference(pose_B(up), pose_B(down)) / (2 * h);
+    EXPECT_LT((features.by_joint.col(j) - moved).norm(), 1e-6) << "joint " << j + 1;
+  }
+  // A first parameter of the base: x0, 2 mm of prior.
+  EXPECT_NEAR(features.by_parameter.col(0).head(3).norm(), 2e-3, 1e-12);
+  // What the compliance of joint 3 does, beside a model that has it.
+  const PhysicalModel with = test::demand(make_physical_model(robot_->truth.cell, {"base", "geometry", "compliance"}));
+  PhysicalModel soft = with;
+  soft.values.head(30) = physics.values;
+  soft.values.tail(6).setZero();
+  PhysicalModel softer = soft;
+  softer.values(32) = 1e-3 * with.parameters()[32].prior_scale;
+  const Vector6 moved = pose_difference(softer.pose_W(posed(inside())), soft.pose_W(posed(inside()))) / 1e-3;
+  EXPECT_GT(moved.head(3).norm(), 1e-4);
+  EXPECT_LT((features.by_parameter.col(32) - moved).norm(), 1e-3 * moved.norm());
+}
+
+TEST_F(CoupledBias, CorrectedTargetsLandWhereTheyWereWanted) {
+  for (const Measurement& m : test::measured(*robot_, 10, 35).measurements) {
+    Target target;
+    target.X_BT = robot_->truth.nominal_pose_W(posed(m.context.q));
+    target.seed = m.context.q;
+    const Correction correction = model_->correct(target, "spindle", "spindle");
+    if (correction.status != CorrectionStatus::kOk) continue;
+    const Vector3 reached = robot_->truth.pose_W(posed(correction.q)).translation();
+    EXPECT_LT(to_mm((reached - target.X_BT.translation()).norm()), 0.05);
+  }
+}
+
+}  // namespace
+}  // namespace trammel
