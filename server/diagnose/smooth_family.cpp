@@ -16,13 +16,10 @@ using Eigen::VectorXd;
 constexpr double kBox = 1.2;             // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr double kSmallestSpan = 0.035;  // rad
 constexpr Index kFunctionsOfOne = 16;
-constexpr Index kFunctionsOfEach = 7;                          // of two
-constexpr double kMapLengthScales[] = {0.04, 0.1, 0.25, 0.5};  // half ranges
-constexpr double kNegligible = 3.7;  // length scales a radian, where the spectrum has fallen to a thousandth
-constexpr int kFewestHarmonics = 4;
-constexpr int kMostHarmonics = 48;
-constexpr int kSizes = 17;                         // a quarter of a decade apart
-constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
+constexpr Index kFunctionsOfEach = 7;                      // of two
+constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
+constexpr int kSizes = 17;                                 // a quarter of a decade apart
+constexpr double kSizeRatio = 1.7782794100389228;          // 10^(1/4)
 
 /// Angular frequency of a sine of the box.
 double frequency(Index k) { return kPi * static_cast<double>(k + 1) / (2 * kBox); }
@@ -64,36 +61,38 @@ class SmoothFamily : public Family {
   explicit SmoothFamily(const LinearProblem& problem) : problem_(problem) {}
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const final {
-    const auto count = static_cast<Index>(g_.size()) * functions_.cols();
-    const Index each = functions_.cols();
+    const std::size_t scales = looked_for_ > 0 ? looked_for_ : deviations_.size();
+    const Index each = deviations_[scales - 1].size();
+    const Index count = static_cast<Index>(g_.size()) * each;
+    const MatrixXd functions = functions_.leftCols(each);
     MatrixXd information = MatrixXd::Zero(count, count);
     MatrixXd along(count, projected.cols());
     MatrixXd root(count, view.background.root().cols());
     for (std::size_t s = 0; s < g_.size(); ++s) {
       const Index first = static_cast<Index>(s) * each;
       const Shares shares = shares_of(problem_, view, g_[s], projected);
-      along.middleRows(first, each) = transposed_product(functions_, shares.along);
-      root.middleRows(first, each) = transposed_product(functions_, shares.root);
+      along.middleRows(first, each) = transposed_product(functions, shares.along);
+      root.middleRows(first, each) = transposed_product(functions, shares.root);
       information.block(first, first, each, each).noalias() =
-          functions_.transpose() * shares.square.asDiagonal() * functions_;
+          functions.transpose() * shares.square.asDiagonal() * functions;
     }
     const MatrixXd across = root.transpose();
     information -= transposed_product(across, across);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
-    for (std::size_t scale = 0; scale < deviations_.size(); ++scale) choose(information, along, scale, best);
+    for (std::size_t scale = 0; scale < scales; ++scale) choose(information, along, scale, best);
     return best;
   }
 
   MatrixXd columns(const Best& best) const final {
     const VectorXd& deviation = deviations_[static_cast<std::size_t>(best.at)];
-    const Index each = functions_.cols();
+    const Index each = deviation.size();
     MatrixXd all(problem_.rows(), static_cast<Index>(g_.size()) * each);
     for (Index i = 0; i < problem_.poses(); ++i) {
       const Index row = problem_.first_row(i);
       for (std::size_t s = 0; s < g_.size(); ++s) {
         all.block(row, static_cast<Index>(s) * each, problem_.row_count(i), each) =
             best.size * g_[s].segment(row, problem_.row_count(i)) *
-            functions_.row(i).cwiseProduct(deviation.transpose());
+            functions_.row(i).head(each).cwiseProduct(deviation.transpose());
       }
     }
     return all;
@@ -104,17 +103,27 @@ class SmoothFamily : public Family {
   const LinearProblem& problem_;
   std::vector<VectorXd> g_;           // R each
   MatrixXd functions_;                // N x k
-  std::vector<VectorXd> deviations_;  // k each, one for every length scale
+  std::size_t looked_for_ = 0;        // how many of the length scales; 0: all
+  std::vector<VectorXd> deviations_;  // one for every length scale, of the functions that it takes: the first ones
   double smallest_ = 1e-6;
   double typical_ = 1e-4;
 
  private:
   void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
+    const Index each = deviations_[scale].size();
+    std::vector<Index> taken;
+    const Index apart = information.cols() / static_cast<Index>(g_.size());
+    for (Index first = 0; first < information.cols(); first += apart) {
+      for (Index k = first; k < first + each; ++k) taken.push_back(k);
+    }
     const VectorXd deviation = deviations_[scale].replicate(static_cast<Index>(g_.size()), 1);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information * deviation.asDiagonal());
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information(taken, taken) *
+                                                        deviation.asDiagonal());
     const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
-    const MatrixXd square =
-        transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along).array().square().matrix();
+    const MatrixXd square = transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along(taken, Eigen::all))
+                                .array()
+                                .square()
+                                .matrix();
     double size = smallest_;
     for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
       const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
@@ -133,30 +142,28 @@ class SmoothFamily : public Family {
 
 class JointMapFamily final : public SmoothFamily {
  public:
-  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& x, double span)
-      : SmoothFamily(problem), joint_(joint) {
-    const Index most = std::clamp<Index>(problem.poses() / 5, 6, 96);
-    span_ = span;
+  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& q) : SmoothFamily(problem), joint_(joint) {
+    const Index most = std::end(kHarmonics)[-1];
     g_.emplace_back(problem.by_joint().col(joint));
-    functions_ = sines(x, most);
-    for (const double length_scale : kMapLengthScales) deviations_.push_back(deviations(most, length_scale));
+    functions_ = MatrixXd(q.size(), 2 * most);
+    for (Index h = 1; h <= most; ++h) {
+      functions_.col(2 * h - 2) = (static_cast<double>(h) * q.array()).sin();
+      functions_.col(2 * h - 1) = (static_cast<double>(h) * q.array()).cos();
+    }
+    for (const Index harmonics : kHarmonics) {
+      deviations_.emplace_back(VectorXd::Constant(2 * harmonics, 1 / std::sqrt(static_cast<double>(harmonics))));
+      if (deviations_.size() == 1 || harmonics <= problem.poses() / 10) looked_for_ = deviations_.size();
+    }
     smallest_ = 1e-7;
     typical_ = 5e-5;
   }
   Cause cause(const Best&) const override { return {"joint_map", joint_, "", "", {}}; }
   std::string source(const Best& best) const override {
-    return fmt::format("joint_map:{}@{}", joint_ + 1, harmonics(kMapLengthScales[static_cast<std::size_t>(best.at)]));
+    return fmt::format("joint_map:{}@{}", joint_ + 1, kHarmonics[static_cast<std::size_t>(best.at)]);
   }
 
  private:
-  /// As many as a function of that length scale (in half ranges) is made of.
-  int harmonics(double length_scale) const {
-    return std::clamp(static_cast<int>(std::ceil(kNegligible / length_scale / (span_ / 2))), kFewestHarmonics,
-                      kMostHarmonics);
-  }
-
   int joint_;
-  double span_ = 0;  // rad
 };
 
 class AnonymousFamily final : public SmoothFamily {
@@ -199,9 +206,8 @@ class AnonymousFamily final : public SmoothFamily {
 
 FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint) {
   const VectorXd q = angles(problem, joint);
-  const VectorXd x = spread(q, kSmallestSpan);
-  if (x.size() == 0) return nullptr;
-  return std::make_unique<JointMapFamily>(problem, joint, x, q.maxCoeff() - q.minCoeff());
+  if (q.maxCoeff() - q.minCoeff() < kSmallestSpan) return nullptr;
+  return std::make_unique<JointMapFamily>(problem, joint, q);
 }
 
 FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints) {

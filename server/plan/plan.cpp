@@ -273,6 +273,25 @@ Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options)
   return q;
 }
 
+Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) {
+  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {});
+  if (!filter) return tl::make_unexpected(filter.error());
+  const Result<JointRanges> ranges = planning_ranges(cell);
+  if (!ranges) return tl::make_unexpected(ranges.error());
+  DrawCount count;
+  std::vector<bool> may(static_cast<std::size_t>(q.rows()), true);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const JointVector one = q.row(i).transpose();
+    bool inside = !cell.robot.joint_outside_limits(one);
+    for (std::size_t j = 0; j < ranges->size(); ++j) {
+      const double at = one(static_cast<Eigen::Index>(j));
+      inside = inside && at >= (*ranges)[j].first && at <= (*ranges)[j].second;
+    }
+    may[static_cast<std::size_t>(i)] = inside && filter->keeps(one, count);
+  }
+  return may;
+}
+
 Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
   if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
   const auto tools = resolved(*cell, options.tools, resolve_tool);

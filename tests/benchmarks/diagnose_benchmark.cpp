@@ -110,7 +110,8 @@ class Plan {
     for (const char* kind : {"encoder_eccentricity", "geometry", "compliance", "payload_changed", "joint_slip"}) {
       for (int seed = 1; seed <= std::max(2, settings_.trials / 4); ++seed) {
         Trial trial{"next", spec_of(kind, 700 + seed, 60, settings_)};
-        trial.spec.ranges = seed % 2 == 0 ? "6dim-s" : "6dim-l";
+        trial.spec.ranges = seed % 2 == 0 ? "6dim-m" : "6dim-l";
+        trial.spec.cell_ranges = "calibration";
         trial.compare_next_poses = true;
         add(trial);
       }
@@ -335,19 +336,25 @@ void print_held_out(const Results& results) {
 }
 
 void print_next_poses(const Results& results) {
-  std::vector<double> claimed, measured;
-  for (const TrialResult& r : of_rows(results, {"next", "undecidable", "named60"})) {
-    if (r.next_poses_claimed) claimed.push_back(*r.next_poses_claimed);
-    if (r.next_poses_ratio) measured.push_back(*r.next_poses_ratio);
-  }
-  const auto line = [](const char* what, std::vector<double> values) {
+  using Worth = test::NextPosesWorth;
+  const auto line = [](const std::string& what, std::vector<double> values) {
     if (values.empty()) return;
     std::sort(values.begin(), values.end());
-    std::printf("%-72s median %.2f, least %.2f, of %zu  aim >= 1.3\n", what, values[values.size() / 2], values.front(),
-                values.size());
+    std::printf("%-72s median %.2f, least %.2f, of %zu  aim >= 1.3\n", what.c_str(), values[values.size() / 2],
+                values.front(), values.size());
   };
-  line("ten random poses' stddev over ten suggested ones', as claimed", claimed);
-  line("ten random poses' stddev over ten suggested ones', by the second simulation", measured);
+  for (const auto& [by, which] : {std::pair{"as claimed", &TrialResult::next_poses_claimed},
+                                  {"by the second simulation", &TrialResult::next_poses_measured}}) {
+    std::vector<double> ratio, reduction;
+    for (const TrialResult& r : of_rows(results, {"next"})) {
+      const std::optional<Worth>& worth = r.*which;
+      if (!worth) continue;
+      ratio.push_back(worth->random_over_suggested());
+      reduction.push_back(worth->reduction());
+    }
+    line(fmt::format("ten random poses' stddev over ten suggested ones', {}", by), ratio);
+    line(fmt::format("stddev taken off by ten suggested poses over ten random ones, {}", by), reduction);
+  }
 }
 
 void print_replicas(const Results& results) {

@@ -197,5 +197,24 @@ TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnoth
   EXPECT_EQ(moved.sources_after, moved.sources_before);
 }
 
+TEST(NextPoses, TellApartWhatTheBatchConfoundsMoreThanRandomOnesWould) {
+  test::Trial trial{.row = "next",
+                    .spec = {.kind = "encoder_eccentricity",
+                             .seed = 703,
+                             .lambda = 60,
+                             .poses = 300,
+                             .ranges = "6dim-l",
+                             .cell_ranges = "calibration"},
+                    .compare_with_oracle = false,
+                    .compare_next_poses = true};
+  DiagnoseOptions options = quick();
+  options.next_poses = 10;
+  const test::TrialResult result = run_trial(trial, options);
+  ASSERT_TRUE(result.next_poses_measured) << result.judgement.said;
+  EXPECT_GT(result.next_poses_measured->random_over_suggested(), 2);
+  EXPECT_GT(result.next_poses_measured->reduction(), 1.0);
+  EXPECT_GT(result.next_poses_claimed->random_over_suggested(), 1.3);
+}
+
 }  // namespace
 }  // namespace trammel

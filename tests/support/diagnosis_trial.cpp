@@ -24,7 +24,7 @@ std::string text_of(const hidden::HiddenTruth& truth) {
 
 /// The hidden simulation's word for what a diagnosis names.
 HiddenCause as_hidden(const Cause& cause, int poses) {
-  HiddenCause hidden{cause.cause, cause.joint + 1, cause.parameter, -1, {}};
+  HiddenCause hidden{cause.cause, cause.joint + 1, cause.parameter, -1, {}, cause.order.value_or(0)};
   if (!cause.pose_id.empty()) hidden.first = std::clamp(std::stoi(cause.pose_id.substr(1)) - 1, 0, poses - 1);
   if (hidden.cause == "compliance" && hidden.parameter.empty()) hidden.parameter = "C" + std::to_string(hidden.joint);
   return hidden;
@@ -47,40 +47,39 @@ bool can_be_made(const HiddenCause& cause) {
     const auto& all = hidden::arm_parameters();
     return std::any_of(all.begin(), all.end(), [&](const auto& known) { return known.name == cause.parameter; });
   }
-  return cause.cause != "gear_transmission" && cause.cause != "joint_map" && cause.cause != "outlier";
+  if (cause.cause == "gear_transmission") return cause.order > 0;
+  return cause.cause != "joint_map" && cause.cause != "outlier";
 }
 
-/// What is named besides the truth, the first of it.
-std::optional<HiddenCause> confounded_with(const Diagnosis& diagnosis, const HiddenCause& truth, int poses) {
-  for (const Finding& finding : diagnosis.findings) {
-    std::vector<Cause> all = finding.could_also_be;
-    all.push_back(finding.cause);
-    for (const Cause& cause : all) {
-      const HiddenCause other = as_hidden(cause, poses);
-      const bool is_truth = other.cause == truth.cause && (truth.joint == 0 || other.joint == truth.joint);
-      if (!is_truth && can_be_made(other)) return other;
-    }
+/// What is named besides the truth.
+std::vector<HiddenCause> confounded_with(const Diagnosis& diagnosis, const HiddenCause& truth, int poses) {
+  std::vector<HiddenCause> others;
+  for (const Cause& cause : diagnosis.next_poses.separates) {
+    const HiddenCause other = as_hidden(cause, poses);
+    const bool is_truth = other.cause == truth.cause && (truth.joint == 0 || other.joint == truth.joint) &&
+                          (truth.parameter.empty() || other.parameter == truth.parameter);
+    if (!is_truth && can_be_made(other)) others.push_back(other);
   }
-  return std::nullopt;
+  return others;
 }
 
 void compare_next_poses(const Diagnosis& diagnosis, const HiddenCase& hidden, TrialResult& result) {
   const NextPoses& next = diagnosis.next_poses;
   if (next.q.empty() || hidden.truth.causes.size() != 1) return;
-  if (next.stddev_expected > 0) result.next_poses_claimed = next.stddev_random / next.stddev_expected;
+  result.next_poses_claimed = {next.stddev_now, next.stddev_expected, next.stddev_random};
   const auto count = static_cast<int>(hidden.world.poses.size());
-  const auto rival = confounded_with(diagnosis, hidden.truth.causes.front(), count);
-  if (!rival) return;
-  const double suggested = relative_stddev(hidden, *rival, as_poses(next.q, count));
+  const std::vector<HiddenCause> rivals = confounded_with(diagnosis, hidden.truth.causes.front(), count);
+  if (rivals.empty()) return;
+  NextPosesWorth worth{relative_stddev(hidden, rivals, {}), relative_stddev(hidden, rivals, as_poses(next.q, count)),
+                       0};
   hidden::Random random(hidden.world.poses.size() + 17);
-  double sum = 0;
   for (int draw = 0; draw < kRandomDraws; ++draw) {
     std::vector<hidden::MeasuringPose> poses =
-        hidden::draw_poses({.count = static_cast<int>(next.q.size()), .ranges = hidden.ranges}, random);
+        hidden::draw_poses({.count = static_cast<int>(next.q.size()), .ranges = hidden.cell_ranges}, random);
     for (hidden::MeasuringPose& pose : poses) pose.index += count;
-    sum += relative_stddev(hidden, *rival, poses) / kRandomDraws;
+    worth.random += relative_stddev(hidden, rivals, poses) / kRandomDraws;
   }
-  result.next_poses_ratio = sum / suggested;
+  result.next_poses_measured = worth;
 }
 
 /// The closest imitator that is no richer than the truth: a richer one must be told from it by its riches.

@@ -17,6 +17,15 @@ struct Trial {
   bool compare_next_poses = false;   ///< with random ones
 };
 
+/// Standard deviation of what is confounded: as it is, with ten suggested poses more, with ten random ones.
+struct NextPosesWorth {
+  double now = 0, suggested = 0, random = 0;
+
+  [[nodiscard]] double random_over_suggested() const { return random / suggested; }
+  /// How many times the reduction by random ones.
+  [[nodiscard]] double reduction() const { return (now - suggested) / (now - random); }
+};
+
 struct TrialResult {
   Trial trial;
   std::string truth;  ///< `backlash:2`
@@ -28,8 +37,7 @@ struct TrialResult {
   std::string rival;
   double held_out_before_mm = 0, held_out_after_mm = 0;
   std::optional<double> oracle_mm;
-  /// Standard deviation of what is confounded with ten random poses over that with the ten suggested.
-  std::optional<double> next_poses_claimed, next_poses_ratio;
+  std::optional<NextPosesWorth> next_poses_claimed, next_poses_measured;
 };
 
 [[nodiscard]] Result<Diagnosis> diagnose_files(const hidden::HiddenCase& hidden, const DiagnoseOptions& options);

@@ -386,12 +386,13 @@ HiddenCase hide(const HiddenSpec& spec) {
   if (draft.permuted) permute(still, frames, draft.random);
   add_noise(draft.world, frames, draft.random);
   if (draft.truth.question == Question::kNothing) draft.truth.causes.clear();
+  const std::string& cell_ranges = spec.cell_ranges.empty() ? draft.plan.ranges : spec.cell_ranges;
   return {batch_text(draft.world, frames),
-          cell_text(draft.world, draft.belief, draft.plan.ranges),
+          cell_text(draft.world, draft.belief, cell_ranges),
           robot_text(),
           draft.truth,
           draft.world,
-          draft.plan.ranges,
+          cell_ranges,
           frames};
 }
 

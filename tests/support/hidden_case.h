@@ -32,6 +32,7 @@ struct HiddenSpec {
   int poses = 300;
   bool orientation = true;
   std::string ranges = "calibration";
+  std::string cell_ranges = {};  ///< that the cell allows; empty: `ranges`
   double validation_share = 0;
 };
 
@@ -49,9 +50,9 @@ struct HiddenTruth {
 struct HiddenCase {
   std::string batch_csv, cell_yaml, robot_yaml;
   HiddenTruth truth;
-  World world;         ///< for oracles
-  std::string ranges;  ///< of its joints
-  Frames measured;     ///< with noise
+  World world;              ///< for oracles
+  std::string cell_ranges;  ///< that the cell allows its joints
+  Frames measured;          ///< with noise
 };
 
 [[nodiscard]] HiddenCase hide(const HiddenSpec& spec);

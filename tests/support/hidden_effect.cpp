@@ -101,7 +101,8 @@ Effect tool_changed(const HiddenCause& cause, const Scene&, Random& random) {
 Effect gear_transmission(const HiddenCause& cause, const Scene&, Random& random) {
   const double phase = uniform(random, 0, kTurn);
   VectorXd values(3);
-  values << 5e-5 * std::cos(phase), 5e-5 * std::sin(phase), uniform(random, 8, cause.joint <= 3 ? 120 : 70);
+  const double drawn = uniform(random, 8, cause.joint <= 3 ? 120 : 70);
+  values << 5e-5 * std::cos(phase), 5e-5 * std::sin(phase), cause.order > 0 ? cause.order : drawn;
   Effect made = effect(cause, {"sine", "cosine", "order"}, values,
                        [j = joint_of(cause)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
                          const double at = v(2) * p.q(j);

@@ -15,6 +15,7 @@ struct HiddenCause {
   std::string parameter;                ///< `C3`, `a2`
   int first = -1;                       ///< row from which it acts, or that is out; -1 elsewhere
   std::vector<std::string> depends_on;  ///< of `unknown`: `q4`
+  double order = 0;                     ///< of a gear, cycles a turn; 0: drawn
 };
 [[nodiscard]] std::string to_string(const HiddenCause& cause);
 

@@ -149,12 +149,14 @@ std::vector<Rival> closest_rivals(const HiddenCase& hidden) {
   return rivals;
 }
 
-double relative_stddev(const HiddenCase& hidden, const HiddenCause& rival, const std::vector<MeasuringPose>& more) {
+double relative_stddev(const HiddenCase& hidden, const std::vector<HiddenCause>& rivals,
+                       const std::vector<MeasuringPose>& more) {
   const World& world = hidden.world;
   std::vector<MeasuringPose> poses = world.poses;
   poses.insert(poses.end(), more.begin(), more.end());
-  const MatrixXd beside =
-      side_by_side(directions_of(arm_columns(world, poses)) * 1e4, of_length(rival_columns(world, rival, poses), 1e4));
+  MatrixXd beside = directions_of(arm_columns(world, poses)) * 1e4;
+  for (const HiddenCause& rival : rivals)
+    beside = side_by_side(beside, of_length(rival_columns(world, rival, poses), 1e4));
   return 1 / outside(directions_of(beside), rows_of(world, poses)).norm();
 }
 

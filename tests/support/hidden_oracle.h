@@ -22,8 +22,8 @@ struct Rival {
 [[nodiscard]] std::vector<Rival> closest_rivals(const HiddenCase& hidden);
 
 /// How uncertain the size of a case's only effect is, in shares of that size, beside the cell's own sources and
-/// `rival`, when `more` poses are measured as well.
-[[nodiscard]] double relative_stddev(const HiddenCase& hidden, const HiddenCause& rival,
+/// `rivals`, when `more` poses are measured as well.
+[[nodiscard]] double relative_stddev(const HiddenCase& hidden, const std::vector<HiddenCause>& rivals,
                                      const std::vector<MeasuringPose>& more);
 
 }  // namespace trammel::hidden
