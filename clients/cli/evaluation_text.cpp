@@ -43,6 +43,36 @@ ordered_json evaluation_json(const Evaluation& evaluation) {
   return json;
 }
 
+namespace {
+
+std::string choice_text(const BiasChoice& choice) {
+  std::string text = choice.sentence + "\n";
+  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "left out", "in time", "in space",
+                      "nlpd (mm)");
+  for (const BiasCandidate& c : choice.candidates) {
+    text += fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
+                        to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
+  }
+  return text;
+}
+
+ordered_json choice_json(const BiasChoice& choice) {
+  ordered_json candidates = ordered_json::array();
+  for (const BiasCandidate& c : choice.candidates) {
+    candidates.push_back({{"kernel", c.kernel},
+                          {"leave_one_out_rms_mm", to_mm(c.leave_one_out_rms)},
+                          {"leave_one_out_nlpd", nlpd_in_mm(c.leave_one_out_nlpd)},
+                          {"time_block_rms_mm", to_mm(c.time_block_rms)},
+                          {"joint_block_rms_mm", to_mm(c.joint_block_rms)},
+                          {"gain_mm2", to_mm(to_mm(c.gain))},
+                          {"gain_stddev_mm2", to_mm(to_mm(c.gain_stddev))},
+                          {"verdict", c.verdict}});
+  }
+  return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", candidates}};
+}
+
+}  // namespace
+
 std::string model_text(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   const ModelProvenance& provenance = parts.provenance;
@@ -54,6 +84,7 @@ std::string model_text(const CompensatedModel& model) {
                       std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                     [](const IdentifiedParameter& p) { return p.identified; }),
                       parts.parameters.size(), parts.rank);
+  if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
   for (const UnidentifiableCombination& combination : parts.unidentifiable) {
     text += fmt::format("  {}\n", combination.sentence);
@@ -130,6 +161,7 @@ ordered_json model_json(const CompensatedModel& model) {
                        {"parameters", parameters},
                        {"not_identifiable", combinations},
                        {"training", evaluation_json(parts.training)}};
+  if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);
   if (parts.validation) json["validation"] = evaluation_json(*parts.validation);
   return json;
 }

@@ -4,7 +4,6 @@
 #include <set>
 #include <tuple>
 
-#include "server/base/check.h"
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
@@ -95,9 +94,9 @@ void add_calibrated(const std::string& level, const CompensatedModel& model, con
 
 /// What is left where the bias is applied at every pose, in domain or not. 3 x N, m.
 Eigen::Matrix3Xd left_by_bias(const CompensatedModel& model, const MeasurementBatch& batch) {
-  TRAMMEL_CHECK(model.bias().has_value());
-  const BiasModel& bias = *model.bias();
   const BiasProblem error = leftover(model.parts().physics, batch);
+  if (!model.bias()) return error.residual_B.transpose();  // none helped
+  const BiasModel& bias = *model.bias();
   std::vector<BiasFeatures> features;
   for (const Measurement& m : batch.measurements) {
     if (bias.needs_features()) features.push_back(model.features(m.context));

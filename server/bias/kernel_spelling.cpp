@@ -149,7 +149,7 @@ bool SpelledBias::has(std::string_view block) const {
 Result<SpelledBias> spelled_bias(std::string_view spelling) { return Reader(spelling).bias(); }
 
 Status check_bias_spelling(std::string_view spelling) {
-  if (spelling == "none") return {};
+  if (spelling == "none" || spelling == "auto") return {};
   return spelled_bias(spelling).map([](const SpelledBias&) {});
 }
 

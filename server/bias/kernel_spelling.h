@@ -25,7 +25,7 @@ struct SpelledBias {
 /// what spelled_kernel() refuses, a block in a product or in parentheses, twice, or without a kernel beside it.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
 
-/// Whether a bias can be spelled so; `none` can.
+/// Whether a bias can be spelled so; `none` can, and `auto`: the one that choose_bias() takes.
 [[nodiscard]] Status check_bias_spelling(std::string_view spelling);
 
 }  // namespace trammel

@@ -10,6 +10,7 @@
 
 #include "server/base/result.h"
 #include "server/bias/bias_model.h"
+#include "server/bias/choose_bias.h"
 #include "server/calibrate/calibrate.h"
 #include "server/compensate/bias_physics.h"
 
@@ -107,6 +108,7 @@ class CompensatedModel {
     std::vector<SuspectPose> suspects;
     std::vector<double> cost_record;
     double discrepancy = 0;                  ///< m per axis, see CalibrationResult
+    std::optional<BiasChoice> bias_choice;   ///< of `auto`: what was asked and what it is worth
     std::optional<BiasState> bias;           ///< without features: they follow from the physics and bias_contexts
     std::vector<PoseContext> bias_contexts;  ///< of the bias' observations, in their order; empty without blocks
     std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded

@@ -138,6 +138,31 @@ PoseContext context_from(const Json& json) {
   return context;
 }
 
+Json to_json(const BiasChoice& choice) {
+  Json candidates = Json::array();
+  for (const BiasCandidate& c : choice.candidates) {
+    candidates.push_back({{"kernel", c.kernel},
+                          {"leave_one_out_rms_m", c.leave_one_out_rms},
+                          {"leave_one_out_nlpd_of_m", c.leave_one_out_nlpd},
+                          {"time_block_rms_m", c.time_block_rms},
+                          {"joint_block_rms_m", c.joint_block_rms},
+                          {"gain_m2", c.gain},
+                          {"gain_stddev_m2", c.gain_stddev},
+                          {"verdict", c.verdict}});
+  }
+  return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", std::move(candidates)}};
+}
+
+BiasChoice choice_from(const Json& json) {
+  BiasChoice choice{json.at("kernel"), {}, json.at("sentence")};
+  for (const Json& c : json.at("candidates")) {
+    choice.candidates.push_back({c.at("kernel"), c.at("leave_one_out_rms_m"), c.at("leave_one_out_nlpd_of_m"),
+                                 c.at("time_block_rms_m"), c.at("joint_block_rms_m"), c.at("gain_m2"),
+                                 c.at("gain_stddev_m2"), c.at("verdict")});
+  }
+  return choice;
+}
+
 /// All but the stamp.
 Json content_of(const CompensatedModel::Parts& parts) {
   const PhysicalModel& physics = parts.physics;
@@ -192,6 +217,7 @@ Json content_of(const CompensatedModel::Parts& parts) {
   if (parts.temperature_mean) {
     content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
   }
+  if (parts.bias_choice) content["bias_choice"] = to_json(*parts.bias_choice);
   if (parts.bias) {
     content["bias"] = to_json(*parts.bias);
     for (const PoseContext& context : parts.bias_contexts) content["bias"]["poses"].push_back(to_json(context));
@@ -251,6 +277,7 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
     parts.temperature_mean = content.at("temperature_c").at("mean").get<double>();
     parts.temperature_stddev = content.at("temperature_c").at("stddev");
   }
+  if (content.contains("bias_choice")) parts.bias_choice = choice_from(content.at("bias_choice"));
   if (content.contains("bias")) {
     const Json& bias = content.at("bias");
     parts.bias = bias_from(bias);

@@ -82,9 +82,10 @@ std::string date_of(std::int64_t unix_time) {
 }
 
 std::string bias_text(const CompensatedModel::Parts& parts) {
-  if (!parts.bias) return "none";
-  return fmt::format("Gaussian process on the joints, kernel {}, {} observations", parts.bias->kernel,
-                     parts.bias->q.rows());
+  const std::string chosen = parts.bias_choice ? "; chosen: " + parts.bias_choice->sentence : "";
+  if (!parts.bias) return "none" + chosen;
+  return fmt::format("Gaussian process on the joints, kernel {}, {} observations{}", parts.bias->kernel,
+                     parts.bias->q.rows(), chosen);
 }
 
 std::string trained_ranges(const CompensatedModel& model) {

@@ -9,6 +9,7 @@
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
 #include "server/trainer/extrapolation.h"
+#include "server/trainer/left_out.h"
 
 namespace trammel {
 
@@ -68,10 +69,32 @@ double domain_limit(const BiasModel& bias) {
   return share(place);
 }
 
-/// The bias of `kernel`, learned from what the physics of `parts` leaves over of `batch`.
+/// What a bias is learned from: what the physics of `parts` leaves over of `batch`, described as far as `kernel` asks.
+BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBatch& batch, bool described) {
+  BiasProblem problem = leftover(parts.physics, batch);
+  if (!described) return problem;
+  const BiasPhysics physics(parts.physics);
+  for (const Measurement& m : batch.measurements) problem.features.push_back(physics.at(m.context));
+  return problem;
+}
+
+/// The bias that is worth it, with the physics identified anew where observations are left out.
+Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, const BiasProblem& problem,
+                                             const BiasOptions& options, const LeftOut& left_out) {
+  Result<ChosenBias> chosen = choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
+    const auto without = left_out.without(observations);
+    return without ? without->residual_B : problem.residual_B;
+  });
+  if (!chosen) return tl::make_unexpected(chosen.error());
+  parts.bias_choice = std::move(chosen->choice);
+  return std::move(chosen->model);
+}
+
+/// The bias of `kernel` or, for `auto`, the one that is worth it. `left_out`: of `all`, without suspects.
 Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, const std::string& kernel,
-                std::uint64_t seed, const std::function<bool(double)>& progress) {
+                const LeftOut& left_out, std::uint64_t seed, const std::function<bool(double)>& progress) {
   parts.bias.reset();
+  parts.bias_choice.reset();
   parts.bias_contexts.clear();
   parts.prior_share_limit = 0;
   if (kernel == "none") return {};
@@ -90,20 +113,24 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   options.kernel = kernel;
   options.seed = seed;
   options.progress = progress;
-  BiasProblem problem = leftover(parts.physics, batch);
-  const Result<SpelledBias> spelled = spelled_bias(kernel);
-  if (!spelled) return tl::make_unexpected(spelled.error());
-  if (!spelled->blocks.empty()) {
-    const BiasPhysics physics(parts.physics);
-    for (const Measurement& m : batch.measurements) {
-      problem.features.push_back(physics.at(m.context));
-      parts.bias_contexts.push_back(m.context);
-    }
+  std::optional<BiasModel> bias;
+  if (kernel == kAutoBias) {
+    Result<std::optional<BiasModel>> chosen = chosen_bias(parts, problem_of(parts, batch, true), options, left_out);
+    if (!chosen) return tl::make_unexpected(chosen.error());
+    bias = std::move(*chosen);
+  } else {
+    const Result<SpelledBias> spelled = spelled_bias(kernel);
+    if (!spelled) return tl::make_unexpected(spelled.error());
+    Result<BiasModel> fitted = BiasModel::fit(problem_of(parts, batch, !spelled->blocks.empty()), options);
+    if (!fitted) return tl::make_unexpected(fitted.error());
+    bias = std::move(*fitted);
   }
-  const Result<BiasModel> bias = BiasModel::fit(problem, options);
-  if (!bias) return tl::make_unexpected(bias.error());
+  if (!bias) return {};
   parts.bias = bias->state();
   parts.bias->features.clear();
+  if (bias->needs_features()) {
+    for (const Measurement& m : batch.measurements) parts.bias_contexts.push_back(m.context);
+  }
   parts.prior_share_limit = domain_limit(*bias);
   return {};
 }
@@ -182,7 +209,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   Result<CalibrationResult> calibration = identify(cell, split.train, options);
   if (!calibration) return tl::make_unexpected(calibration.error());
   CompensatedModel::Parts parts;
-  parts.extrapolation_slope = extrapolation_slope(*calibration, split.train);
+  const LeftOut left_out(*calibration, split.train);
+  parts.extrapolation_slope = extrapolation_slope(left_out, cell->robot);
   parts.physics = std::move(calibration->model);
   parts.parameters = std::move(calibration->parameters);
   parts.unidentifiable = std::move(calibration->unidentifiable);
@@ -194,7 +222,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   parts.cost_record = std::move(calibration->cost_record);
   parts.discrepancy = calibration->discrepancy;
 
-  const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), options.seed,
+  const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), left_out, options.seed,
                                   [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return tl::make_unexpected(learned.error());
 
@@ -216,9 +244,10 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Me
   as_it_is.model = parts.physics;
   as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());
   as_it_is.suspects = parts.suspects;
-  parts.extrapolation_slope = extrapolation_slope(as_it_is, *checked);
+  const LeftOut left_out(as_it_is, *checked);
+  parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
   const Status learned =
-      add_bias(parts, *checked, options.bias.value_or(cell.model.bias), options.seed,
+      add_bias(parts, *checked, options.bias.value_or(cell.model.bias), left_out, options.seed,
                [&](double share) { return !options.progress || options.progress("learning the bias", share); });
   if (!learned) return tl::make_unexpected(learned.error());
   record_training(parts, batch, *checked, options);

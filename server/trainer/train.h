@@ -12,7 +12,7 @@ namespace trammel {
 
 struct TrainOptions {
   std::optional<std::string> level;      ///< instead of the cell's error sources
-  std::optional<std::string> bias;       ///< instead of the cell's bias
+  std::optional<std::string> bias;       ///< instead of the cell's: `none`, a kernel or `auto` (choose_bias())
   std::optional<CompensatedModel> from;  ///< a model of this cell to start from: only `refit` is identified anew
   std::vector<std::string> refit = {"base", "tool"};
   double validation_share = 0;  ///< of the rows, drawn, when the batch has no `set` column; 0 = train on all

@@ -69,5 +69,23 @@ TEST(ModelText, SaysWhatCouldNotBeIdentified) {
   EXPECT_EQ(model_json(model)["not_identifiable"][0]["parameters"][1], "gamma0");
 }
 
+TEST(ModelText, TellsWhatWasAskedBeforeABiasWasLeftOut) {
+  CompensatedModel::Parts parts = test::nominal_model(test::small_cell("cell-3"), 12).parts();
+  parts.bias_choice = BiasChoice{
+      "none",
+      {{"none", 23.6e-6, -9.8, 24e-6, 25e-6, 0, 0, "taken"}, {"se", 23.8e-6, -9.7, 0, 0, 1e-12, 2e-12, "no"}},
+      "no bias helps"};
+  const CompensatedModel model = CompensatedModel::make(std::move(parts)).value();
+  const std::string text = model_text(model);
+  EXPECT_NE(text.find("no bias helps\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("none                                    0.0236      0.0240      0.0250        -2.892  taken"),
+            std::string::npos)
+      << text;
+  const auto json = model_json(model)["bias_choice"];
+  EXPECT_EQ(json["kernel"], "none");
+  EXPECT_NEAR(json["candidates"][1]["leave_one_out_rms_mm"], 0.0238, 1e-12);
+  EXPECT_NEAR(json["candidates"][1]["gain_mm2"], 1e-6, 1e-15);
+}
+
 }  // namespace
 }  // namespace trammel::cli

@@ -25,6 +25,10 @@ CalibrationResult identified(const std::shared_ptr<const Cell>& cell, const std:
   return test::demand(calibrate(cell, test::demand(parse_level(level)), batch, {}));
 }
 
+JointVector slope_of(const CalibrationResult& found, const MeasurementBatch& batch) {
+  return extrapolation_slope(LeftOut(found, batch), found.model.cell->robot);
+}
+
 /// Nothing is identified anew.
 CalibrationResult as_it_is(CalibrationResult found) {
   found.covariance.setZero();
@@ -57,10 +61,10 @@ TEST(Extrapolation, IsOfTheJointThatThePhysicsLacks) {
   const auto cell = test::cell_7();
   MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 300, 7);
   const CalibrationResult found = identified(cell, "M3", batch);
-  const JointVector complete = extrapolation_slope(found, batch);
+  const JointVector complete = slope_of(found, batch);
   // Something that grows with joint 4 across the arm: its slope from 20 to 30 deg is 1.7 mm/rad.
   for (Measurement& m : batch.measurements) m.p_W.x() += 2e-3 * m.context.q(3) * std::abs(m.context.q(3));
-  const JointVector lacking = extrapolation_slope(as_it_is(found), batch);
+  const JointVector lacking = slope_of(as_it_is(found), batch);
   for (int j = 0; j < 6; ++j) {
     EXPECT_LT(complete(j), 0.15e-3) << j;
     EXPECT_LE(lacking(j), j == 3 ? 3e-3 : 0.6 * lacking(3)) << j;  // what joint 4 did there
@@ -83,19 +87,19 @@ TEST(Extrapolation, ToFirstOrderIsWhatIdentifyingAnewFinds) {
     square += (m.p_W - anew.model.pose_W(m.context).translation()).squaredNorm() / 3;
     distance += std::pow(m.context.q(1) - from_deg(5), 2);
   }
-  EXPECT_NEAR(extrapolation_slope(found, batch)(1), std::sqrt(square / distance), 0.35 * std::sqrt(square / distance));
+  EXPECT_NEAR(slope_of(found, batch)(1), std::sqrt(square / distance), 0.35 * std::sqrt(square / distance));
 }
 
 TEST(Extrapolation, ASuspectIsNotAsked) {
   const auto cell = test::cell_7();
   MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 60, 8);
   CalibrationResult found = as_it_is(identified(cell, "M3", batch));
-  const JointVector clean = extrapolation_slope(found, batch);
+  const JointVector clean = slope_of(found, batch);
   Measurement& bad = batch.measurements[5];
   bad.p_W.x() += 0.05;
-  EXPECT_GT(extrapolation_slope(found, batch).maxCoeff(), 10 * clean.maxCoeff());
+  EXPECT_GT(slope_of(found, batch).maxCoeff(), 10 * clean.maxCoeff());
   found.suspects = {{bad.pose_id, bad.row, 0.05, 1000}};
-  EXPECT_LT(extrapolation_slope(found, batch).maxCoeff(), 2 * clean.maxCoeff());
+  EXPECT_LT(slope_of(found, batch).maxCoeff(), 2 * clean.maxCoeff());
 }
 
 TEST(Extrapolation, AJointThatStoodStillIsTrustedNoMoreThanTheWorstOfTheOthers) {
@@ -103,11 +107,11 @@ TEST(Extrapolation, AJointThatStoodStillIsTrustedNoMoreThanTheWorstOfTheOthers) 
   JointRanges box = small_box();
   box[5] = {0.3, 0.3};
   const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), box, 100, 9);
-  const JointVector slope = extrapolation_slope(identified(cell, "M1", batch), batch);
+  const JointVector slope = slope_of(identified(cell, "M1", batch), batch);
   EXPECT_GT(slope.maxCoeff(), 0.5e-3);
   EXPECT_EQ(slope(5), slope.head(5).maxCoeff());
   // A model without parameters has nothing to identify anew, but what it lacks grows all the same.
-  EXPECT_GT(extrapolation_slope(identified(cell, "M0", batch), batch).head(3).minCoeff(), 1e-3);
+  EXPECT_GT(slope_of(identified(cell, "M0", batch), batch).head(3).minCoeff(), 1e-3);
 }
 
 TEST(Extrapolation, GrowsWithTheChordAndStaysAtItsLargestBeyondHalfATurn) {

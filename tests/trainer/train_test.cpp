@@ -125,6 +125,27 @@ TEST(Train, ATrackerThatMovedIsNoPartOfWhatIsServed) {
   EXPECT_LT(to_mm(fresh.calibrated.rms), 0.025);
 }
 
+TEST(Train, AutoTakesNoBiasWhereThePhysicsIsCompleteAndThePhysicsItselfWhereItIsNot) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const std::uint64_t seed : {61, 62, 63}) {
+    const CompensatedModel complete = test::demand(train(cell, test::measured(robot, 120, seed), quick("M3", "auto")));
+    ASSERT_TRUE(complete.parts().bias_choice);
+    EXPECT_EQ(complete.parts().bias_choice->kernel, "none") << complete.parts().bias_choice->sentence;
+    EXPECT_FALSE(complete.parts().bias);
+  }
+  const MeasurementBatch batch = test::measured(robot, 80, 64);
+  const CompensatedModel lacking = test::demand(train(cell, batch, quick("M2", "auto")));
+  EXPECT_EQ(lacking.parts().bias_choice->kernel, "se + parameters") << lacking.parts().bias_choice->sentence;
+  EXPECT_LT(to_mm(lacking.evaluate(test::measured(robot, 300, 65)).compensated.rms), 0.026);
+  const CompensatedModel stored = test::demand(deserialize(serialize(lacking), "memory"));
+  EXPECT_EQ(stored.provenance().hash, lacking.provenance().hash);
+  ASSERT_EQ(stored.parts().bias_choice->candidates.size(), lacking.parts().bias_choice->candidates.size());
+  EXPECT_EQ(stored.parts().bias_choice->candidates[1].gain, lacking.parts().bias_choice->candidates[1].gain);
+  EXPECT_EQ(test::demand(train(cell, batch, quick("M2", "auto"))).provenance().hash, lacking.provenance().hash);
+  EXPECT_FALSE(test::demand(train(cell, batch, quick("M2", "se"))).parts().bias_choice);
+}
+
 TEST(Train, GivesUpWhenAsked) {
   const auto cell = test::cell_7();
   TrainOptions options = quick("M1", "se");

@@ -147,6 +147,17 @@ TEST_F(TrainerTest, MakesAnAcceptedBatchTheModelInForce) {
   EXPECT_TRUE(later->in_force);
 }
 
+TEST_F(TrainerTest, ARetrainChoosesTheBiasItselfWhereAsked) {
+  start();
+  train("lt-07");
+  const JobProgress chosen = retrain({"lt-07"}, "", "auto");
+  EXPECT_EQ(chosen.stage, JobStage::kDone) << chosen.what;
+  EXPECT_EQ(store_->model("cell-7", chosen.model_version)->parts().bias_choice->kernel, "none");
+  const auto unknown = trainer_->retrain("cell-7", {"lt-07"}, "", "automatic");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().message.find("`automatic` is unknown"), std::string::npos) << unknown.error().message;
+}
+
 TEST_F(TrainerTest, StoresAWorseModelAndLeavesTheBetterOneInForce) {
   start();
   train("lt-07");

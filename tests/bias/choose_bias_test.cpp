@@ -1,0 +1,102 @@
+#include "server/bias/choose_bias.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/bias/bias_data.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// What a complete physics leaves over: the tracker's noise.
+BiasProblem noise_alone(Index count, std::uint64_t seed) {
+  BiasProblem problem = smooth_problem(count, seed);
+  std::mt19937_64 random(seed + 900);
+  for (double& value : problem.residual_B.reshaped()) value = problem.sigma[0] * normal(&random);
+  return problem;
+}
+
+TEST(ChooseBias, TakesNoneOfNoise) {
+  for (const Index count : {40, 150, 400}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      const ChosenBias chosen = choose_bias(noise_alone(count, seed), {}).value();
+      EXPECT_EQ(chosen.choice.kernel, "none") << count << " " << seed << ": " << chosen.choice.sentence;
+      EXPECT_FALSE(chosen.model);
+      EXPECT_EQ(chosen.choice.candidates.front().verdict, "taken");
+      EXPECT_TRUE(chosen.choice.sentence.starts_with("no bias helps: leave-one-out ")) << chosen.choice.sentence;
+      EXPECT_TRUE(chosen.choice.sentence.ends_with("; left out")) << chosen.choice.sentence;
+    }
+  }
+}
+
+TEST(ChooseBias, TakesTheKernelOfASmoothResidualAndSaysWhatItIsWorth) {
+  const BiasProblem problem = smooth_problem(200, 1);
+  const ChosenBias chosen = choose_bias(problem, {}).value();
+  EXPECT_EQ(chosen.choice.kernel, "se");
+  ASSERT_TRUE(chosen.model);
+  EXPECT_EQ(chosen.model->state().kernel, "se");
+  ASSERT_EQ(chosen.choice.candidates.size(), 3u);  // none, se, matern52: no features, so no blocks
+  const BiasCandidate& none = chosen.choice.candidates[0];
+  const BiasCandidate& se = chosen.choice.candidates[1];
+  EXPECT_NEAR(se.leave_one_out_rms, chosen.model->report().leave_one_out_rms, 1e-12);
+  EXPECT_LT(se.time_block_rms, 0.5 * none.time_block_rms);
+  EXPECT_GE(se.joint_block_rms, se.leave_one_out_rms);
+  EXPECT_GT(se.gain, 2 * se.gain_stddev);
+  EXPECT_NE(chosen.choice.candidates[2].verdict, "taken");
+}
+
+TEST(ChooseBias, SameProblemAndSeedSameChoice) {
+  const BiasProblem problem = smooth_problem(60, 3);
+  const ChosenBias one = choose_bias(problem, {}).value();
+  const ChosenBias other = choose_bias(problem, {}).value();
+  EXPECT_EQ(one.choice.sentence, other.choice.sentence);
+  for (std::size_t i = 0; i < one.choice.candidates.size(); ++i) {
+    EXPECT_EQ(one.choice.candidates[i].time_block_rms, other.choice.candidates[i].time_block_rms);
+  }
+}
+
+TEST(ChooseBias, WhatNeighboursInTimeShareIsNoReasonForABias) {
+  // Eight poses measured twenty times each, while something drifts: poses left out one by one are
+  // predicted by their neighbours, whole visits are not.
+  BiasProblem problem = smooth_problem(160, 4);
+  std::mt19937_64 random(77);
+  for (Index visit = 0; visit < 8; ++visit) {
+    Eigen::RowVectorXd q = problem.q.row(visit);
+    const Eigen::RowVector3d drift =
+        20 * problem.sigma[0] * Eigen::RowVector3d(normal(&random), normal(&random), normal(&random));
+    for (Index i = 20 * visit; i < 20 * (visit + 1); ++i) {
+      for (Index j = 0; j < q.size(); ++j) problem.q(i, j) = q(j) + 0.01 * normal(&random);
+      for (Index d = 0; d < 3; ++d) problem.residual_B(i, d) = drift(d) + problem.sigma[0] * normal(&random);
+    }
+  }
+  const ChosenBias chosen = choose_bias(problem, {}).value();
+  EXPECT_EQ(chosen.choice.kernel, "none") << chosen.choice.sentence;
+  EXPECT_LT(chosen.choice.candidates[1].leave_one_out_rms, 0.8 * chosen.choice.candidates[0].leave_one_out_rms);
+  EXPECT_NE(chosen.choice.sentence.find("neighbours in time"), std::string::npos) << chosen.choice.sentence;
+}
+
+TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
+  const BiasProblem problem = smooth_problem(80, 5);
+  std::vector<std::size_t> asked;
+  const ChosenBias chosen = choose_bias(problem, {}, [&](const std::vector<Index>& block) -> MatrixXd {
+                              asked.push_back(block.size());
+                              MatrixXd residual = problem.residual_B;
+                              residual(block, 0).array() += 1.0;  // m: without them nothing is known of them
+                              return residual;
+                            }).value();
+  EXPECT_EQ(asked, std::vector<std::size_t>(16, 10));  // eight blocks in time, eight in joint space
+  EXPECT_GT(chosen.choice.candidates[0].time_block_rms, 0.9);
+  EXPECT_EQ(chosen.choice.kernel, "none");
+}
+
+TEST(ChooseBias, TooFewObservationsAreNotJudged) {
+  const ChosenBias chosen = choose_bias(smooth_problem(29, 1), {}).value();
+  EXPECT_EQ(chosen.choice.kernel, "none");
+  EXPECT_NE(chosen.choice.sentence.find("29 observations are too few"), std::string::npos);
+  EXPECT_FALSE(choose_bias(smooth_problem(5, 1), {}));
+}
+
+}  // namespace
+}  // namespace trammel
