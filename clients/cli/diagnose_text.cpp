@@ -49,6 +49,16 @@ std::string parameters_line(const ordered_json& parameters) {
   return text;
 }
 
+std::string beginning_line(const ordered_json& beginning) {
+  const auto place = [](const ordered_json& one) {
+    const ordered_json& time = one.at("time_s");
+    return one.at("pose_id").get<std::string>() +
+           (time.is_null() ? "" : fmt::format(" ({:.0f} s)", time.get<double>()));
+  };
+  return fmt::format("      may have begun at any of {} poses from {} to {} (95 %)\n", beginning.at("pose_ids").size(),
+                     place(beginning.at("earliest")), place(beginning.at("latest")));
+}
+
 std::string finding_lines(const ordered_json& finding) {
   std::string text =
       fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10.2g}{:>10.4f}{:>10.4f}\n", cause_text(finding),
@@ -56,6 +66,9 @@ std::string finding_lines(const ordered_json& finding) {
                   finding.at("p_value").get<double>(), finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
   if (!finding.at("parameters").empty()) text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
+  if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
+    text += beginning_line(finding.at("may_begin_at"));
+  }
   if (!finding.at("could_also_be").empty()) {
     text += fmt::format("      could also be: {}\n", causes_text(finding.at("could_also_be")));
   }
@@ -86,7 +99,9 @@ std::string figures_table(const ordered_json& diagnosis) {
   std::string text = fmt::format("\n  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
                      figures_line("before", diagnosis.at("before")) + figures_line("after", diagnosis.at("after")) +
                      figures_line("held out, before", held_out.at("before")) +
-                     figures_line("held out, after", held_out.at("after"));
+                     figures_line("held out, after", held_out.at("after")) +
+                     figures_line("  but suspects", held_out.at("before_without_suspects")) +
+                     figures_line("  after, but them", held_out.at("after_without_suspects"));
   if (!held_out.at("before").is_null()) {
     text += fmt::format("  (held out: {})\n", held_out.at("how").get<std::string>());
   }
@@ -132,12 +147,42 @@ std::string unseen_lines(const ordered_json& unseen) {
   return text;
 }
 
+/// What a cause would need to show, empty where nothing is said.
+std::string need_of(const ordered_json& unseen, const std::string& name) {
+  for (const ordered_json& one : unseen) {
+    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
+    if (one.at("cause").get<std::string>() + joint == name) return one.at("needs");
+  }
+  return "";
+}
+
+/// A line a cause: all that looks like it, and once what it needs.
+std::string not_separable_lines(const ordered_json& diagnosis) {
+  std::vector<std::pair<std::string, std::string>> lines;
+  for (const ordered_json& group : diagnosis.at("not_separable")) {
+    const auto name = group.front().get<std::string>();
+    std::string others;
+    for (std::size_t k = 1; k < group.size(); ++k) others += (k > 1 ? ", " : "") + group[k].get<std::string>();
+    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == name; });
+    if (known == lines.end()) {
+      lines.emplace_back(name, others);
+    } else {
+      known->second += ", " + others;
+    }
+  }
+  std::string text;
+  for (const auto& [name, others] : lines) {
+    const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
+    text += fmt::format("  not told apart by these poses: {} from {}{}\n", name, others,
+                        need.empty() ? "" : fmt::format(" (needs {})", need));
+  }
+  return text;
+}
+
 std::string limits_text(const ordered_json& diagnosis) {
   std::string text;
   for (const ordered_json& limit : diagnosis.at("limits")) text += fmt::format("  {}\n", limit.get<std::string>());
-  for (const ordered_json& group : diagnosis.at("not_separable")) {
-    text += fmt::format("  not told apart by these poses: {}\n", words_text(group, ", "));
-  }
+  text += not_separable_lines(diagnosis);
   text += unseen_lines(diagnosis.at("could_not_have_seen"));
   return text.empty() ? "" : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
 }

@@ -15,6 +15,8 @@
 #include "server/diagnose/recovery.h"
 #include "server/diagnose/search.h"
 #include "server/diagnose/separability.h"
+#include "server/diagnose/surrogates.h"
+#include "server/diagnose/validation.h"
 #include "server/diagnose/wording.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
@@ -47,9 +49,13 @@ std::vector<std::string> limits_of(const MeasurementBatch& batch, const RepeatSt
   if (none([](const Measurement& m) { return m.context.time.has_value(); }))
     limits.emplace_back("no times: a drift, and what warms up, can only be told by the order of the poses");
   if (none([](const Measurement& m) { return m.context.temperature.has_value(); }))
-    limits.emplace_back("no temperatures: thermal growth cannot be named");
+    limits.emplace_back(
+        "no temperatures: thermal growth was looked for by the order of the poses, and cannot be told from a drift");
   if (none([](const Measurement& m) { return !m.context.direction.empty(); }))
-    limits.emplace_back("no approach directions: backlash cannot be named");
+    limits.emplace_back(
+        "no approach directions: backlash was looked for as if each joint came from where it was at the row before, "
+        "and "
+        "cannot be named for certain");
   if (repeats.degrees_of_freedom == 0)
     limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
   return limits;
@@ -134,7 +140,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   const bool sorted = put_in_order_of_time(*checked);
   fill_velocity(*checked);
   const BatchSplit split = split_batch(*checked, 0, options.seed);
-  const MergedRepeats merged = merge_repeats(split.train, cell->tracker.sigma);
+  MergedRepeats merged = merge_repeats(split.train, cell->tracker.sigma);
+  const Surrogates surrogates = put_in_surrogates(merged.batch);
   if (merged.batch.measurements.size() < static_cast<std::size_t>(kFewestPoses)) {
     return refused("batch {}: {} poses to diagnose, at least {}", batch.id, merged.batch.measurements.size(),
                    kFewestPoses);
@@ -144,6 +151,10 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
       search_causes(cell, with_unknown_tool(cell->model.error_sources, *cell), merged.batch, options);
   if (!searched) return tl::make_unexpected(searched.error());
   const SearchResult& found = *searched;
+  MeasurementBatch recorded = found.batch;
+  MeasurementBatch all_recorded = found.all;
+  take_out_surrogates(surrogates, recorded);
+  take_out_surrogates(surrogates, all_recorded);
 
   if (!reported(options, "measuring the gain", 0.65)) return tl::make_unexpected(given_up());
   const std::vector<std::string> candidates = candidate_sources(*cell, found.batch, nullptr);
@@ -171,6 +182,12 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   diagnosis.before = figures_of(before.positions(before.residual()));
   diagnosis.after = figures_of(served.positions(served.residual()));
   diagnosis.findings = findings_of(found, after);
+  if (surrogates.time) {
+    for (Finding& finding : diagnosis.findings) {
+      for (PossibleBeginning& place : finding.may_begin_at) place.time.reset();
+    }
+  }
+  doubt_what_was_not_recorded(surrogates, recorded, diagnosis.findings);
   fill_unexplained(diagnosis, found, after, all);
   diagnosis.verdict = verdict_of(diagnosis);
   for (const Accepted& one : found.accepted) {
@@ -195,16 +212,12 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
         fmt::format("{} folds, each predicted from the others; the causes were chosen on all poses",
                     Folds(after, after.nuisance()).count());
   } else {
-    const auto errors = [&](const PhysicalModel& model) {
-      Eigen::Matrix3Xd e(3, static_cast<Index>(split.validation.measurements.size()));
-      for (Index i = 0; i < e.cols(); ++i) {
-        const Measurement& m = split.validation.measurements[static_cast<std::size_t>(i)];
-        e.col(i) = model.X_WB.linear().transpose() * (m.p_W - model.pose_W(m.context).translation());
-      }
-      return figures_of(e);
-    };
-    diagnosis.held_out_before = errors(found.before.model);
-    diagnosis.held_out_after = errors(extended.model);
+    Validation validation = validate(before, served, split.validation);
+    diagnosis.held_out_before = validation.before;
+    diagnosis.held_out_after = validation.after;
+    diagnosis.held_out_before_without = validation.before_without;
+    diagnosis.held_out_after_without = validation.after_without;
+    std::move(validation.fit_neither.begin(), validation.fit_neither.end(), std::back_inserter(diagnosis.suspects));
     diagnosis.held_out_how = fmt::format("{} validation rows", split.validation.measurements.size());
   }
 
@@ -212,8 +225,12 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   const std::vector<FamilyPtr> families = make_families(after);
   Blindness blind = blindness(after, families, all, found.chance);
   diagnosis.could_not_have_seen = std::move(blind.unseen);
-  static_cast<void>(candidate_sources(*cell, found.batch, &diagnosis.could_not_have_seen));
+  std::erase_if(diagnosis.could_not_have_seen,
+                [&](const Unseen& unseen) { return is_by_surrogate(surrogates, unseen.cause); });
+  static_cast<void>(candidate_sources(*cell, recorded, &diagnosis.could_not_have_seen));
   diagnosis.not_separable = std::move(blind.inseparable);
+  for (Inseparable& pair : hidden_by_constancy(found.before.model, recorded))
+    diagnosis.not_separable.push_back(std::move(pair));
 
   const Background first(before.nuisance());
   for (int joint = 0; joint < cell->robot.size(); ++joint) {
@@ -248,7 +265,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   }
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
   diagnosis.leftover = dependence_of(after, all.project(after.residual()), options.seed);
-  diagnosis.limits = limits_of(found.all, merged.statistics);
+  diagnosis.limits = limits_of(all_recorded, merged.statistics);
   if (sorted)
     diagnosis.limits.emplace_back(
         "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
@@ -257,7 +274,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     diagnosis.limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
 
   const Matrix3 R_BW = found.before.model.X_WB.linear().transpose();
-  diagnosis.batch = found.batch;
+  diagnosis.batch = std::move(recorded);
   diagnosis.residual_after_B = R_BW * served.positions(served.residual());
   diagnosis.residual_before_B = R_BW * before.positions(before.residual());
   diagnosis.batch_hash = batch_hash(batch);

@@ -31,11 +31,21 @@ struct Estimate {
   double u95 = 0;  ///< half width of the 95 % interval (1.96 standard deviations), everything else free
 };
 
+/// A pose at which something may have begun.
+struct PossibleBeginning {
+  std::string pose_id;
+  int row = 0;
+  std::optional<double> time;  ///< s, as recorded
+};
+
 /// A cause that the simulation lacks.
 struct Finding {
   Cause cause;
   std::string source;  ///< as a cell file's list of error sources would spell it; empty for an outlier
   std::vector<Estimate> parameters;
+  /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in the order of
+  /// measuring.
+  std::vector<PossibleBeginning> may_begin_at;
   double effect_rms = 0;             ///< m, Euclidean, over the poses: what it does that nothing else in the model can
   ErrorFigures held_out_before;      ///< without this cause, the others found in place
   ErrorFigures held_out_after;       ///< with it
@@ -92,6 +102,7 @@ struct SuspectedPose {
   int row = 0;
   double distance = 0;  ///< m, from where the extended model has it
   std::string reason;
+  bool held_out = false;  ///< nothing was learned from it anyway; it counts in the held-out figures
 };
 
 /// Measuring poses that would tell apart what this batch cannot.
@@ -127,6 +138,8 @@ struct Diagnosis {
   std::string noise_from;
   ErrorFigures before, after;  ///< of all poses used, before and after extension
   std::optional<ErrorFigures> held_out_before, held_out_after;
+  /// The same without the poses held out that fit neither model; empty where there are none.
+  std::optional<ErrorFigures> held_out_before_without, held_out_after_without;
   std::string held_out_how;  ///< `validation rows` or `8 blocks, each predicted from the others`
   std::vector<Finding> findings;
   Unexplained unexplained;

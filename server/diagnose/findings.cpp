@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnose/beginning.h"
 #include "server/diagnose/effect.h"
 #include "server/diagnose/folds.h"
 #include "server/diagnose/wording.h"
@@ -85,6 +86,29 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
+/// The poses at which `one` may have begun, given what `effect` it has and everything else that is free.
+std::vector<PossibleBeginning> beginnings_of(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                                             const Accepted& one, const VectorXd& effect, const Background& rest) {
+  const auto family = std::find_if(families.begin(), families.end(), [&](const FamilyPtr& other) {
+    const Cause cause = other->cause(other->typical());
+    return other->predicts() && !cause.pose_id.empty() && cause.cause == one.cause.cause &&
+           cause.joint == one.cause.joint;
+  });
+  const auto& poses = problem.batch().measurements;
+  const auto found =
+      std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.pose_id == one.cause.pose_id; });
+  if (one.cause.pose_id.empty() || family == families.end() || found == poses.end()) return {};
+  Best always;
+  always.at = 0;
+  std::vector<PossibleBeginning> beginnings;
+  for (const Index i : possible_beginnings(problem, (*family)->columns(always), rest, problem.residual() + effect,
+                                           static_cast<Index>(found - poses.begin()))) {
+    const Measurement& m = poses[static_cast<std::size_t>(i)];
+    beginnings.push_back({m.pose_id, m.row, m.context.time});
+  }
+  return beginnings;
+}
+
 Finding outlier(const Accepted& one, double noise, const ErrorFigures& held_out) {
   Finding finding;
   finding.cause = one.cause;
@@ -105,6 +129,10 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
   const Estimated estimated{all.estimate(problem.residual()), all.covariance()};
   const Folds folds(problem, columns);
   const VectorXd held_out = folds.held_out_residual(problem.residual());
+  const bool begins = std::any_of(found.accepted.begin(), found.accepted.end(), [](const Accepted& one) {
+    return !one.source.empty() && !one.cause.pose_id.empty();
+  });
+  const std::vector<FamilyPtr> families = begins ? make_families(problem) : std::vector<FamilyPtr>();
   std::vector<Finding> findings;
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) {
@@ -120,6 +148,7 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     const VectorXd effect = effect_of_source(problem, one.in_model);
     const Background rest(columns(Eigen::all, all_but(columns.cols(), places)));
     finding.effect_rms = problem.position_rms(rest.project(effect));
+    finding.may_begin_at = beginnings_of(problem, families, one, effect, rest);
     finding.strength = own_estimate(problem, one.in_model, estimated.change, estimated.covariance).strength();
     finding.p_value = one.p_value;
     finding.naming_frequency = one.naming_frequency;

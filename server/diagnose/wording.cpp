@@ -69,6 +69,10 @@ std::string said(const Finding& finding) {
   std::string text = to_string(finding.cause);
   if (finding.cause.order) text += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
   if (!finding.cause.pose_id.empty()) text += fmt::format(" from pose {}", finding.cause.pose_id);
+  if (finding.may_begin_at.size() > 1) {
+    text += fmt::format(", or another of {} to {},", finding.may_begin_at.front().pose_id,
+                        finding.may_begin_at.back().pose_id);
+  }
   text += fmt::format(" ({:.0f} um rms)", to_mm(finding.effect_rms) * 1e3);
   if (finding.could_also_be.empty()) return text;
   std::vector<std::string> others;
@@ -115,6 +119,14 @@ std::string sentence_for(const Diagnosis& d) {
   if (d.unexplained.present) {
     add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it.",
                     text.empty() ? "" : " else", listed(d.unexplained.depends_on), 1e6 * d.unexplained.rms));
+  }
+  std::vector<std::string> held_out;
+  for (const SuspectedPose& pose : d.suspects) {
+    if (pose.held_out) held_out.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
+  }
+  if (!held_out.empty()) {
+    add(fmt::format("Of the poses held out, {} {} neither model.", listed(held_out),
+                    held_out.size() > 1 ? "fit" : "fits"));
   }
   if (sure.empty() && doubtful.empty() && !d.unexplained.present) {
     add(fmt::format("Nothing {}found in {} poses: {:.0f} um rms are left.", bad.empty() ? "" : "else ", d.poses,

@@ -33,6 +33,17 @@ ordered_json causes_json(const std::vector<Cause>& causes) {
   return list;
 }
 
+ordered_json beginning_json(const std::vector<PossibleBeginning>& places) {
+  const auto place_json = [](const PossibleBeginning& place) {
+    return ordered_json{{"pose_id", place.pose_id},
+                        {"row", place.row},
+                        {"time_s", place.time ? ordered_json(*place.time) : ordered_json(nullptr)}};
+  };
+  ordered_json ids = ordered_json::array();
+  for (const PossibleBeginning& place : places) ids.push_back(place.pose_id);
+  return {{"earliest", place_json(places.front())}, {"latest", place_json(places.back())}, {"pose_ids", ids}};
+}
+
 ordered_json finding_json(const Finding& finding) {
   ordered_json json = cause_json(finding.cause);
   json["source"] = finding.source;
@@ -40,6 +51,7 @@ ordered_json finding_json(const Finding& finding) {
   for (const Estimate& estimate : finding.parameters) {
     json["parameters"][estimate.name] = {{"value", estimate.value}, {"u95", estimate.u95}, {"unit", estimate.unit}};
   }
+  if (!finding.may_begin_at.empty()) json["may_begin_at"] = beginning_json(finding.may_begin_at);
   json["effect_rms_mm"] = to_mm(finding.effect_rms);
   json["held_out"] = {{"before", figures_json(finding.held_out_before)},
                       {"after", figures_json(finding.held_out_after)}};
@@ -91,8 +103,11 @@ ordered_json unseen_json(const std::vector<Unseen>& unseen) {
 ordered_json suspects_json(const std::vector<SuspectedPose>& suspects) {
   ordered_json list = ordered_json::array();
   for (const SuspectedPose& pose : suspects) {
-    list.push_back(
-        {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"reason", pose.reason}});
+    list.push_back({{"pose_id", pose.pose_id},
+                    {"row", pose.row},
+                    {"distance_mm", to_mm(pose.distance)},
+                    {"held_out", pose.held_out},
+                    {"reason", pose.reason}});
   }
   return list;
 }
@@ -156,6 +171,8 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
           {"held_out",
            {{"before", figures_or_null(diagnosis.held_out_before)},
             {"after", figures_or_null(diagnosis.held_out_after)},
+            {"before_without_suspects", figures_or_null(diagnosis.held_out_before_without)},
+            {"after_without_suspects", figures_or_null(diagnosis.held_out_after_without)},
             {"how", diagnosis.held_out_how}}},
           {"findings", findings_json(diagnosis)},
           {"unexplained", unexplained_json(diagnosis.unexplained)},

@@ -79,6 +79,16 @@ std::string estimates_of(const Finding& finding) {
   return html.empty() ? "–" : html;
 }
 
+std::string beginning_of(const Finding& finding) {
+  const auto& places = finding.may_begin_at;
+  if (places.size() < 2) return "";
+  const auto place = [](const PossibleBeginning& one) {
+    return one.pose_id + (one.time ? fmt::format(" ({:.0f} s)", *one.time) : "");
+  };
+  return fmt::format(" It may have begun at any of {} poses from {} to {} (95\u00a0%).", places.size(),
+                     place(places.front()), place(places.back()));
+}
+
 std::string finding_rows(const Finding& finding) {
   const std::string others = causes_in_words(finding.could_also_be);
   const std::string row =
@@ -91,7 +101,7 @@ std::string finding_rows(const Finding& finding) {
          fmt::format(
              "<tr class=\"action\"><td></td><td></td><td colspan=\"6\">{} Named by {:.0f}\u00a0% of the "
              "repetitions.</td></tr>\n",
-             html_text(sentence_of(finding.action)), 100 * finding.naming_frequency);
+             html_text(sentence_of(finding.action) + beginning_of(finding)), 100 * finding.naming_frequency);
 }
 
 std::string findings_text(const Diagnosis& diagnosis) {
@@ -128,6 +138,10 @@ std::string figures_table(const Diagnosis& diagnosis) {
       figures_row("all poses, before", diagnosis.before) + figures_row("all poses, after", diagnosis.after);
   if (diagnosis.held_out_before) rows += figures_row("held out, before", *diagnosis.held_out_before);
   if (diagnosis.held_out_after) rows += figures_row("held out, after", *diagnosis.held_out_after);
+  if (diagnosis.held_out_before_without && diagnosis.held_out_after_without) {
+    rows += figures_row("held out but for those that fit neither, before", *diagnosis.held_out_before_without) +
+            figures_row("held out but for those that fit neither, after", *diagnosis.held_out_after_without);
+  }
   return table("figures", {"mm", "rms", "mean", "99.7 %", "max"}, rows) +
          (diagnosis.held_out_how.empty() ? "" : paragraph("Held out: " + diagnosis.held_out_how + "."));
 }

@@ -37,5 +37,22 @@ TEST(DiagnosisJson, CountsJointsFromOneAndSpeaksInMillimetresAndDegrees) {
   EXPECT_TRUE(json["could_not_have_seen"][1]["smallest_mm"].is_null());
 }
 
+TEST(DiagnosisJson, SaysWhenAStepMayHaveBegunAndWhichHeldOutPosesFitNeitherModel) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  EXPECT_FALSE(diagnosis_json(diagnosis)["findings"][0].contains("may_begin_at"));
+  diagnosis.findings[0].may_begin_at = {{"p7", 8, 120.0}, {"p8", 9, std::nullopt}};
+  diagnosis.suspects.push_back({"p9", 10, 1e-3, "held-out", true});
+  diagnosis.held_out_before_without = diagnosis.before;
+  const auto json = diagnosis_json(diagnosis);
+  const auto& begins = json["findings"][0]["may_begin_at"];
+  EXPECT_EQ(begins["pose_ids"].size(), 2u);
+  EXPECT_EQ(begins["earliest"]["pose_id"], "p7");
+  EXPECT_EQ(begins["earliest"]["time_s"], 120.0);
+  EXPECT_TRUE(begins["latest"]["time_s"].is_null());
+  EXPECT_TRUE(json["suspect_poses"].back()["held_out"].get<bool>());
+  EXPECT_TRUE(json["held_out"]["before_without_suspects"].contains("rms_mm"));
+  EXPECT_TRUE(json["held_out"]["after_without_suspects"].is_null());
+}
+
 }  // namespace
 }  // namespace trammel

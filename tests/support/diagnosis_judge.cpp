@@ -42,17 +42,16 @@ std::optional<std::size_t> place_of(const Cause& said, const HiddenCase& hidden)
   return std::nullopt;
 }
 
-std::vector<Cause> all_mentioned(const Diagnosis& diagnosis) {
+/// What a reader is left with: where something was found, what it is said to be; where nothing was, what the batch is
+/// said not to tell.
+std::vector<Cause> left_open(const Diagnosis& diagnosis) {
   std::vector<Cause> all;
   for (const Finding& finding : diagnosis.findings) {
     all.push_back(finding.cause);
     all.insert(all.end(), finding.could_also_be.begin(), finding.could_also_be.end());
   }
+  if (!diagnosis.findings.empty() || diagnosis.unexplained.present) return all;
   for (const Inseparable& set : diagnosis.not_separable) all.insert(all.end(), set.causes.begin(), set.causes.end());
-  for (const Unseen& unseen : diagnosis.could_not_have_seen) {
-    if (!unseen.detectable || !unseen.identifiable)
-      all.push_back(unseen.cause);  // else: seen, had it been large enough
-  }
   return all;
 }
 
@@ -136,7 +135,7 @@ Judgement judge(const Diagnosis& diagnosis, const HiddenCase& hidden) {
   count_findings(diagnosis, hidden, judgement);
   judgement.exact = diagnosis.verdict == Verdict::kNamed && judgement.wrong == 0 && judgement.open == 0 &&
                     !diagnosis.unexplained.present && judgement.right == static_cast<int>(hidden.truth.causes.size());
-  const std::vector<Cause> mentioned = all_mentioned(diagnosis);
+  const std::vector<Cause> mentioned = left_open(diagnosis);
   judgement.set_holds_truth = std::any_of(mentioned.begin(), mentioned.end(), [&](const Cause& cause) {
     return !hidden.truth.causes.empty() && means(cause, hidden, 0);
   });

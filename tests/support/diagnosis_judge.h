@@ -24,7 +24,8 @@ struct Judgement {
   int right_or_open = 0;         ///< causes hidden that are named or among what a finding leaves open
   int wrong = 0;                 ///< causes named that were not hidden
   int open = 0;                  ///< findings that leave open which of several causes it is
-  bool set_holds_truth = false;  ///< the first cause hidden is among all that is named or left open, however
+  bool set_holds_truth = false;  ///< the first cause hidden is among what a finding names or leaves open; where nothing
+                                 ///< was found, among what is said not to be told apart
   bool over_confident = false;   ///< one single name for what cannot be told
   bool unknown_rightly = false;  ///< unknown, of the right joints
   std::string said;              ///< `backlash:2`, `tool|geometry:d6`, `unknown q4`, `nothing`

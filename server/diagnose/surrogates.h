@@ -1,0 +1,31 @@
+#pragma once
+
+#include "server/diagnose/diagnosis.h"
+
+namespace trammel {
+
+/// What a batch does not record, put in from the order of its rows, so that its causes are looked for all the same:
+/// the time goes on by the row, the arm warms up along it, and a joint comes from the side on which it was before.
+struct Surrogates {
+  bool time = false, temperature = false, direction = false;  ///< were put in
+};
+/// Fills in what no row has. `batch` is in its order of measuring; nothing is put into a continuous path.
+[[nodiscard]] Surrogates put_in_surrogates(MeasurementBatch& batch);
+
+/// Takes them out again.
+void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch);
+
+/// Whether the cause was looked for by a surrogate only.
+[[nodiscard]] bool is_by_surrogate(const Surrogates& surrogates, const Cause& cause);
+
+/// A cause that was found by a surrogate is never sure: adds to each finding what it may be instead, and says in its
+/// action what to record. `recorded`: the batch without surrogates.
+void doubt_what_was_not_recorded(const Surrogates& surrogates, const MeasurementBatch& recorded,
+                                 std::vector<Finding>& findings);
+
+/// Causes whose circumstances were recorded and the same at all poses (one side of approach, one temperature), so that
+/// the geometry of `model` takes them over whole.
+[[nodiscard]] std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model,
+                                                           const MeasurementBatch& recorded);
+
+}  // namespace trammel
