@@ -1,10 +1,13 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
+#include <map>
 
 #include "clients/cli/commands.h"
 #include "clients/cli/evaluation_text.h"
 #include "clients/cli/options.h"
 #include "clients/cli/output.h"
+#include "server/diagnose/triage.h"
 #include "server/measurement/batch_file.h"
 #include "server/report/model_page.h"
 #include "server/trainer/train.h"
@@ -26,6 +29,27 @@ struct TrainArguments {
   double validation_share = 0;
 };
 
+/// As the service does before it learns from a batch: holds it against the model to start from. What is refitted may
+/// differ; anything else would be learned as if it belonged to it.
+Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit,
+                    const MeasurementBatch& batch) {
+  const Result<MeasurementBatch> checked = check_against_cell(batch, from.cell());
+  if (!checked) return {};  // its tools are others: nothing to compare
+  const bool known = std::all_of(checked->measurements.begin(), checked->measurements.end(), [&](const Measurement& m) {
+    return from.check_trained_with(m.context.tool, m.context.payload).has_value();
+  });
+  if (!known) return {};
+  const Triage seen = triage(from, *checked);
+  const std::map<std::string, std::string> same = {
+      {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
+  const auto source = same.find(seen.cause.cause);
+  const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
+                        source != same.end() && std::find(refit.begin(), refit.end(), source->second) != refit.end();
+  if (seen.learn || refitted) return {};
+  return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id, seen.sentence,
+                 fmt::join(refit, ","));
+}
+
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
@@ -44,6 +68,7 @@ Status train_model(const TrainArguments& arguments) {
     Result<std::vector<std::string>> refit = parse_level(arguments.refit);
     if (!refit) return tl::make_unexpected(refit.error());
     options.refit = std::move(*refit);
+    if (const Status fits = hold_against(*options.from, options.refit, *batch); !fits) return fits;
   }
   const Result<CompensatedModel> model = [&] {
     ProgressLine progress;

@@ -393,6 +393,17 @@ TEST_F(CommandLine, ADiagnosisThatNamesNothingExtendsNothing) {
   EXPECT_EQ(json::parse(test::read_file(file("found.json"))).at("verdict"), "nothing");
 }
 
+TEST_F(CommandLine, ATrainingFromAModelTakesNoBatchThatRefittingDoesNotExplain) {
+  const std::string batch = measure("b", 60, 1);
+  const std::string model = train(batch, "M3");
+  must({"train", "--cell", cell_, "--batch", batch, "--from", model, "--bias", "none", "-o", file("again.model")});
+  const std::string spoilt = changed(batch, "z_mm", [](std::size_t row, const std::string& field) {
+    return fmt::format("{:.6f}", std::stod(field) + 3 * std::sin(7.0 * static_cast<double>(row)));
+  });
+  expect_refused({"train", "--cell", cell_, "--batch", spoilt, "--from", model, "--bias", "none", "-o", file("out")},
+                 {"nothing known explains it", "train without --from"});
+}
+
 TEST_F(CommandLine, ADiagnosisWithoutNextPosesSaysWhyAndWritesNoPlan) {
   const Finished finished =
       must({"diagnose", "--cell", cell_, "--batch", measure("good", 60, 1), "--next-poses", file("next.csv")});
