@@ -63,9 +63,11 @@ struct BiasModel::Fitted {
   BiasFitReport report;
   bool coupled = false;
   BiasOutputsPtr outputs;
+  double mean_noise_shape = 1;  // of a measurement like these, whose sigmas may differ much
 
   Fitted(BiasState of, bool with_blocks, BiasOutputsPtr conditioned)
       : state(std::move(of)), coupled(with_blocks), outputs(std::move(conditioned)) {
+    mean_noise_shape = noise_shape(state.sigma).mean();
     report.log_likelihood = outputs->log_likelihood();
     report.noise_stddev = outputs->noise_variance().cwiseSqrt();
     report.leave_one_out_rms = row_rms(state.residual_B - leave_one_out_mean_B());
@@ -231,7 +233,7 @@ BiasPrediction BiasModel::predict(const JointVector& q, const BiasFeatures& feat
 
 std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q, const std::vector<BiasFeatures>& features) const {
   std::vector<BiasPrediction> predictions;
-  const Vector3 noise = fitted_->outputs->noise_variance();
+  const Vector3 noise = fitted_->mean_noise_shape * fitted_->outputs->noise_variance();
   for (const OutputPrediction& at : fitted_->outputs->predict(q, features)) {
     BiasPrediction prediction;
     prediction.mean_B = at.mean + fitted_->state.offset;

@@ -36,7 +36,7 @@ struct BiasOptions {
 struct BiasPrediction {
   Vector3 mean_B = Vector3::Zero();             ///< m
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
-  Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one noisy measurement of it
+  Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one measurement as noisy as the mean of them
   Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
   double prior_share =
       1.0;  ///< posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not

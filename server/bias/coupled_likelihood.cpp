@@ -156,8 +156,12 @@ bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
   out->value = -solution->log_likelihood;
   out->gradient = VectorXd::Zero(x.size());
   const Index scales = kernel_sets() * kernel_parameters_;
+  const Index p = blocks_.column_count();
+  VectorXd inverse_diagonal;  // of A⁻¹
   for (Index d = 0; d < outputs(); ++d) {
-    const VectorXd part = contract(*solution, at.outputs[static_cast<std::size_t>(d)], d);
+    const AlignedMatrix precision = precision_of(*solution, size(), d);
+    if (d == 0) inverse_diagonal = -precision.map().diagonal().head(p);
+    const VectorXd part = contract(*solution, at.outputs[static_cast<std::size_t>(d)], precision, d);
     const Index set = prior_.shared_scales ? 0 : d;
     out->gradient.segment(set * kernel_parameters_, kernel_parameters_) += part.head(kernel_parameters_);
     out->gradient[scales + d] = part[kernel_parameters_];
@@ -165,9 +169,6 @@ bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
   }
   if (blocks_.parameter_count() > 0) {
     // ½ (1 - (A⁻¹)_kk - ŵ_k²) by each log variance.
-    const Index p = blocks_.column_count();
-    const VectorXd inverse_diagonal =
-        solution->root.matrixL().solve(MatrixXd::Identity(p, p)).colwise().squaredNorm().transpose();
     const VectorXd slope = 0.5 * (1.0 - inverse_diagonal.array() - solution->weights.array().square());
     out->gradient.tail(blocks_.parameter_count()) = solution->variance_slope.transpose() * slope;
   }
@@ -175,9 +176,9 @@ bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
   return std::isfinite(out->value) && out->gradient.allFinite();
 }
 
-VectorXd CoupledLikelihood::contract(const CoupledSolution& solution, const GpHyperparameters& at, Index output) const {
+VectorXd CoupledLikelihood::contract(const CoupledSolution& solution, const GpHyperparameters& at,
+                                     const AlignedMatrix& precision, Index output) const {
   const Index n = size();
-  const AlignedMatrix matrix = precision_of(solution, n, output);
   const Index p = solution.weights.size();
   const AlignedMatrix& features = solution.features[static_cast<std::size_t>(output)];
   const double signal = std::exp(2 * at.log_signal_stddev);
@@ -192,7 +193,7 @@ VectorXd CoupledLikelihood::contract(const CoupledSolution& solution, const GpHy
       const Index rows = std::min(kTile, n - i);
       auto g = weight.map();
       g.setZero();
-      g.topLeftCorner(rows, cols) = signal * (matrix.map().block(p + i, p + j, rows, cols) -
+      g.topLeftCorner(rows, cols) = signal * (precision.map().block(p + i, p + j, rows, cols) -
                                               alpha.segment(i, rows) * alpha.segment(j, cols).transpose());
       if (i == j) {
         g.triangularView<Eigen::StrictlyUpper>().setZero();

@@ -48,7 +48,7 @@ struct CoupledSolution {
                                                    const CoupledData& data, const CoupledHyperparameters& at);
 
 /// C⁻¹ of output d with itself: its lower triangle stands in the rows and columns of the result from p on, which is
-/// returned with A⁻¹ Hᵀ M⁻¹ before it.
+/// returned with A⁻¹ Hᵀ M⁻¹ and -A⁻¹ before it.
 [[nodiscard]] AlignedMatrix precision_of(const CoupledSolution& solution, Eigen::Index points, Eigen::Index output);
 
 /// Weak priors, as GpPrior says of one process.
@@ -78,9 +78,10 @@ class CoupledLikelihood {
   [[nodiscard]] Eigen::Index outputs() const { return data_.y.cols(); }
   [[nodiscard]] Eigen::Index kernel_sets() const { return prior_.shared_scales ? 1 : outputs(); }
   void add_prior(const Eigen::VectorXd& x, ObjectiveValue* out) const;
-  /// ½ tr((C⁻¹ - α αᵀ) dM_d) by [kernel parameters, log σ_f, log σ_n] of output d.
+  /// ½ tr((C⁻¹ - α αᵀ) dM_d) by [kernel parameters, log σ_f, log σ_n] of output d; `precision` as precision_of() gives
+  /// it.
   [[nodiscard]] Eigen::VectorXd contract(const CoupledSolution& solution, const GpHyperparameters& at,
-                                         Eigen::Index output) const;
+                                         const AlignedMatrix& precision, Eigen::Index output) const;
 
   std::shared_ptr<const Kernel> kernel_;
   LinearBlocks blocks_;

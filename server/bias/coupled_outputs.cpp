@@ -34,14 +34,19 @@ CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
   return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, 0, data.q.rows(), data.y.cols())};
 }
 
+// Variances are widened by what cross-validation shows: many hyperparameters, and the drift of a measuring session,
+// make the process surer than it should be.
 class CoupledOutputs final : public BiasOutputs {
  public:
   CoupledOutputs(LinearBlocks blocks, CoupledPosterior posterior, const CoupledHyperparameters& at,
                  const VectorXd& noise_shape)
-      : blocks_(std::move(blocks)), posterior_(std::move(posterior)), noise_shape_(noise_shape) {
+      : blocks_(std::move(blocks)),
+        posterior_(std::move(posterior)),
+        noise_shape_(noise_shape),
+        widening_(std::max(1.0, posterior_.surprise())) {
     noise_variance_.resize(static_cast<Index>(at.outputs.size()));
     for (Index d = 0; d < count(); ++d)
-      noise_variance_[d] = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+      noise_variance_[d] = widening_ * std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
   }
 
   MatrixXd mean(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
@@ -61,7 +66,7 @@ class CoupledOutputs final : public BiasOutputs {
       for (CoupledPrediction& at :
            posterior_.predict(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()))) {
         const double share = share_of(at.covariance.diagonal(), at.prior);
-        predictions.push_back({std::move(at.mean), std::move(at.covariance), share});
+        predictions.push_back({std::move(at.mean), widening_ * at.covariance, share});
       }
     }
     return predictions;
@@ -70,12 +75,12 @@ class CoupledOutputs final : public BiasOutputs {
   VectorXd noise_variance() const override { return noise_variance_; }
   VectorXd log_likelihood() const override { return VectorXd::Constant(1, posterior_.log_likelihood()); }
   MatrixXd leave_one_out_mean() const override { return posterior_.leave_one_out_mean(); }
-  MatrixXd leave_one_out_variance() const override { return posterior_.leave_one_out_variance(); }
+  MatrixXd leave_one_out_variance() const override { return widening_ * posterior_.leave_one_out_variance(); }
   VectorXd leave_one_out_share() const override {
     const MatrixXd& variance = posterior_.leave_one_out_variance();
     VectorXd share(variance.rows());
     for (Index i = 0; i < share.size(); ++i) {
-      const VectorXd known = variance.row(i).transpose() - noise_shape_[i] * noise_variance_;
+      const VectorXd known = variance.row(i).transpose() - noise_shape_[i] / widening_ * noise_variance_;
       share[i] = share_of(known, posterior_.prior().row(i).transpose());
     }
     return share;
@@ -90,6 +95,7 @@ class CoupledOutputs final : public BiasOutputs {
   LinearBlocks blocks_;
   CoupledPosterior posterior_;
   VectorXd noise_shape_;
+  double widening_;  // of all variances, by what poses left out together show
   VectorXd noise_variance_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/base/check.h"
 #include "server/bias/numerics.h"
 
 namespace trammel {
@@ -14,6 +15,8 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr Index kRun = 10;  // poses that follow one another are left out together
+constexpr Index kFolds = 3;
 constexpr Index kTargets = 64;  // at once: the matrices pass through the cache once for all of them
 
 }  // namespace
@@ -31,7 +34,7 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   for (const AlignedMatrix& matrix : solution->eliminated) {
     posterior.explained_.emplace_back(matrix.map().block(n + 1, 0, p, n));
   }
-  posterior.leave_one_out(*solution, data);
+  posterior.leave_out(*solution, data);
   posterior.column_scale_ = solution->column_scale;
   posterior.prior_.resize(n, data.y.cols());
   posterior.weights_ = solution->weights.cwiseProduct(solution->column_scale);
@@ -54,24 +57,57 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   return posterior;
 }
 
-// With B the rows and columns of C⁻¹ that belong to one pose: covariance B⁻¹, error B⁻¹ α.
-void CoupledPosterior::leave_one_out(const CoupledSolution& solution, const CoupledData& data) {
+// With B the rows and columns of C⁻¹ that belong to the poses left out: covariance B⁻¹, error B⁻¹ α.
+void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledData& data) {
   const Index outputs = data.y.cols();
   leave_one_out_mean_.resize(points_, outputs);
   leave_one_out_variance_.resize(points_, outputs);
   std::vector<MatrixXd> halves;  // L⁻¹ Hᵀ M⁻¹
   for (const MatrixXd& explained : explained_) halves.emplace_back(solution.root.matrixL().solve(explained));
-  for (Index i = 0; i < points_; ++i) {
-    MatrixXd B(outputs, outputs);
+  // Errors and their variances, output by output.
+  const auto left_out = [&](const std::vector<Index>& poses) {
+    const auto count = static_cast<Index>(poses.size());
+    MatrixXd stacked(solution.A.rows(), outputs * count);
+    VectorXd alpha(outputs * count);
     for (Index d = 0; d < outputs; ++d) {
-      const auto row = static_cast<std::size_t>(d);
-      for (Index e = 0; e < outputs; ++e) B(d, e) = -halves[row].col(i).dot(halves[static_cast<std::size_t>(e)].col(i));
-      B(d, d) -= solution.eliminated[row](i, i);
+      stacked.middleCols(d * count, count) = halves[static_cast<std::size_t>(d)](Eigen::all, poses);
+      alpha.segment(d * count, count) = solution.alpha.col(d)(poses);
     }
-    const MatrixXd covariance = B.inverse();
-    leave_one_out_mean_.row(i) = data.y.row(i) - (covariance * solution.alpha.row(i).transpose()).transpose();
-    leave_one_out_variance_.row(i) = covariance.diagonal().transpose();
+    MatrixXd B = MatrixXd::Zero(outputs * count, outputs * count);
+    B.selfadjointView<Eigen::Lower>().rankUpdate(stacked.transpose(), -1.0);
+    for (Index d = 0; d < outputs; ++d) {
+      B.block(d * count, d * count, count, count).triangularView<Eigen::Lower>() -=
+          solution.eliminated[static_cast<std::size_t>(d)].map()(poses, poses);
+    }
+    const Index size = B.rows();
+    const Index padded = padded_rows(size + 1);
+    AlignedMatrix matrix(padded % 64 == 0 ? padded + kTargetBlock : padded, padded);
+    matrix.map().topLeftCorner(size, size).triangularView<Eigen::Lower>() = B;
+    matrix.map().row(size).head(size) = alpha.transpose();
+    AlignedMatrix work(numerics().work_size(size + 1), 1);
+    double log_det = 0;
+    const bool positive = numerics().inverse_root(size, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
+    TRAMMEL_CHECK(positive);
+    VectorXd variance(size);
+    for (Index i = 0; i < size; ++i) variance[i] = matrix.map().col(i).segment(i, size - i).squaredNorm();
+    return std::pair<VectorXd, VectorXd>(-matrix.map().row(size).head(size).transpose(), variance);
+  };
+  for (Index i = 0; i < points_; ++i) {
+    const auto [error, variance] = left_out({i});
+    leave_one_out_mean_.row(i) = data.y.row(i) - error.transpose();
+    leave_one_out_variance_.row(i) = variance.transpose();
   }
+  double surprise = 0;
+  for (Index fold = 0; fold < kFolds; ++fold) {
+    std::vector<Index> poses;
+    for (Index i = 0; i < points_; ++i) {
+      if (i / kRun % kFolds == fold) poses.push_back(i);
+    }
+    if (poses.empty()) break;
+    const auto [error, variance] = left_out(poses);
+    surprise += error.cwiseAbs2().cwiseQuotient(variance).sum();
+  }
+  surprise_ = surprise / static_cast<double>(points_ * outputs);
 }
 
 MatrixXd CoupledPosterior::mean(const MatrixXd& q, const std::vector<MatrixXd>& columns) const {

@@ -220,6 +220,15 @@ TEST(BiasModel, TrustsAPointOfLargerSigmaLess) {
   EXPECT_GT(vague.stddev_B[0], equal->predict(problem.q.row(0)).stddev_B[0]);
 }
 
+TEST(BiasModel, AMeasurementIsAsNoisyAsTheMeanOfThoseItLearnedFrom) {
+  BiasProblem problem = smooth_problem(100, 13);
+  problem.sigma.head(20).setConstant(20e-6);  // four times the variance of the median
+  const BiasModel model = fit(problem);
+  const BiasPrediction at = model.predict(JointVector::Zero(6));
+  const double noise = std::pow(at.measured_stddev_B[1], 2) - std::pow(at.stddev_B[1], 2);
+  EXPECT_NEAR(noise, (0.8 * 1 + 0.2 * 4) * std::pow(model.report().noise_stddev[1], 2), 1e-6 * noise);
+}
+
 TEST(BiasModel, SurvivesAJointThatNeverMovesAndAnOutputThatIsZero) {
   BiasProblem problem = smooth_problem(80, 14);
   problem.q.col(5).setConstant(0.3);

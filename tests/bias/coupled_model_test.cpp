@@ -110,7 +110,11 @@ TEST(CoupledModel, LeaveOneOutEqualsRestoringWithoutThePose) {
   const BiasState& all = fitted().state();
   const BiasPrediction expected = rest->predict(all.q.row(40).transpose(), all.features[40]);
   EXPECT_LT((fitted().leave_one_out_mean_B().row(40).transpose() - expected.mean_B).norm(), 1e-6 * kNoise);
-  EXPECT_LT((fitted().leave_one_out_stddev_B().row(40).transpose() - expected.measured_stddev_B).norm(), 1e-3 * kNoise);
+  // One factor widens all stddevs, learned from 150 poses here and from 149 there.
+  const Vector3 ratio = fitted().leave_one_out_stddev_B().row(40).transpose().cwiseQuotient(expected.measured_stddev_B);
+  EXPECT_NEAR(ratio[0], 1, 0.02);
+  EXPECT_NEAR(ratio[1], ratio[0], 1e-4);
+  EXPECT_NEAR(ratio[2], ratio[0], 1e-4);
   EXPECT_NEAR(fitted().leave_one_out_prior_share()[40], expected.prior_share, 1e-3);
 }
 

@@ -204,6 +204,38 @@ TEST_P(EveryBlock, LeavingAPoseOutEqualsFittingWithoutIt) {
   }
 }
 
+TEST_P(EveryBlock, CrossValidationSurprisesAsFittingWithoutARunOfPosesSays) {
+  const LinearBlocks blocks = this->blocks();
+  const CoupledData data = this->data();
+  const CoupledHyperparameters at = some_hyperparameters(blocks);
+  const auto posterior = CoupledPosterior::condition(make_kernel("se"), blocks, data, at);
+  ASSERT_TRUE(posterior.has_value());
+  double surprise = 0;
+  for (Index fold = 0; fold < 3; ++fold) {
+    const auto is_out = [fold](Index i) { return i / 10 % 3 == fold; };
+    std::vector<Index> kept;
+    for (Index i = 0; i < GetParam().count; ++i) {
+      if (!is_out(i)) kept.push_back(i);
+    }
+    const CoupledData rest =
+        arm_data(blocks, data.q(kept, Eigen::all), data.y(kept, Eigen::all), data.noise_shape(kept));
+    const auto without = CoupledPosterior::condition(make_kernel("se"), blocks, rest, at, VarianceForm::kExact);
+    ASSERT_TRUE(without.has_value());
+    for (Index i = 0; i < GetParam().count; ++i) {
+      if (!is_out(i)) continue;
+      const JointVector q = data.q.row(i);
+      const CoupledPrediction expected = predict_one(*without, q, arm_columns(blocks, q));
+      for (Index d = 0; d < 3; ++d) {
+        const double noise = std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+        surprise +=
+            std::pow(data.y(i, d) - expected.mean[d], 2) / (expected.covariance(d, d) + noise * data.noise_shape[i]);
+      }
+    }
+  }
+  surprise /= static_cast<double>(3 * GetParam().count);
+  EXPECT_NEAR(posterior->surprise(), surprise, 1e-6 * surprise);
+}
+
 void expect_gradient_of_differences(const CoupledLikelihood& likelihood, const VectorXd& x) {
   ObjectiveValue evaluation;
   ASSERT_TRUE(likelihood.evaluate(x, &evaluation));
