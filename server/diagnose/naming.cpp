@@ -14,6 +14,7 @@ constexpr Index kRepetitions = 100;
 constexpr double kSureFrequency = 0.9;
 constexpr double kRivalFrequency = 0.03;
 constexpr double kMargin = 3;           // nat: odds of 20 to 1
+constexpr double kBeyondDoubt = 5;      // nat: odds of 150 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
 constexpr double kRelated = 0.4;        // the same of 0.63
 constexpr double kTouches = 0.1;        // less is a coincidence
@@ -21,6 +22,7 @@ constexpr double kAsGood = 6;           // of strength
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kPathStep = 0.2;       // rad
 constexpr double kAtOnce = 0.05;        // of the poses
+constexpr double kShapeOdds = 0.05;     // nat, of strength: the same
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
 bool no_rival(const Cause& named, const Cause& other) {
@@ -129,8 +131,10 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     // Another cause may be there as well: only what makes much of this effect is a rival for it.
     const bool related = of_effect.strength > kRelated * whole;
     const bool as_likely = related && seen.score[place] - seen.score[f] < kMargin;
-    const bool wins =
-        naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency && of_effect.strength > kTouches * whole;
+    // Repetitions tell how often such data decide; these data may have decided.
+    const bool decided = seen.score[place] - seen.score[f] > std::max(kBeyondDoubt, kShapeOdds * best.strength);
+    const bool wins = naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency &&
+                      of_effect.strength > kTouches * whole && !decided;
     if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
   }
   for (const Cause& rival : untestable_rivals(cause, problem.batch())) {
