@@ -140,7 +140,7 @@ void add_train(CLI::App& app, Action& chosen) {
                       "What to identify instead of the cell's error sources: M0, M1 (base), M2 (+ geometry), M3 (+ "
                       "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
   command->add_option("--bias", arguments->bias,
-                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ... or none");
+                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none or auto");
   command->add_option("--from", arguments->from,
                       "Model file of the same robot to start from: all but the sources of --refit stay as they are");
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
