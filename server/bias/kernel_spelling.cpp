@@ -100,7 +100,7 @@ class Reader {
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
       return refused(
-          "bias kernel `{}`: `{}` is unknown; known are none (alone), {}, and to be added joint_map, "
+          "bias kernel `{}`: `{}` is unknown; known are none and auto (alone), {}, and to be added joint_map, "
           "parameters",
           all_, name, kernel_names());
     if (!take('(')) return kernel;

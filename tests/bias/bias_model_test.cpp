@@ -296,9 +296,10 @@ TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
 
   BiasOptions options;
   options.kernel = "sea";
-  expect_refused(good, options,
-                 "bias kernel `sea`: `sea` is unknown; known are none (alone), se, matern32, matern52, periodic, "
-                 "rational_quadratic, linear, white, and to be added joint_map, parameters");
+  expect_refused(
+      good, options,
+      "bias kernel `sea`: `sea` is unknown; known are none and auto (alone), se, matern32, matern52, periodic, "
+      "rational_quadratic, linear, white, and to be added joint_map, parameters");
   options.kernel = "se";
   options.starts = 0;
   expect_refused(good, options, "bias fit: 0 starts, at least 1");

@@ -217,7 +217,8 @@ TEST(Kernel, ALoneWordIsThatKernelItself) {
 
 TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
   const std::string known =
-      "known are none (alone), se, matern32, matern52, periodic, rational_quadratic, linear, white, and to be added "
+      "known are none and auto (alone), se, matern32, matern52, periodic, rational_quadratic, linear, white, and to be "
+      "added "
       "joint_map, parameters";
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"se + gauss", "bias kernel `se + gauss`: `gauss` is unknown; " + known},
