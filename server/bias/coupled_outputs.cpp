@@ -50,11 +50,11 @@ class CoupledOutputs final : public BiasOutputs {
   }
 
   MatrixXd mean(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
-    MatrixXd mean(q.rows(), count());
-    for (Index first = 0; first < q.rows(); first += kTargets) {
-      const Index many = std::min(kTargets, q.rows() - first);
-      mean.middleRows(first, many) =
-          posterior_.mean(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()));
+    TRAMMEL_CHECK(static_cast<Index>(features.size()) == q.rows());
+    MatrixXd mean = posterior_.own_mean(q);
+    for (Index i = 0; i < q.rows(); ++i) {
+      const MatrixXd H = blocks_.columns(q.row(i).transpose(), features[static_cast<std::size_t>(i)]);
+      for (Index d = 0; d < count(); ++d) mean(i, d) += H.row(d).dot(posterior_.weights());
     }
     return mean;
   }

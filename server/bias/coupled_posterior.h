@@ -23,12 +23,13 @@ class CoupledPosterior {
                                                                  const CoupledHyperparameters& at,
                                                                  VarianceForm form = VarianceForm::kCompressed);
 
-  /// At the rows of `q`; `columns`: H there, not scaled, as CoupledData has it. Many at once cost a tenth of one by
-  /// one.
+  /// At the rows of `q`; `columns`: H there, not scaled, as CoupledData has it. Where kExact was not asked for, poses
+  /// whose covariance with the target is too small to matter are passed over: the variance of an output is then off by
+  /// less than 0.003 of its noise's (bound: DECISIONS.md).
   [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
                                                        const std::vector<Eigen::MatrixXd>& columns) const;
-  /// The means alone, M x D.
-  [[nodiscard]] Eigen::MatrixXd mean(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns) const;
+  /// What the outputs' own processes add to H w, M x D.
+  [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
   /// p, of the columns as they are (not scaled).
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
@@ -47,9 +48,17 @@ class CoupledPosterior {
  private:
   CoupledPosterior() = default;
   void leave_out(const CoupledSolution& solution, const CoupledData& data);
-  // L⁻¹ R_dᵀ, p x M.
-  [[nodiscard]] Eigen::MatrixXd half_covariance(const Eigen::MatrixXd& q, const Eigen::MatrixXd& scaled,
-                                                Eigen::Index d) const;
+  /// What one output contributes at some targets.
+  struct Part {
+    Eigen::MatrixXd R;      // p x M: R_dᵀ
+    Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
+    Eigen::VectorXd prior;  // of both parts
+  };
+  // Rising: those whose covariance matters; none where no inverse is kept.
+  [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
+  [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
+  // R A⁻¹ Rᵀ of target i.
+  [[nodiscard]] Eigen::MatrixXd shared_covariance(const std::vector<Part>& parts, Eigen::Index i) const;
   // Of a few targets at once.
   void predict_few(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns,
                    std::vector<CoupledPrediction>* out) const;
@@ -59,8 +68,10 @@ class CoupledPosterior {
   std::vector<GpHyperparameters> hyperparameters_;
   std::vector<GaussianProcess> outputs_;  // of y_d - H_d ŵ
   std::vector<AlignedMatrix> features_;
-  std::vector<Eigen::MatrixXd> explained_;  // D: Hᵀ M⁻¹, p x N
-  Eigen::LLT<Eigen::MatrixXd> root_;        // of A
+  std::vector<Eigen::MatrixXd> explained_;    // D: Hᵀ M⁻¹, p x N
+  std::vector<std::vector<double>> inverse_;  // D: M⁻¹, lower triangle row after row; empty: not needed
+  std::vector<double> passed_over_;           // D: root sum of squares of the covariances that do not matter
+  AlignedMatrix packed_root_;                 // L⁻¹ of A = L Lᵀ, as Numerics packs it
   Eigen::VectorXd column_scale_;
   Eigen::VectorXd weights_;
   double log_likelihood_ = 0;

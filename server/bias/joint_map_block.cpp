@@ -39,15 +39,21 @@ class JointMapBlock final : public LinearBlock {
     return Eigen::Vector2d(kAmplitudeSpread, kKneeSpread).replicate(shape.by_joint.cols(), 1);
   }
 
-  // For each joint J_j, then J_j cos(h q_j) and J_j sin(h q_j).
+  // For each joint J_j, then J_j cos(h q_j) and J_j sin(h q_j), each harmonic the one before turned by q_j.
   void columns(const JointVector& q, const BiasFeatures& features, Eigen::Ref<MatrixXd> out) const override {
     for (Index j = 0; j < features.by_joint.cols(); ++j) {
-      const auto J = features.by_joint.col(j);
+      const Vector6 J = features.by_joint.col(j);
+      const double cosine = std::cos(q[j]);
+      const double sine = std::sin(q[j]);
+      double c = 1;
+      double s = 0;
       out.col(kColumns * j) = J;
       for (Index h = 1; h <= kHarmonics; ++h) {
-        const double angle = static_cast<double>(h) * q[j];
-        out.col(kColumns * j + 2 * h - 1) = std::cos(angle) * J;
-        out.col(kColumns * j + 2 * h) = std::sin(angle) * J;
+        const double turned = c * cosine - s * sine;
+        s = s * cosine + c * sine;
+        c = turned;
+        out.col(kColumns * j + 2 * h - 1) = c * J;
+        out.col(kColumns * j + 2 * h) = s * J;
       }
     }
   }

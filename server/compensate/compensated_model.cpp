@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "server/base/check.h"
-#include "server/bias/kernel_spelling.h"
 #include "server/base/units.h"
+#include "server/bias/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/robot/inverse_kinematics.h"
 
@@ -170,7 +170,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     else
       joints.status = InverseStatus::kOk;
     joints.q = context.q;
-    result.X_BT_wanted = predict(context, 0.0).X_BT_nominal;
+    result.X_BT_wanted = parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context);
   } else {
     result.X_BT_wanted = target.X_BT;
     if (target.conf) {
@@ -208,6 +208,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   const auto settled = [&] {
     return missing.head<3>().norm() < options.tolerance && missing.tail<3>().norm() < kRotationTolerance;
   };
+  // Until it settles only the mean is asked for: the variance costs a hundred times as much.
   while (!settled() && result.iterations < options.max_iterations) {
     ++result.iterations;
     result.X_BT_commanded.translation() += missing.head<3>();
@@ -215,9 +216,9 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     joints = nominal_joints(result.X_BT_commanded, context.q);
     if (joints.status != InverseStatus::kOk) return why(joints.status);
     context.q = joints.q;
-    prediction = predict(context, bias_weight);
-    missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
+    missing = pose_difference(result.X_BT_wanted, pose_B(context, bias_weight));
   }
+  if (result.iterations > 0) prediction = predict(context, bias_weight);
   result.q = joints.q;
   result.error_after = missing.head<3>().norm();
   result.stddev = prediction.stddev_B.norm();

@@ -168,6 +168,8 @@ class CompensatedModel {
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const BiasPrediction* bias,
                                         std::optional<double> bias_weight) const;
+  /// X_BT as predict() expects it, and nothing else.
+  [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
   /// Covariance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
   /// approached, how warm the arm is.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,

@@ -46,6 +46,16 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
   return predictions;
 }
 
+Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) const {
+  const PoseContext context = completed(asked);
+  const std::optional<BiasModel>& bias = inside_->bias;
+  Pose X_BT = parts().physics.X_WB.inverse() * parts().physics.pose_W(context);
+  if (!bias || bias_weight == 0) return X_BT;
+  X_BT.translation() +=
+      bias_weight * (bias->needs_features() ? bias->mean_B(context.q, features(context)) : bias->mean_B(context.q));
+  return X_BT;
+}
+
 Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                                const Vector3& p_B) const {
   const PhysicalModel& physics = parts().physics;

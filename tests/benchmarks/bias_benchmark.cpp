@@ -21,6 +21,7 @@
 #include "server/bias/bias_model.h"
 #include "server/bias/gaussian_process.h"
 #include "server/bias/hyperparameter_search.h"
+#include "server/trainer/train.h"
 #include "tests/bias/bias_data.h"
 #include "tests/support/outside.h"
 #include "tests/support/temporary_folder.h"
@@ -91,6 +92,70 @@ void mean_and_stddev(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(model.predict_all(q));
 }
 
+// ---- coupled: a bias on top of M3 of a virtual robot with gear errors, asked as a cell asks -----------------------
+
+// Trained once for each number of poses; hundreds of columns.
+const CompensatedModel& coupled_model(int poses) {
+  static std::map<int, CompensatedModel> models;
+  const auto known = models.find(poses);
+  if (known != models.end()) return known->second;
+  TrainOptions options;
+  options.level = "M3";
+  options.bias = "matern52 + joint_map + parameters";
+  VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  for (const char* spec : {"joint_map:1@9", "joint_map:2@7", "joint_map:3@8"}) {
+    const auto map = make_error_source(spec, *robot.truth.cell);
+    TRAMMEL_CHECK(map.has_value());
+    const Index first = add_source(robot.truth, *map);
+    robot.truth.values.segment(first, static_cast<Index>((*map)->parameters().size())).setConstant(4e-5);
+  }
+  auto model = train(robot.truth.cell, test::measured(robot, poses, 11), options);
+  TRAMMEL_CHECK(model.has_value());
+  return models.emplace(poses, *std::move(model)).first->second;
+}
+
+struct CoupledTargets {
+  MatrixXd q;
+  std::vector<BiasFeatures> features;
+};
+
+CoupledTargets coupled_targets(const CompensatedModel& model, Index count) {
+  CoupledTargets targets;
+  const MatrixXd& known = model.parts().bias->q;
+  targets.q.resize(count, known.cols());
+  std::mt19937_64 random(7);
+  for (Index i = 0; i < count; ++i) {
+    for (Index j = 0; j < known.cols(); ++j)
+      targets.q(i, j) = std::uniform_real_distribution(model.parts().q_min(j), model.parts().q_max(j))(random);
+    PoseContext context = model.parts().bias_contexts.front();
+    context.q = targets.q.row(i);
+    targets.features.push_back(model.features(context));
+  }
+  return targets;
+}
+
+void coupled_mean(benchmark::State& state) {
+  const CompensatedModel& model = coupled_model(static_cast<int>(state.range(0)));
+  const CoupledTargets targets = coupled_targets(model, state.range(1));
+  for (auto _ : state) benchmark::DoNotOptimize(model.bias()->mean_all_B(targets.q, targets.features));
+}
+
+void coupled_mean_and_stddev(benchmark::State& state) {
+  const CompensatedModel& model = coupled_model(static_cast<int>(state.range(0)));
+  const CoupledTargets targets = coupled_targets(model, state.range(1));
+  for (auto _ : state) benchmark::DoNotOptimize(model.bias()->predict_all(targets.q, targets.features));
+}
+
+void coupled_correction(benchmark::State& state) {
+  const CompensatedModel& model = coupled_model(static_cast<int>(state.range(0)));
+  const CoupledTargets targets = coupled_targets(model, 1);
+  const PoseContext& context = model.parts().bias_contexts.front();
+  Target target;
+  target.joint_target = true;
+  target.seed = targets.q.row(0);
+  for (auto _ : state) benchmark::DoNotOptimize(model.correct(target, context.tool, context.payload));
+}
+
 void sizes(benchmark::internal::Benchmark* benchmark) {
   for (const int count : {300, 800, 1200, 2000}) benchmark->Arg(count);
 }
@@ -103,6 +168,9 @@ BENCHMARK(full_fit)->Apply(sizes)->Arg(5000)->Unit(benchmark::kMillisecond);
 BENCHMARK(restore)->Apply(sizes)->Unit(benchmark::kMillisecond);
 BENCHMARK(mean)->Apply(sizes_and_targets)->Unit(benchmark::kMicrosecond);
 BENCHMARK(mean_and_stddev)->Apply(sizes_and_targets)->Unit(benchmark::kMicrosecond);
+BENCHMARK(coupled_mean)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);
+BENCHMARK(coupled_mean_and_stddev)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);
+BENCHMARK(coupled_correction)->Arg(1200)->Unit(benchmark::kMicrosecond);
 
 // ---- beside scikit-learn
 // ----------------------------------------------------------------------------------------------

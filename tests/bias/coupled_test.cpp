@@ -278,6 +278,34 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryBlock,
                                          Case{"both_97", Blocks::kBoth, 97}),
                          [](const auto& test) { return test.param.name; });
 
+TEST(CoupledPosterior, PassesOverPosesThatAreTooFarAwayToMatterAndNoOthers) {
+  const LinearBlocks blocks = made(Blocks::kBoth);
+  const MatrixXd q = turns(220, 53);
+  CoupledHyperparameters at = some_hyperparameters(blocks);
+  for (GpHyperparameters& output : at.outputs) {
+    output.kernel.array() += std::log(0.1);
+    output.log_signal_stddev = std::log(5 * kSignal);
+  }
+  const CoupledData data = arm_data(blocks, q, gear_residual(q, kNoise, 54), uneven_noise(q.rows()));
+  const auto fast = CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at);
+  const auto exact = CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at, VarianceForm::kExact);
+  ASSERT_TRUE(fast && exact);
+  double moved = 0;
+  const MatrixXd targets = turns(30, 55) * 0.5;
+  for (const auto& target : targets.rowwise()) {
+    const MatrixXd H = arm_columns(blocks, target);
+    const CoupledPrediction a = predict_one(*fast, target, H);
+    const CoupledPrediction b = predict_one(*exact, target, H);
+    EXPECT_EQ(a.mean, b.mean);
+    for (Index d = 0; d < 3; ++d) {
+      const double noise = 0.5 * std::exp(2 * at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+      EXPECT_NEAR(a.covariance(d, d), b.covariance(d, d), 0.003 * noise);
+      moved = std::max(moved, std::abs(a.covariance(d, d) - b.covariance(d, d)) / noise);
+    }
+  }
+  EXPECT_GT(moved, 1e-9) << "nothing was passed over";
+}
+
 TEST(CoupledPosterior, SaysThatAnErrorOfTheFirstJointIsAcrossTheArmAndNotAlongIt) {
   const LinearBlocks blocks = made(Blocks::kJointMap);
   const MatrixXd q = turns(40, 51);
