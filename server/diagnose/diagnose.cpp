@@ -11,6 +11,7 @@
 #include "server/diagnose/effect.h"
 #include "server/diagnose/findings.h"
 #include "server/diagnose/folds.h"
+#include "server/diagnose/naming.h"
 #include "server/diagnose/next_poses.h"
 #include "server/diagnose/recovery.h"
 #include "server/diagnose/search.h"
@@ -189,6 +190,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   }
   doubt_what_was_not_recorded(surrogates, recorded, diagnosis.findings);
   fill_unexplained(diagnosis, found, after, all);
+  doubt_beside(diagnosis.unexplained, diagnosis.findings);
   diagnosis.verdict = verdict_of(diagnosis);
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
@@ -196,9 +198,11 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   for (const ErrorSourcePtr& source : found.before.model.sources) diagnosis.sources_before.push_back(source->name());
   diagnosis.sources_after = diagnosis.sources_before;
   for (const Finding& finding : diagnosis.findings) {
-    // Which number of a cause it is may stay open: the cause as a whole is identified anyway.
+    // Which number of a cause it is may stay open: the cause as a whole is identified anyway. And a more general
+    // description does the same to the poses.
     const bool sure = std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
-      return other.cause == finding.cause.cause && other.joint == finding.cause.joint;
+      return (other.cause == finding.cause.cause && other.joint == finding.cause.joint) ||
+             is_description_of(other, finding.cause);
     });
     // A list of sources says by its row where a cause begins; in a batch whose rows were moved that row is another.
     const bool at_a_row = !sorted || finding.cause.pose_id.empty();

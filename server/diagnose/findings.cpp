@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInterval95 = 1.959963984540;
+constexpr double kDwarfed = 0.25;  // of the size of what is unknown
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -34,6 +35,29 @@ Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, con
   const double amplitude = value.norm();
   const Eigen::Vector2d slope = amplitude > 0 ? Eigen::Vector2d(value / amplitude) : Eigen::Vector2d::UnitX();
   return {name, "urad", 1e6 * amplitude, 1e6 * kInterval95 * std::sqrt(slope.dot(covariance * slope))};
+}
+
+/// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a cosine
+/// of every harmonic, rad.
+Estimate peak_to_peak_of(const MeasurementBatch& batch, int joint, const VectorXd& values, const MatrixXd& covariance) {
+  const auto functions = [&](double q) {
+    VectorXd f(values.size());
+    for (Index h = 0; 2 * h + 1 < f.size(); ++h) {
+      f(2 * h) = std::sin(static_cast<double>(h + 1) * q);
+      f(2 * h + 1) = std::cos(static_cast<double>(h + 1) * q);
+    }
+    return f;
+  };
+  VectorXd lowest;
+  VectorXd highest;
+  for (const Measurement& m : batch.measurements) {
+    const VectorXd here = functions(m.context.q(joint));
+    if (lowest.size() == 0 || values.dot(here) < values.dot(lowest)) lowest = here;
+    if (highest.size() == 0 || values.dot(here) > values.dot(highest)) highest = here;
+  }
+  const VectorXd across = highest - lowest;
+  return {"peak_to_peak", "urad", 1e6 * values.dot(across),
+          1e6 * kInterval95 * std::sqrt(across.dot(covariance * across))};
 }
 
 std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::string& source, const Cause& cause,
@@ -57,6 +81,8 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
     estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
   } else if (cause.cause == "encoder_eccentricity") {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
+  } else if (cause.cause == "joint_map" && values.size() > 0) {
+    estimates.push_back(peak_to_peak_of(problem.batch(), cause.joint, values, covariance));
   }
   if (!cause.parameter.empty()) {
     const OwnEstimate own = own_estimate(problem, source, estimated.change, estimated.covariance);
@@ -161,6 +187,15 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     findings.push_back(std::move(finding));
   }
   return findings;
+}
+
+void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings) {
+  if (!unexplained.present) return;
+  for (Finding& finding : findings) {
+    if (finding.source.empty() || finding.effect_rms > kDwarfed * unexplained.rms) continue;
+    finding.could_also_be.push_back({"unknown", -1, "", "", {}});
+    finding.action = "find first what is unknown here: it is several times larger";
+  }
 }
 
 HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {

@@ -8,6 +8,9 @@ namespace trammel {
 /// everything else that was found, effects, strengths and what each gains on poses held out.
 [[nodiscard]] std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem);
 
+/// Beside something unknown that is several times larger a small effect may well be part of it: its name is not sure.
+void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings);
+
 /// Errors of poses held out (blocks of a cross-validation), before and after.
 struct HeldOut {
   ErrorFigures before, after;

@@ -141,14 +141,16 @@ class Search {
     return all;
   }
 
-  /// Adds `one`'s source, in the form that predicts best, and identifies everything anew. False, and nothing is
-  /// changed, where poses held out are predicted no better with it.
-  Result<bool> extend(Accepted& one) {
+  /// Adds `one`'s source, instead of that of `poorer` where there is one, in the form that predicts best, and
+  /// identifies everything anew. False, and nothing is changed, where poses held out are predicted no better with it.
+  Result<bool> extend(Accepted& one, const Accepted* poorer = nullptr) {
     const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
     double least = held_out_square(result_.after, weight);
+    PriorModel start = result_.after;
+    if (poorer != nullptr) remove_from(start, poorer->in_model);
     std::optional<PriorModel> best;
     for (const std::string& spelling : spellings(one.source)) {
-      PriorModel extended = result_.after;
+      PriorModel extended = start;
       if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
       refine(extended, result_.batch, result_.unnamed);
       const double square = held_out_square(extended, weight);
@@ -161,6 +163,13 @@ class Search {
     if (!best) return false;
     result_.after = std::move(*best);
     return true;
+  }
+
+  /// The map of that joint among what is accepted: a second one is more of the first.
+  auto known_map(const Cause& cause) {
+    return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
+      return cause.cause == "joint_map" && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
+    });
   }
 
   void renew_chance(const std::vector<FamilyPtr>& families, const Background& background) {
@@ -186,7 +195,9 @@ class Search {
     const Background background(background_columns(problem, result_.unnamed));
     const Scan seen = scan(families, {background}, problem.residual(), chance_);
     const auto open = [&](std::size_t f) {
-      return families[f]->named() && families[f]->predicts() && !is_closed(*families[f], seen.best[f]);
+      const auto map = known_map(families[f]->cause(seen.best[f]));
+      return families[f]->named() && families[f]->predicts() && !is_closed(*families[f], seen.best[f]) &&
+             (map == result_.accepted.end() || &*map == &one);
     };
     auto place = seen.strongest(open);
     if (place) place = simplest(families, seen, *place, open);
@@ -291,9 +302,14 @@ class Search {
     const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
     one.naming_frequency = naming.frequency;
     one.could_also_be = naming.could_also_be;
-    const Result<bool> extended = extend(one);
+    const auto poorer = known_map(one.cause);
+    const Result<bool> extended = extend(one, poorer == result_.accepted.end() ? nullptr : &*poorer);
     if (!extended) return extended;
     if (*extended) {
+      if (poorer != result_.accepted.end()) {
+        one.p_value = std::min(one.p_value, poorer->p_value);
+        result_.accepted.erase(poorer);
+      }
       result_.accepted.push_back(std::move(one));
     } else {
       closed_.push_back(one.cause);

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
+#include "server/diagnose/findings.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_robot.h"
 
 // An effect is hidden by a simulation that shares nothing with the server's; the diagnosis sees a batch, a cell and a
 // robot file and must find it, or say that it cannot. A bounded part of what diagnose_benchmark does at length.
@@ -195,6 +198,36 @@ TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnoth
   EXPECT_EQ(moved.findings[0].cause, in_order.findings[0].cause);
   EXPECT_NE(in_order.sources_after, in_order.sources_before);
   EXPECT_EQ(moved.sources_after, moved.sources_before);
+}
+
+TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
+  std::vector<Finding> findings(2);
+  findings[0].source = findings[1].source = "wrist_coupling";
+  findings[0].effect_rms = 4e-6;
+  findings[1].effect_rms = 12e-6;
+  doubt_beside({true, {"q2"}, 33e-6, 1e-6}, findings);
+  EXPECT_EQ(findings[0].could_also_be, (std::vector<Cause>{{"unknown", -1, "", "", {}}}));
+  EXPECT_TRUE(findings[1].could_also_be.empty());
+}
+
+TEST(MapsOfJoints, AreOneFindingAJointAlsoWhereFineDetailShowsOnlyBesideAllElse) {
+  const auto cell = test::cell_7();
+  VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const char* spec : {"joint_map:2@20", "joint_map:3@20", "joint_map:5@20"}) {
+    const Eigen::Index first = add_source(robot.truth, test::demand(make_error_source(spec, *cell)));
+    for (Eigen::Index k = 0; k < 40; ++k) {
+      const double size = k < 12 ? 3e-4 : 2e-5;
+      robot.truth.values(first + k) = size * std::sin(static_cast<double>(k * k + first));
+    }
+  }
+  const Diagnosis diagnosis = test::demand(diagnose(cell, test::measured(robot, 300, 71), quick()));
+  std::set<int> joints;
+  for (const Finding& finding : diagnosis.findings) {
+    if (finding.cause.cause != "joint_map") continue;
+    EXPECT_TRUE(joints.insert(finding.cause.joint).second);
+  }
+  EXPECT_EQ(joints, (std::set<int>{1, 2, 4})) << diagnosis.sentence;
+  EXPECT_LT(diagnosis.after.rms, 0.05 * diagnosis.before.rms);
 }
 
 TEST(NextPoses, TellApartWhatTheBatchConfoundsMoreThanRandomOnesWould) {
