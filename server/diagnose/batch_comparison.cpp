@@ -148,8 +148,10 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   Fit fit;
   fit.residual = fitting.residual;
   double inside = 0;
+  double all = 0;
   for (int i = 0; i < n; ++i) {
     const double cost = fitting.square[static_cast<std::size_t>(i)];
+    all += cost;
     if (cost > limit()) {
       fit.outliers.push_back(i);
     } else {
@@ -162,6 +164,7 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   fit.score = inside + limit() * outliers + off.dot(fitting.prior * off) + k * std::log(3.0 * n) + places * std::log(n);
   const double freedom = 3 * (n - outliers) - k;
   fit.misfit = freedom > 0 ? inside / freedom : inside;
+  fit.misfit_all = all / std::max(3 * n - k, 1);
   fit.explains =
       freedom > 0 && fit.misfit <= kGoodMisfit && outliers <= std::max<double>(kFewOutliers, kMostOutliers * n);
   return fit;

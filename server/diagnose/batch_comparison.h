@@ -25,7 +25,8 @@ struct Alternative {
 
 struct Fit {
   double score = 0;
-  double misfit = 0;  ///< chi^2 per degree of freedom of the inliers
+  double misfit = 0;      ///< chi^2 per degree of freedom of the inliers
+  double misfit_all = 0;  ///< the same of all poses
   bool explains = false;
   std::vector<int> outliers;
   Eigen::Matrix3Xd residual;  ///< m

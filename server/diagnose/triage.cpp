@@ -120,7 +120,7 @@ class Judge {
 
 Triage Judge::told(const Tried& none) const {
   Triage triage;
-  triage.misfit = std::sqrt(none.fit.misfit);
+  triage.misfit = std::sqrt(none.fit.misfit_all);
   if (tried_.empty()) {
     triage.verdict = TriageVerdict::kPoisoned;
     triage.learn = false;

@@ -147,6 +147,17 @@ TEST_F(TriageTest, WhatNothingExplainsIsPoisoned) {
   EXPECT_FALSE(poisoned.learn);
 }
 
+TEST_F(TriageTest, ABatchOfWhichNoPoseFitsIsAsManyDeviationsOffAsItIs) {
+  MeasurementBatch batch = batch_of(robot_as_it_was());
+  double way = 1;
+  for (Measurement& m : batch.measurements) m.p_W += Vector3(2e-3 * (way = -way), 0, 0);
+  const Triage poisoned = triaged(batch);
+  ASSERT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
+  EXPECT_NEAR(poisoned.effect_rms, 2e-3, 2e-4);
+  EXPECT_GT(poisoned.misfit, 20) << poisoned.sentence;
+  EXPECT_EQ(poisoned.sentence.find("(0 times"), std::string::npos) << poisoned.sentence;
+}
+
 TEST_F(TriageTest, TooFewPosesAreNotJudged) {
   MeasurementBatch batch = batch_of(robot_with("tool", {5e-3, 0, 0}));
   batch.measurements.resize(5);
