@@ -1,6 +1,7 @@
 #include "clients/cli/diagnose_text.h"
 
 #include "server/base/units.h"
+#include "server/diagnose/wording.h"
 #include "server/measurement/csv_table.h"
 #include "server/report/figures_json.h"
 #include "server/report/html.h"
@@ -190,9 +191,9 @@ std::string limits_text(const ordered_json& diagnosis) {
 std::string next_poses_text(const ordered_json& diagnosis) {
   if (diagnosis.at("next_poses").empty()) return "";
   const ordered_json& worth = diagnosis.at("next_poses_for");
-  std::string text = fmt::format("\nNext poses, to tell apart {} (uncertainty {:.3g} now, {:.3g} with them):\n",
-                                 causes_text(worth.at("separate")), worth.at("stddev_now").get<double>(),
-                                 worth.at("stddev_expected").get<double>());
+  std::string text = fmt::format("\nNext poses, to tell apart {} (uncertain by {} now, by {} with them):\n",
+                                 causes_text(worth.at("separate")), uncertain_by(worth.at("stddev_now")),
+                                 uncertain_by(worth.at("stddev_expected")));
   for (const ordered_json& pose : diagnosis.at("next_poses")) {
     text += " ";
     for (const ordered_json& value : pose) text += fmt::format("{:>10.2f}", value.get<double>());
@@ -243,6 +244,7 @@ ordered_json extension_json(const Extension& extension) {
   return {{"better", extension.gain.beyond_chance()},
           {"z", extension.gain.z},
           {"z_limit", PairedGain::kBeyondChance},
+          {"judged_without", extension.gain.left_out},
           {"error_sources", extension.sources},
           {"of_the_cell", extension.lasting},
           {"held_out_poses", extension.after.parts().validation->poses},

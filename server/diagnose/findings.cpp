@@ -37,8 +37,8 @@ Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, con
   return {name, "urad", 1e6 * amplitude, 1e6 * kInterval95 * std::sqrt(slope.dot(covariance * slope))};
 }
 
-/// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a cosine
-/// of every harmonic, rad.
+/// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a
+/// cosine of every harmonic, rad.
 Estimate peak_to_peak_of(const MeasurementBatch& batch, int joint, const VectorXd& values, const MatrixXd& covariance) {
   const auto functions = [&](double q) {
     VectorXd f(values.size());

@@ -141,4 +141,10 @@ std::string sentence_for(const Diagnosis& d) {
   return text;
 }
 
+std::string uncertain_by(double share_of_effect) {
+  if (share_of_effect >= 1) return "more than the effect itself";
+  const double percent = 100 * share_of_effect;
+  return percent < 10 ? fmt::format("{:.2g} % of the effect", percent) : fmt::format("{:.0f} % of the effect", percent);
+}
+
 }  // namespace trammel

@@ -14,5 +14,7 @@ namespace trammel {
 [[nodiscard]] std::string why_no_next_poses(const std::vector<Finding>& findings);
 /// The verdict for people.
 [[nodiscard]] std::string sentence_for(const Diagnosis& diagnosis);
+/// What is confounded, of which a standard deviation is known in shares of the effect found: `6 % of the effect`.
+[[nodiscard]] std::string uncertain_by(double share_of_effect);
 
 }  // namespace trammel

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
+#include "server/diagnose/wording.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
@@ -196,9 +197,10 @@ std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   const NextPoses& next = diagnosis.next_poses;
   if (next.q.empty()) return paragraph(sentence_of("None suggested: " + next.none_because));
   return fmt::format(
-             "<p>They tell {} apart. The uncertainty of what is confounded, relative to the effect found: {:.3g} now, "
-             "<b>{:.3g} expected with these poses</b>, {:.3g} with as many random ones.</p>\n",
-             html_text(causes_in_words(next.separates)), next.stddev_now, next.stddev_expected, next.stddev_random) +
+             "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with these "
+             "poses</b>, by {} with as many random ones.</p>\n",
+             html_text(causes_in_words(next.separates)), uncertain_by(next.stddev_now),
+             uncertain_by(next.stddev_expected), uncertain_by(next.stddev_random)) +
          next_poses_table(next.q, cell);
 }
 

@@ -71,6 +71,23 @@ MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64
   return batch;
 }
 
+Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
+  constexpr double kMostLeftOut = 0.1;
+  std::set<int> rows;
+  for (const SuspectedPose& pose : diagnosis.suspects) {
+    if (pose.held_out) rows.insert(pose.row);
+  }
+  Judges judges{std::move(held_out), {}};
+  auto& all = judges.batch.measurements;
+  if (static_cast<double>(rows.size()) > kMostLeftOut * static_cast<double>(all.size())) return judges;
+  std::erase_if(all, [&](const Measurement& m) {
+    if (!rows.contains(m.row)) return false;
+    judges.left_out.push_back(m.pose_id);
+    return true;
+  });
+  return judges;
+}
+
 Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                          const Diagnosis& diagnosis, TrainOptions options) {
   if (const Status allowed = check_can_extend(diagnosis); !allowed) return tl::make_unexpected(allowed.error());
@@ -85,7 +102,9 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const Measurem
   Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
   if (!checked) return tl::make_unexpected(checked.error());
   fill_velocity(*checked);
-  const PairedGain gain = paired_gain(*before, *after, split_batch(*checked, 0, options.seed).validation);
+  Judges judges = judges_of(diagnosis, split_batch(*checked, 0, options.seed).validation);
+  PairedGain gain = paired_gain(*before, *after, judges.batch);
+  gain.left_out = std::move(judges.left_out);
   return Extension{sources, lasting_sources(sources), std::move(*before), std::move(*after), gain};
 }
 

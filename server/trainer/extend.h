@@ -36,6 +36,15 @@ struct Extension {
 /// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for validation.
 [[nodiscard]] MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed);
 
+/// Rows that one model is judged against another by.
+struct Judges {
+  MeasurementBatch batch;
+  std::vector<std::string> left_out;  ///< pose ids
+};
+/// The rows held out, without those that the diagnosis says fit neither model: they would judge both by how badly they
+/// were measured. Where these are more than a tenth it is no matter of single poses, and all of them judge.
+[[nodiscard]] Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out);
+
 /// Trains on the training rows of `batch` with the cell's error sources and with those of the diagnosis. Refuses what
 /// check_can_extend() and train() refuse, and a batch without rows held out: nothing could be judged.
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,

@@ -24,10 +24,16 @@ PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& a
 }
 
 std::string to_string(const PairedGain& gain) {
-  return fmt::format("{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit {:.2f})",
+  return fmt::format("{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit {:.2f}){}",
                      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses,
                      gain.beyond_chance() ? "better beyond chance" : "not better beyond chance", gain.z,
-                     PairedGain::kBeyondChance);
+                     PairedGain::kBeyondChance, judged_without(gain.left_out));
+}
+
+std::string judged_without(const std::vector<std::string>& poses) {
+  if (poses.empty()) return "";
+  return fmt::format("; judged without {}, which {} neither model", fmt::join(poses, ", "),
+                     poses.size() > 1 ? "fit" : "fits");
 }
 
 }  // namespace trammel

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "server/compensate/compensated_model.h"
 
 namespace trammel {
@@ -13,6 +16,7 @@ struct PairedGain {
   int poses = 0;
   double rms_before = 0, rms_after = 0;  ///< m, Euclidean
   double z = 0;
+  std::vector<std::string> left_out;  ///< pose ids held out as well, that fit neither model and judge none
 
   /// Chance alone would say so in one of a hundred cases.
   static constexpr double kBeyondChance = 2.326;
@@ -24,7 +28,10 @@ struct PairedGain {
 /// Of the compensated positions of `batch`, which both models know the tools of.
 [[nodiscard]] PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
                                      const MeasurementBatch& batch);
-/// `0.0210 mm rms, 0.0250 mm before on the same 30 poses: better beyond chance (z 4.1, limit 2.33)`
+/// `0.0210 mm rms, before 0.0250 mm on the same 30 poses held out: better beyond chance (z 4.10, limit 2.33); judged
+/// without p7, which fits neither model`
 [[nodiscard]] std::string to_string(const PairedGain& gain);
+/// `; judged without p7, which fits neither model`; empty where there are none.
+[[nodiscard]] std::string judged_without(const std::vector<std::string>& poses);
 
 }  // namespace trammel

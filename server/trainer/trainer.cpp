@@ -563,7 +563,7 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
 }
 
 Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
-                     const std::string& note) {
+                     const std::string& note, const Diagnosis* diagnosis) {
   progress.stage = JobStage::kStoring;
   progress.what.clear();
   progress.share = 1;
@@ -572,8 +572,11 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
     const std::lock_guard lock(activation_mutex_);
     MeasurementBatch whole = batch;
     fill_velocity(whole);
-    const MeasurementBatch held_out = split_batch(whole, options_.validation_share, options_.seed).validation;
-    Acceptance verdict = judge(model, registry_.in_force(progress.cell).get(), held_out, bar, options_.accept_ratio);
+    Judges judges{split_batch(whole, options_.validation_share, options_.seed).validation, {}};
+    if (diagnosis != nullptr) judges = judges_of(*diagnosis, std::move(judges.batch));
+    Acceptance verdict =
+        judge(model, registry_.in_force(progress.cell).get(), judges.batch, bar, options_.accept_ratio);
+    verdict.message += judged_without(judges.left_out);
     if (!note.empty()) verdict.message += "; the batch: " + note;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());

@@ -17,6 +17,8 @@
 
 namespace trammel {
 
+struct Diagnosis;
+
 struct TrainerOptions {
   int queue_capacity = 16;        ///< jobs waiting; one more is refused (kBusy) and nothing is stored
   int max_poses = 5000;           ///< of one training, all its batches together; memory grows with the square
@@ -136,9 +138,10 @@ class Trainer {
                                                                          const std::stop_token& stop);
   [[nodiscard]] TrainOptions train_options(const StoredJob& job, const Cell& cell, const JobProgress& progress,
                                            const std::stop_token& stop);
-  /// Stores the model and, if it is good enough, puts it in force. `note` goes with the outcome.
+  /// Stores the model and, if it is good enough, puts it in force. `note` goes with the outcome; poses that fit neither
+  /// model by a `diagnosis` do not judge.
   [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
-                            const std::string& note);
+                            const std::string& note, const Diagnosis* diagnosis = nullptr);
   /// Ends a job that makes no model.
   [[nodiscard]] Status finish(JobProgress progress, const std::string& outcome);
   void report(const JobProgress& progress);

@@ -130,7 +130,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   };
   const auto model = train(cell_found, *batch, training);
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), Bar::kBetter, "");
+  return keep(*model, *batch, std::move(progress), Bar::kBetter, "", &*diagnosis);
 }
 
 Status Trainer::finish(JobProgress progress, const std::string& outcome) {

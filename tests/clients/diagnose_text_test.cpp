@@ -15,7 +15,21 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
        {"ambiguous: The gear of joint 3", "gear_transmission of joint 3", "order = 48.503 ± 0.040",
         "half of the 95 % interval", "could also be: geometry d6", "Have the gear of joint 3 looked at",
         "9 um rms that depend on q4", "pose p28 (row 29)",
-        "would not have shown: backlash: needs both approach directions (joints 2)", "uncertainty 2.4 now, 0.3"}) {
+        "would not have shown: backlash: needs both approach directions (joints 2)", "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  }
+}
+
+TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  diagnosis.findings[0].may_begin_at = {{"p7", 8, 120.0}, {"p8", 9, {}}};
+  const Cause payload = {"payload", -1, "", "", {}};
+  diagnosis.not_separable = {{{payload, {"compliance", -1, "C2", "", {}}}, 1},
+                             {{payload, {"compliance", -1, "C3", "", {}}}, 1}};
+  diagnosis.could_not_have_seen.push_back({payload, 0.9, 1e-5, {}, "a second known payload"});
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  for (const char* part : {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
+                           "payload from compliance:C2, compliance:C3 (needs a second known payload)"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }

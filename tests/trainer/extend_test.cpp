@@ -46,6 +46,44 @@ TEST_F(Extend, ByAnotherCauseIsNotCalledBetterThanItIs) {
   EXPECT_GT(extension.after.parts().validation->compensated.rms, 0.15e-3);
 }
 
+/// Row of a pose held out, and the batch with that pose off by `by` (m).
+std::pair<int, MeasurementBatch> with_one_off(MeasurementBatch batch, const Vector3& by) {
+  for (Measurement& m : batch.measurements) {
+    if (m.set != MeasurementSet::kValidation) continue;
+    m.p_W += by;
+    return {m.row, batch};
+  }
+  return {-1, batch};
+}
+
+TEST_F(Extend, IsNotJudgedByAHeldOutPoseThatFitsNeitherModelAndSaysSo) {
+  diagnosis_.sources_after = {"base", kGear};
+  const auto [row, batch] = with_one_off(batch_, {0, 0, 0.02});
+  const Extension counted = test::demand(extend(cell_, batch, diagnosis_, {}));
+  EXPECT_FALSE(counted.gain.beyond_chance()) << "a pose 20 mm off decides: " << to_string(counted.gain);
+  diagnosis_.suspects = {{"bad", row, 0.02, "", true}};
+  const Extension extension = test::demand(extend(cell_, batch, diagnosis_, {}));
+  EXPECT_TRUE(extension.gain.beyond_chance()) << to_string(extension.gain);
+  EXPECT_EQ(extension.gain.poses, 29);
+  EXPECT_EQ(extension.gain.left_out.size(), 1U);
+  EXPECT_NE(to_string(extension.gain).find("judged without " + extension.gain.left_out.at(0)), std::string::npos);
+  EXPECT_EQ(extension.after.parts().validation->poses, 30) << "it still counts in the figures";
+}
+
+TEST_F(Extend, IsJudgedByAllPosesWhereMoreThanATenthFitNeitherModel) {
+  int held_out = 0;
+  for (const Measurement& m : batch_.measurements) {
+    if (m.set != MeasurementSet::kValidation) continue;
+    if (++held_out <= 4) diagnosis_.suspects.push_back({m.pose_id, m.row, 1e-3, "", true});
+  }
+  MeasurementBatch rows = split_batch(batch_, 0, 1).validation;
+  EXPECT_EQ(judges_of(diagnosis_, rows).batch.measurements.size(), 30U);
+  diagnosis_.suspects.pop_back();
+  EXPECT_EQ(judges_of(diagnosis_, rows).batch.measurements.size(), 27U);
+  diagnosis_.suspects[0].held_out = false;
+  EXPECT_EQ(judges_of(diagnosis_, rows).left_out.size(), 2U) << "one that was learned from is not held out";
+}
+
 TEST_F(Extend, IsRefusedWhereNothingWasNamed) {
   diagnosis_.verdict = Verdict::kUnknown;
   diagnosis_.sentence = "Something depends on joint 4.";
