@@ -55,8 +55,7 @@ std::vector<std::string> limits_of(const MeasurementBatch& batch, const RepeatSt
   if (none([](const Measurement& m) { return !m.context.direction.empty(); }))
     limits.emplace_back(
         "no approach directions: backlash was looked for as if each joint came from where it was at the row before, "
-        "and "
-        "cannot be named for certain");
+        "and cannot be named for certain");
   if (repeats.degrees_of_freedom == 0)
     limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
   return limits;
@@ -140,9 +139,11 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   if (!checked) return tl::make_unexpected(checked.error());
   const bool sorted = put_in_order_of_time(*checked);
   fill_velocity(*checked);
-  const BatchSplit split = split_batch(*checked, 0, options.seed);
+  BatchSplit split = split_batch(*checked, 0, options.seed);
   MergedRepeats merged = merge_repeats(split.train, cell->tracker.sigma);
-  const Surrogates surrogates = put_in_surrogates(merged.batch);
+  const Surrogates surrogates = put_in_surrogates(*checked);
+  take_over_surrogates(surrogates, *checked, merged.batch);
+  take_over_surrogates(surrogates, *checked, split.validation);
   if (merged.batch.measurements.size() < static_cast<std::size_t>(kFewestPoses)) {
     return refused("batch {}: {} poses to diagnose, at least {}", batch.id, merged.batch.measurements.size(),
                    kFewestPoses);

@@ -89,8 +89,9 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
   if (in_time && cause.cause != "thermal_growth" &&
       !recorded([](const PoseContext& c) { return c.temperature.has_value(); }))
     rivals.push_back({"thermal_growth", -1, "", "", {}});
-  const bool of_joints = cause.joint >= 0 || cause.cause == "geometry";
-  if (of_joints && is_path(batch) && !recorded([](const PoseContext& c) { return c.velocity.has_value(); }))
+  // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
+  if (cause.cause != "outlier" && is_path(batch) &&
+      !recorded([](const PoseContext& c) { return c.velocity.has_value(); }))
     rivals.push_back({"time_lag", -1, "", "", {}});
   return rivals;
 }

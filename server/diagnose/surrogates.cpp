@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "server/diagnose/naming.h"
 
@@ -48,6 +49,17 @@ Surrogates put_in_surrogates(MeasurementBatch& batch) {
     ++row;
   }
   return put;
+}
+
+void take_over_surrogates(const Surrogates& surrogates, const MeasurementBatch& whole, MeasurementBatch& part) {
+  std::map<int, const PoseContext*> by_index;
+  for (const Measurement& m : whole.measurements) by_index[m.context.index] = &m.context;
+  for (Measurement& m : part.measurements) {
+    const PoseContext& from = *by_index.at(m.context.index);
+    if (surrogates.time) m.context.time = from.time;
+    if (surrogates.temperature) m.context.temperature = from.temperature;
+    if (surrogates.direction) m.context.direction = from.direction;
+  }
 }
 
 void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch) {

@@ -12,6 +12,10 @@ struct Surrogates {
 /// Fills in what no row has. `batch` is in its order of measuring; nothing is put into a continuous path.
 [[nodiscard]] Surrogates put_in_surrogates(MeasurementBatch& batch);
 
+/// Gives rows of `whole` that went into `part` what was put in there: by then some have been set aside or merged, and
+/// none of them says where the joint was before.
+void take_over_surrogates(const Surrogates& surrogates, const MeasurementBatch& whole, MeasurementBatch& part);
+
 /// Takes them out again.
 void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch);
 

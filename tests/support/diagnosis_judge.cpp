@@ -126,6 +126,20 @@ void count_findings(const Diagnosis& diagnosis, const HiddenCase& hidden, Judgem
   judgement.right_or_open = static_cast<int>(std::count(mentioned.begin(), mentioned.end(), true));
 }
 
+/// What an effect whose circumstance nobody recorded still depends on.
+std::string traceable_dependence(const HiddenCause& cause) {
+  return cause.joint > 0 ? fmt::format("q{}", cause.joint) : "time";
+}
+
+/// `left_open`: what a reader is left with.
+bool is_right_of_unrecorded(const Diagnosis& diagnosis, const HiddenCase& hidden, const std::vector<Cause>& left_open) {
+  const bool unnamed = diagnosis.findings.empty();
+  if (hidden.truth.untraceable && unnamed) return true;
+  const std::vector<std::string> on = {traceable_dependence(hidden.truth.causes.front())};
+  if (unnamed) return diagnosis.unexplained.present && diagnosis.unexplained.depends_on == on;
+  return std::any_of(left_open.begin(), left_open.end(), [&](const Cause& cause) { return means(cause, hidden, 0); });
+}
+
 }  // namespace
 
 Judgement judge(const Diagnosis& diagnosis, const HiddenCase& hidden) {
@@ -139,6 +153,7 @@ Judgement judge(const Diagnosis& diagnosis, const HiddenCase& hidden) {
   judgement.set_holds_truth = std::any_of(mentioned.begin(), mentioned.end(), [&](const Cause& cause) {
     return !hidden.truth.causes.empty() && means(cause, hidden, 0);
   });
+  judgement.unrecorded_rightly = !hidden.truth.causes.empty() && is_right_of_unrecorded(diagnosis, hidden, mentioned);
   judgement.over_confident = judgement.right + judgement.wrong > 0;
   if (hidden.truth.question == Question::kUnknown) {
     std::vector<std::string> on = diagnosis.unexplained.depends_on;

@@ -28,7 +28,9 @@ struct Judgement {
                                  ///< was found, among what is said not to be told apart
   bool over_confident = false;   ///< one single name for what cannot be told
   bool unknown_rightly = false;  ///< unknown, of the right joints
-  std::string said;              ///< `backlash:2`, `tool|geometry:d6`, `unknown q4`, `nothing`
+  bool unrecorded_rightly = false;  ///< of a cause whose column was withheld: found, however doubtful, or unknown of
+                                    ///< what it depends on; nothing or unknown where it cannot be traced
+  std::string said;                 ///< `backlash:2`, `tool|geometry:d6`, `unknown q4`, `nothing`
   std::vector<NumberFound> numbers;
 };
 

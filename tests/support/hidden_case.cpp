@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "tests/support/hidden_columns.h"
 #include "tests/support/hidden_files.h"
 #include "tests/support/hidden_panel.h"
 
@@ -386,8 +387,10 @@ HiddenCase hide(const HiddenSpec& spec) {
   if (draft.permuted) permute(still, frames, draft.random);
   add_noise(draft.world, frames, draft.random);
   if (draft.truth.question == Question::kNothing) draft.truth.causes.clear();
+  draft.truth.untraceable = contains(draft.names, "backlash") && contains(spec.withheld, "dir") &&
+                            draft.plan.approach == Approach::kBothSides;
   const std::string& cell_ranges = spec.cell_ranges.empty() ? draft.plan.ranges : spec.cell_ranges;
-  return {batch_text(draft.world, frames),
+  return {without_columns(batch_text(draft.world, frames), spec.withheld),
           cell_text(draft.world, draft.belief, cell_ranges),
           robot_text(),
           draft.truth,

@@ -34,6 +34,8 @@ struct HiddenSpec {
   std::string ranges = "calibration";
   std::string cell_ranges = {};  ///< that the cell allows; empty: `ranges`
   double validation_share = 0;
+  /// Columns of the batch that nobody recorded, by how their names begin: `dir`, `time_s`.
+  std::vector<std::string> withheld = {};
 };
 
 struct HiddenTruth {
@@ -45,6 +47,8 @@ struct HiddenTruth {
   /// First and last row from which each effect may be said to begin: what lies between makes too little difference to
   /// be noticed. Both -1 where it has no beginning.
   std::vector<std::pair<int, int>> begins;
+  /// What it follows was neither recorded nor can be told from the order of the rows.
+  bool untraceable = false;
 };
 
 struct HiddenCase {
