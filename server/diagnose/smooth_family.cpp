@@ -18,8 +18,9 @@ constexpr double kSmallestSpan = 0.035;  // rad
 constexpr Index kFunctionsOfOne = 16;
 constexpr Index kFunctionsOfEach = 7;                      // of two
 constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
-constexpr int kSizes = 17;                                 // a quarter of a decade apart
-constexpr double kSizeRatio = 1.7782794100389228;          // 10^(1/4)
+constexpr double kTelling = 1e-4;                  // of the largest deviation: what a function may have and be left out
+constexpr int kSizes = 17;                         // a quarter of a decade apart
+constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
 
 /// Angular frequency of a sine of the box.
 double frequency(Index k) { return kPi * static_cast<double>(k + 1) / (2 * kBox); }
@@ -110,13 +111,16 @@ class SmoothFamily : public Family {
 
  private:
   void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
-    const Index each = deviations_[scale].size();
+    std::vector<Index> telling;
+    for (Index k = 0; k < deviations_[scale].size(); ++k) {
+      if (deviations_[scale](k) > kTelling * deviations_[scale].maxCoeff()) telling.push_back(k);
+    }
     std::vector<Index> taken;
     const Index apart = information.cols() / static_cast<Index>(g_.size());
     for (Index first = 0; first < information.cols(); first += apart) {
-      for (Index k = first; k < first + each; ++k) taken.push_back(k);
+      for (const Index k : telling) taken.push_back(first + k);
     }
-    const VectorXd deviation = deviations_[scale].replicate(static_cast<Index>(g_.size()), 1);
+    const VectorXd deviation = VectorXd(deviations_[scale](telling)).replicate(static_cast<Index>(g_.size()), 1);
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information(taken, taken) *
                                                         deviation.asDiagonal());
     const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
