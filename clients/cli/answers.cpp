@@ -100,9 +100,17 @@ JointUncertainty joint_uncertainty(const ErrorPrediction& prediction) {
           stddev_mm.x(),        stddev_mm.y(),        stddev_mm.z()};
 }
 
+Result<RotationUncertainty> rotation_uncertainty(const ErrorPrediction& prediction) {
+  if (!prediction.rotation_stddev_B)
+    return refused("the model learned no orientations: its training poses did not all have one, or its bias is none");
+  const Vector3& s = *prediction.rotation_stddev_B;
+  return RotationUncertainty{to_deg(s.x()), to_deg(s.y()), to_deg(s.z())};
+}
+
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
   std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id", kPoseColumns);
   if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2,slx_mm,sly_mm,slz_mm";
+  if (!predictions.turned.empty()) text += ",srx_deg,sry_deg,srz_deg";
   text += "\n";
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
     const client::PredictedError& item = predictions.items[i];
@@ -115,6 +123,10 @@ std::string predictions_csv(const JointList& list, const Predictions& prediction
       const JointUncertainty& u = predictions.together[i];
       for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2, u.slx_mm, u.sly_mm, u.slz_mm})
         text += fmt::format(",{:.9g}", value);
+    }
+    if (!predictions.turned.empty()) {
+      const RotationUncertainty& u = predictions.turned[i];
+      for (const double value : {u.srx_deg, u.sry_deg, u.srz_deg}) text += fmt::format(",{:.9g}", value);
     }
     text += "\n";
   }
@@ -135,6 +147,10 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
                      {"in_domain", item.in_domain},
                      {"nominal", pose_json(item.nominal)},
                      {"predicted", pose_json(item.predicted)}});
+    if (!predictions.turned.empty()) {
+      const RotationUncertainty& u = predictions.turned[i];
+      items.back().update({{"srx_deg", u.srx_deg}, {"sry_deg", u.sry_deg}, {"srz_deg", u.srz_deg}});
+    }
     if (predictions.together.empty()) continue;
     const JointUncertainty& u = predictions.together[i];
     items.back().update({{"cxy_mm2", u.cxy_mm2},

@@ -26,11 +26,19 @@ struct JointUncertainty {
 };
 [[nodiscard]] JointUncertainty joint_uncertainty(const ErrorPrediction& prediction);
 
+/// About the axes of the base, of one measurement of the orientation.
+struct RotationUncertainty {
+  double srx_deg = 0, sry_deg = 0, srz_deg = 0;
+};
+/// Refuses a prediction of a model that did not learn orientations.
+[[nodiscard]] Result<RotationUncertainty> rotation_uncertainty(const ErrorPrediction& prediction);
+
 /// Answers with the id of the one model that gave them.
 struct Predictions {
   std::string model_id;
-  std::vector<client::PredictedError> items;    ///< one a pose of the list
-  std::vector<JointUncertainty> together = {};  ///< likewise where it was asked for, else none
+  std::vector<client::PredictedError> items;     ///< one a pose of the list
+  std::vector<JointUncertainty> together = {};   ///< likewise where it was asked for, else none
+  std::vector<RotationUncertainty> turned = {};  ///< likewise
 };
 struct Corrections {
   std::string model_id;
@@ -38,7 +46,8 @@ struct Corrections {
   std::vector<client::CorrectedTarget> items;  ///< one a target
 };
 
-/// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for, `cxy_mm2` ... `slz_mm`.
+/// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for, `cxy_mm2` ... `slz_mm` and
+/// `srx_deg` ...
 [[nodiscard]] std::string predictions_csv(const JointList& list, const Predictions& predictions);
 [[nodiscard]] nlohmann::ordered_json predictions_json(const JointList& list, const Predictions& predictions);
 

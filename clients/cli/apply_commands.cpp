@@ -19,6 +19,7 @@ struct ApplyArguments {
   std::string model, input, tool, payload, output, json;
   ServiceOptions service;
   bool covariance = false;
+  bool orientation = false;
 };
 
 /// Tool and payload of each pose: the file's, else the command line's.
@@ -92,6 +93,10 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
     for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
       if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
+      if (!arguments.orientation) continue;
+      const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
+      if (!turned) return refused("{}: {}", arguments.model, turned.error().message);
+      predictions.turned.push_back(*turned);
     }
   }
   return predictions;
@@ -100,6 +105,8 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
   if (arguments.covariance)
     return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
+  if (arguments.orientation)
+    return failure(ErrorCode::kUsage, "--orientation needs a model file: a service does not send these deviations");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
@@ -211,6 +218,8 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--covariance", arguments->covariance,
       "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
       "of the true error, without the tracker's own (slx_mm ...)");
+  command->add_flag("--orientation", arguments->orientation,
+                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
 }

@@ -20,6 +20,26 @@ std::string nlpd_line(const Evaluation& evaluation) {
                      nlpd_in_mm(*evaluation.nlpd));
 }
 
+std::string orientation_lines(const std::optional<OrientationFigures>& orientation) {
+  if (!orientation) return "";
+  std::string text = fmt::format(
+      "  orientation, deg rms of {} poses: nominal {:.4f}, calibrated {:.4f}, compensated {:.4f}", orientation->poses,
+      to_deg(orientation->nominal), to_deg(orientation->calibrated), to_deg(orientation->compensated));
+  if (orientation->coverage_95)
+    text += fmt::format("; {:.1f} % of rotations inside their 95 % interval", 100 * *orientation->coverage_95);
+  return text + "\n";
+}
+
+ordered_json orientation_json(const OrientationFigures& orientation) {
+  ordered_json json = {{"poses", orientation.poses}};
+  const auto level = [](double rms) { return ordered_json{{"rms_deg", to_deg(rms)}}; };
+  json["nominal"] = level(orientation.nominal);
+  json["calibrated"] = level(orientation.calibrated);
+  json["compensated"] = level(orientation.compensated);
+  if (orientation.coverage_95) json["coverage_95"] = *orientation.coverage_95;
+  return json;
+}
+
 }  // namespace
 
 std::string evaluation_table(const Evaluation& evaluation) {
@@ -28,7 +48,7 @@ std::string evaluation_table(const Evaluation& evaluation) {
          figures_line("compensated", evaluation.compensated) +
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
                      evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
-         nlpd_line(evaluation);
+         nlpd_line(evaluation) + orientation_lines(evaluation.orientation);
 }
 
 ordered_json evaluation_json(const Evaluation& evaluation) {
@@ -40,10 +60,18 @@ ordered_json evaluation_json(const Evaluation& evaluation) {
   json["coverage_95"] = evaluation.coverage_95;
   json["in_domain"] = evaluation.in_domain;
   if (evaluation.nlpd) json["nlpd"] = nlpd_in_mm(*evaluation.nlpd);
+  if (evaluation.orientation) json["orientation"] = orientation_json(*evaluation.orientation);
   return json;
 }
 
 namespace {
+
+std::string rotation_text(const CompensatedModel::Parts& parts) {
+  if (parts.rotation_bias) return "the bias corrects orientations too\n";
+  if (!parts.bias || parts.oriented_poses == 0) return "";
+  return fmt::format("the bias corrects positions only: {} of its {} poses have an orientation, all must\n",
+                     parts.oriented_poses, parts.bias->q.rows());
+}
 
 std::string choice_text(const BiasChoice& choice) {
   std::string text = choice.sentence + "\n";
@@ -84,6 +112,7 @@ std::string model_text(const CompensatedModel& model) {
                       std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                     [](const IdentifiedParameter& p) { return p.identified; }),
                       parts.parameters.size(), parts.rank);
+  text += rotation_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
   for (const UnidentifiableCombination& combination : parts.unidentifiable) {
@@ -161,6 +190,8 @@ ordered_json model_json(const CompensatedModel& model) {
                        {"parameters", parameters},
                        {"not_identifiable", combinations},
                        {"training", evaluation_json(parts.training)}};
+  if (parts.rotation_bias) json["bias_of_orientation"] = true;
+  if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
   if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);
   if (parts.validation) json["validation"] = evaluation_json(*parts.validation);
   return json;

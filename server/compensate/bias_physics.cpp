@@ -30,6 +30,15 @@ PhysicalModel with_standard_sources(PhysicalModel physics) {
 
 }  // namespace
 
+BiasFeatures turned(const BiasFeatures& features) {
+  const auto swapped = [](const Eigen::MatrixXd& rows) {
+    Eigen::MatrixXd other(6, rows.cols());
+    other << rows.bottomRows<3>(), rows.topRows<3>();
+    return other;
+  };
+  return {swapped(features.by_joint), swapped(features.by_parameter)};
+}
+
 BiasPhysics::BiasPhysics(const PhysicalModel& physics) : whole_(with_standard_sources(physics)) {
   const std::vector<Parameter> parameters = whole_.parameters();
   prior_stddev_.resize(static_cast<Eigen::Index>(parameters.size()));

@@ -5,6 +5,9 @@
 
 namespace trammel {
 
+/// With rotations above positions: what a bias of the orientation is told.
+[[nodiscard]] BiasFeatures turned(const BiasFeatures& features);
+
 /// What a bias with blocks is told of the arm at a pose: by the same function when it is trained and when it answers.
 /// Parameters are the model's own and, where it lacks them, those of the standard sources `base`, `geometry` and
 /// `compliance` (`tool` where nobody knows the tool) at zero. So what an incomplete model leaves over is learned with

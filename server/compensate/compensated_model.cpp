@@ -24,6 +24,11 @@ std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const 
   return std::isfinite(mean) ? std::optional(mean) : std::nullopt;
 }
 
+/// Share of coordinates inside their 95 % interval.
+double coverage_95(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
+  return (error.array().abs() <= kInterval95 * stddev.array()).cast<double>().mean();
+}
+
 }  // namespace
 
 double nlpd_in_mm(double nlpd_in_m) { return nlpd_in_m + std::log(to_mm(1.0)); }
@@ -70,6 +75,10 @@ std::string_view to_string(CorrectionStatus status) {
 }
 
 namespace {
+
+Vector3 column_rms(const Eigen::MatrixXd& rows) {
+  return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
+}
 
 /// At the observations of a bias with blocks.
 Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& parts, const BiasPhysics& physics) {
@@ -123,8 +132,18 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     Result<BiasModel> bias = BiasModel::restore(state);
     if (!bias) return tl::make_unexpected(bias.error());
     inside->bias = std::move(*bias);
-    const Eigen::MatrixXd& residual_B = parts.bias->residual_B;
-    inside->bias_size_B = (residual_B.colwise().squaredNorm() / static_cast<double>(residual_B.rows())).cwiseSqrt();
+    inside->bias_size_B = column_rms(state.residual_B);
+    if (parts.rotation_bias) {
+      BiasState rotation = *parts.rotation_bias;
+      if (rotation.kernel != state.kernel || rotation.q != state.q)
+        return refused(
+            "model: the bias of the orientation is not of the same poses and kernel as that of the position");
+      for (const BiasFeatures& features : state.features) rotation.features.push_back(turned(features));
+      Result<BiasModel> turning = BiasModel::restore(rotation);
+      if (!turning) return tl::make_unexpected(turning.error());
+      inside->rotation_bias = std::move(*turning);
+      inside->rotation_bias_size_B = column_rms(rotation.residual_B);
+    }
   }
   parts.provenance.hash = content_hash(parts);
   parts.provenance.id = parts.provenance.hash.substr(0, 12);
@@ -239,6 +258,31 @@ bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
   return batch_hash(batch) == parts().provenance.batch_hash;
 }
 
+void CompensatedModel::add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,
+                                     const std::vector<ErrorPrediction>& predictions, LevelErrors* errors) const {
+  const PhysicalModel& physics = parts().physics;
+  const Pose X_BW = physics.X_WB.inverse();
+  std::vector<std::size_t> oriented;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (batch.measurements[i].R_WT) oriented.push_back(i);
+  }
+  const auto n = static_cast<Eigen::Index>(oriented.size());
+  LevelErrors::Rotations& rotation = errors->rotation;
+  rotation.nominal.resize(3, n);
+  rotation.calibrated.resize(3, n);
+  rotation.compensated.resize(3, n);
+  rotation.stddev.resize(3, inside_->rotation_bias ? n : 0);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::size_t i = oriented[static_cast<std::size_t>(k)];
+    const Matrix3 R_BT = X_BW.linear() * *batch.measurements[i].R_WT;
+    const auto error_of = [&](const Pose& X_BT) { return rotation_log(R_BT * X_BT.linear().transpose()); };
+    rotation.nominal.col(k) = error_of(predictions[i].X_BT_nominal);
+    rotation.calibrated.col(k) = error_of(X_BW * physics.pose_W(completed(poses[i])));
+    rotation.compensated.col(k) = error_of(predictions[i].X_BT_predicted);
+    if (predictions[i].rotation_stddev_B) rotation.stddev.col(k) = *predictions[i].rotation_stddev_B;
+  }
+}
+
 CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch& batch) const {
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
@@ -262,6 +306,7 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
     errors.stddev.col(i) = prediction.stddev_B;
     errors.in_domain.push_back(prediction.in_domain);
   }
+  add_rotations(batch, poses, predictions, &errors);
   return errors;
 }
 
@@ -272,10 +317,19 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   evaluation.nominal = figures_of(errors.nominal);
   evaluation.calibrated = figures_of(errors.calibrated);
   evaluation.compensated = figures_of(errors.compensated);
-  evaluation.coverage_95 =
-      (errors.compensated.array().abs() <= kInterval95 * errors.stddev.array()).cast<double>().mean();
+  evaluation.coverage_95 = coverage_95(errors.compensated, errors.stddev);
   evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
+  const LevelErrors::Rotations& rotation = errors.rotation;
+  if (rotation.nominal.cols() > 0) {
+    const auto rms = [](const Eigen::Matrix3Xd& turns) {
+      return std::sqrt(turns.squaredNorm() / static_cast<double>(turns.cols()));
+    };
+    evaluation.orientation = {static_cast<int>(rotation.nominal.cols()), rms(rotation.nominal),
+                              rms(rotation.calibrated), rms(rotation.compensated), std::nullopt};
+    if (rotation.stddev.cols() > 0)
+      evaluation.orientation->coverage_95 = coverage_95(rotation.compensated, rotation.stddev);
+  }
   return evaluation;
 }
 

@@ -24,6 +24,13 @@ struct ErrorFigures {
 /// Of the errors in the columns of `e_B` (3 x N, m, not empty).
 [[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
 
+/// Orientation errors of the poses that have a measured orientation, rms of the rotation angle, rad.
+struct OrientationFigures {
+  int poses = 0;
+  double nominal = 0, calibrated = 0, compensated = 0;
+  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; where orientation is learned
+};
+
 /// The three levels of one model on one set of poses.
 struct Evaluation {
   int poses = 0;
@@ -34,6 +41,7 @@ struct Evaluation {
   /// (nlpd_in_mm). Less is better: it rewards small errors and honest stddevs. Empty where a stddev is 0, and in models
   /// of before it was kept.
   std::optional<double> nlpd;
+  std::optional<OrientationFigures> orientation;  ///< where orientations were measured
 };
 [[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
 
@@ -47,6 +55,8 @@ struct ErrorPrediction {
   Vector3 true_stddev_B = Vector3::Zero();
   /// Of one measurement, m^2, the three axes together: stddev_B is the root of its diagonal.
   Matrix3 covariance_B = Matrix3::Zero();
+  /// Of one measurement of the orientation, rad, about the axes of B; where the model learned orientations.
+  std::optional<Vector3> rotation_stddev_B;
   bool in_domain = false;  ///< false: the learned bias is not, or not fully, in error_B
   double bias_weight = 0;  ///< how much of the learned bias is, in [0, 1]: 1 in domain, 0 well outside
 };
@@ -110,6 +120,8 @@ class CompensatedModel {
     double discrepancy = 0;                  ///< m per axis, see CalibrationResult
     std::optional<BiasChoice> bias_choice;   ///< of `auto`: what was asked and what it is worth
     std::optional<BiasState> bias;           ///< without features: they follow from the physics and bias_contexts
+    std::optional<BiasState> rotation_bias;  ///< of the same poses: residual rotation vectors in B and sigma, rad
+    int oriented_poses = 0;                  ///< where only some poses of a bias had an orientation: none is learned
     std::vector<PoseContext> bias_contexts;  ///< of the bias' observations, in their order; empty without blocks
     std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
     double temperature_stddev = 0;           ///< K
@@ -146,6 +158,12 @@ class CompensatedModel {
     Eigen::Matrix3Xd nominal, calibrated, compensated;
     Eigen::Matrix3Xd stddev;  ///< expected of compensated
     std::vector<bool> in_domain;
+    /// The same of the orientations of those poses that have one, rotation vectors, rad; stddev 3 x 0 where none was
+    /// learned.
+    struct Rotations {
+      Eigen::Matrix3Xd nominal, calibrated, compensated, stddev;
+    };
+    Rotations rotation = {};
   };
   [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
   /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty. Poses of another
@@ -159,21 +177,31 @@ class CompensatedModel {
     Parts parts;
     BiasPhysics bias_physics;
     std::optional<BiasModel> bias;
+    std::optional<BiasModel> rotation_bias;
     bool bias_has_parameters = false;
-    Vector3 bias_size_B = Vector3::Zero();  // m, rms over the training poses
+    Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses
+    Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise
+  };
+  /// What the biases say at a pose.
+  struct Learned {
+    BiasPrediction position;
+    std::optional<BiasPrediction> rotation;
   };
   /// With the temperature to take where nobody says it.
   [[nodiscard]] PoseContext completed(PoseContext asked) const;
   /// `bias_weight`: to take instead of what the pose's place in the domain says.
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
-  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const BiasPrediction* bias,
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned,
                                         std::optional<double> bias_weight) const;
+  [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
   /// X_BT as predict() expects it, and nothing else.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
   /// Covariance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
   /// approached, how warm the arm is.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
+  void add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,
+                     const std::vector<ErrorPrediction>& predictions, LevelErrors* errors) const;
   [[nodiscard]] bool is_own(const MeasurementBatch& batch) const;
   explicit CompensatedModel(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
   std::shared_ptr<const Inside> inside_;

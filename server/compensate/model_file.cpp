@@ -74,6 +74,13 @@ Json to_json(const Evaluation& e) {
                {"coverage_95", e.coverage_95},
                {"in_domain", e.in_domain}};
   if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
+  if (e.orientation) {
+    json["orientation"] = {{"poses", e.orientation->poses},
+                           {"nominal_rad", e.orientation->nominal},
+                           {"calibrated_rad", e.orientation->calibrated},
+                           {"compensated_rad", e.orientation->compensated}};
+    if (e.orientation->coverage_95) json["orientation"]["coverage_95"] = *e.orientation->coverage_95;
+  }
   return json;
 }
 
@@ -86,6 +93,11 @@ Evaluation evaluation_from(const Json& json) {
   e.coverage_95 = json.at("coverage_95");
   e.in_domain = json.at("in_domain");
   if (json.contains("nlpd_of_m")) e.nlpd = json.at("nlpd_of_m").get<double>();
+  if (json.contains("orientation")) {
+    const Json& o = json.at("orientation");
+    e.orientation = {o.at("poses"), o.at("nominal_rad"), o.at("calibrated_rad"), o.at("compensated_rad"), {}};
+    if (o.contains("coverage_95")) e.orientation->coverage_95 = o.at("coverage_95").get<double>();
+  }
   return e;
 }
 
@@ -221,6 +233,8 @@ Json content_of(const CompensatedModel::Parts& parts) {
   if (parts.bias) {
     content["bias"] = to_json(*parts.bias);
     for (const PoseContext& context : parts.bias_contexts) content["bias"]["poses"].push_back(to_json(context));
+    if (parts.rotation_bias) content["rotation_bias"] = to_json(*parts.rotation_bias);
+    if (parts.oriented_poses > 0) content["oriented_poses"] = parts.oriented_poses;
   }
   if (parts.validation) content["validation"] = to_json(*parts.validation);
   return content;
@@ -284,6 +298,8 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
     if (bias.contains("poses")) {
       for (const Json& context : bias.at("poses")) parts.bias_contexts.push_back(context_from(context));
     }
+    if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
+    if (content.contains("oriented_poses")) parts.oriented_poses = content.at("oriented_poses");
   }
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   const Json& provenance = content.at("provenance");

@@ -21,38 +21,47 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
 }
 
 ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optional<double> bias_weight) const {
-  const std::optional<BiasModel>& bias = inside_->bias;
-  if (!bias) return predict(asked, nullptr, bias_weight);
-  const BiasPrediction learned =
-      bias->needs_features() ? bias->predict(asked.q, features(completed(asked))) : bias->predict(asked.q);
-  return predict(asked, &learned, bias_weight);
+  if (!inside_->bias) return predict(asked, nullptr, bias_weight);
+  return predict(asked, &learned({asked}).front(), bias_weight);
+}
+
+std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vector<PoseContext>& poses) const {
+  const BiasModel& bias = *inside_->bias;
+  Eigen::MatrixXd q(static_cast<Eigen::Index>(poses.size()), cell().robot.size());
+  std::vector<BiasFeatures> of_position, of_rotation;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    q.row(static_cast<Eigen::Index>(i)) = poses[i].q.transpose();
+    if (!bias.needs_features()) continue;
+    of_position.push_back(features(completed(poses[i])));
+    if (inside_->rotation_bias) of_rotation.push_back(turned(of_position.back()));
+  }
+  std::vector<Learned> all;
+  for (BiasPrediction& position : bias.predict_all(q, of_position)) all.push_back({std::move(position), std::nullopt});
+  if (!inside_->rotation_bias) return all;
+  std::vector<BiasPrediction> rotations = inside_->rotation_bias->predict_all(q, of_rotation);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].rotation = std::move(rotations[i]);
+  return all;
 }
 
 std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<PoseContext>& poses) const {
-  const std::optional<BiasModel>& bias = inside_->bias;
-  std::vector<BiasPrediction> learned;
-  if (bias) {
-    Eigen::MatrixXd q(static_cast<Eigen::Index>(poses.size()), cell().robot.size());
-    std::vector<BiasFeatures> features_of_poses;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      q.row(static_cast<Eigen::Index>(i)) = poses[i].q.transpose();
-      if (bias->needs_features()) features_of_poses.push_back(features(completed(poses[i])));
-    }
-    learned = bias->predict_all(q, features_of_poses);
-  }
+  std::vector<Learned> all;
+  if (inside_->bias) all = learned(poses);
   std::vector<ErrorPrediction> predictions;
   for (std::size_t i = 0; i < poses.size(); ++i)
-    predictions.push_back(predict(poses[i], bias ? &learned[i] : nullptr, std::nullopt));
+    predictions.push_back(predict(poses[i], all.empty() ? nullptr : &all[i], std::nullopt));
   return predictions;
 }
 
 Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) const {
   const PoseContext context = completed(asked);
-  const std::optional<BiasModel>& bias = inside_->bias;
   Pose X_BT = parts().physics.X_WB.inverse() * parts().physics.pose_W(context);
-  if (!bias || bias_weight == 0) return X_BT;
-  X_BT.translation() +=
-      bias_weight * (bias->needs_features() ? bias->mean_B(context.q, features(context)) : bias->mean_B(context.q));
+  if (!inside_->bias || bias_weight == 0) return X_BT;
+  const std::optional<BiasModel>& rotation = inside_->rotation_bias;
+  const BiasFeatures of_position = inside_->bias->needs_features() ? features(context) : BiasFeatures{};
+  X_BT.translation() += bias_weight * inside_->bias->mean_B(context.q, of_position);
+  if (!rotation) return X_BT;
+  const Vector3 turn_B = rotation->mean_B(context.q, rotation->needs_features() ? turned(of_position) : of_position);
+  X_BT.linear() = (rotation_exp(bias_weight * turn_B) * X_BT.linear()).eval();
   return X_BT;
 }
 
@@ -83,7 +92,34 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
   return covariance;
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const BiasPrediction* bias,
+namespace {
+
+/// How far what is left after a bias is to be trusted: figures of one kind, m or rad.
+struct Uncertainty {
+  Matrix3 identified;  ///< what the parameters leave uncertain
+  double metrology;    ///< variances of one axis: of the instrument,
+  double unlearned;    ///< and of what the physics leaves over where no bias is taken
+  Vector3 bias_size;   ///< rms over the training poses
+  double left_of_identified;
+};
+
+/// Covariance of one measurement. Noise is never less than the tracker's: a fit to few poses takes some of it for
+/// signal. What the parameters leave uncertain is part of a bias that has them; any other corrects it as far as it
+/// knows anything; where the bias does not count it counts in full. What of the bias is not taken may be missing: as
+/// much as it is there, and as it was at the training poses.
+Matrix3 with_bias(const BiasPrediction& bias, double weight, const Uncertainty& of) {
+  const Vector3 known = bias.stddev_B.cwiseAbs2();
+  const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(of.metrology);
+  const Vector3 untaken = bias.mean_B.cwiseAbs2().cwiseMax(of.bias_size.cwiseAbs2());
+  Matrix3 covariance = bias.covariance_B + (weight * of.left_of_identified + (1 - weight)) * of.identified;
+  covariance.diagonal() +=
+      weight * noise + (1 - weight) * noise.cwiseMax(of.unlearned) + (1 - weight) * (1 - weight) * untaken;
+  return covariance;
+}
+
+}  // namespace
+
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned,
                                           std::optional<double> bias_weight) const {
   const PoseContext context = completed(asked);
   const PhysicalModel& physics = parts().physics;
@@ -103,24 +139,29 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const BiasPr
   const double unlearned = metrology + parts().discrepancy * parts().discrepancy +
                            domain.growth(context.q, parts().extrapolation_slope, cell().robot);
   Matrix3 covariance = identified + unsaid;
-  if (bias == nullptr) {
+  if (learned == nullptr) {
     covariance.diagonal().array() += unlearned;
   } else {
-    prediction.in_domain &= bias->prior_share <= parts().prior_share_limit;
-    const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias->prior_share) : 0.0);
+    const BiasPrediction& bias = learned->position;
+    prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
+    const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias.prior_share) : 0.0);
     prediction.bias_weight = weight;
-    prediction.X_BT_predicted.translation() += weight * bias->mean_B;
-    // Noise is never less than the tracker's: a fit to few poses takes some of it for signal. What the parameters
-    // leave uncertain is part of a bias that has them; any other corrects it as far as it knows anything; where the
-    // bias does not count it counts in full. What of the bias is not taken may be missing: as much as it is there, and
-    // as it was at the training poses.
-    const Vector3 known = bias->stddev_B.cwiseAbs2();
-    const Vector3 noise = (bias->measured_stddev_B.cwiseAbs2() - known).cwiseMax(metrology);
-    const Vector3 untaken = bias->mean_B.cwiseAbs2().cwiseMax(inside_->bias_size_B.cwiseAbs2());
-    const double left_of_identified = inside_->bias_has_parameters ? 0.0 : bias->prior_share;
-    covariance = bias->covariance_B + (weight * left_of_identified + (1 - weight)) * identified + unsaid;
-    covariance.diagonal() +=
-        weight * noise + (1 - weight) * noise.cwiseMax(unlearned) + (1 - weight) * (1 - weight) * untaken;
+    prediction.X_BT_predicted.translation() += weight * bias.mean_B;
+    const double left = inside_->bias_has_parameters ? 0.0 : bias.prior_share;
+    covariance = with_bias(bias, weight, {identified, metrology, unlearned, inside_->bias_size_B, left}) + unsaid;
+    if (learned->rotation) {
+      const BiasPrediction& turn = *learned->rotation;
+      const Eigen::MatrixXd turned_B = X_BW.linear() * J_W.bottomRows<3>();
+      const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
+      const double unknown = inside_->bias_has_parameters ? 0.0 : turn.prior_share;
+      prediction.X_BT_predicted.linear() =
+          (rotation_exp(weight * turn.mean_B) * prediction.X_BT_predicted.linear()).eval();
+      prediction.rotation_stddev_B = with_bias(turn, weight,
+                                               {turned_B * parts().covariance * turned_B.transpose(), instrument,
+                                                instrument, inside_->rotation_bias_size_B, unknown})
+                                         .diagonal()
+                                         .cwiseSqrt();
+    }
   }
   prediction.covariance_B = covariance;
   prediction.stddev_B = covariance.diagonal().cwiseSqrt();

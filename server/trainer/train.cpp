@@ -78,6 +78,23 @@ BiasProblem problem_of(const CompensatedModel::Parts& parts, const MeasurementBa
   return problem;
 }
 
+/// Of the orientations of `batch`, if all were measured: residual rotation vectors in B and sigma in rad, at the poses
+/// of `problem`.
+std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics, const MeasurementBatch& batch,
+                                            const BiasProblem& problem) {
+  BiasProblem rotation = problem;
+  rotation.sigma.setConstant(physics.cell->tracker.sigma_rotation);
+  const Matrix3 R_BW = physics.X_WB.linear().transpose();
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const Measurement& m = batch.measurements[i];
+    if (!m.R_WT) return std::nullopt;
+    const Vector3 turn_W = rotation_log(*m.R_WT * physics.pose_W(m.context).linear().transpose());
+    rotation.residual_B.row(static_cast<Eigen::Index>(i)) = (R_BW * turn_W).transpose();
+  }
+  for (BiasFeatures& features : rotation.features) features = turned(features);
+  return rotation;
+}
+
 /// The bias that is worth it, with the physics identified anew where observations are left out.
 Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, const BiasProblem& problem,
                                              const BiasOptions& options, const LeftOut& left_out) {
@@ -90,10 +107,28 @@ Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, con
   return std::move(chosen->model);
 }
 
+/// The orientation by a process of its own, of the same kernel: what is learned of the positions stays what it is.
+Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const BiasProblem& problem,
+                         const BiasOptions& options) {
+  const std::optional<BiasProblem> rotation = rotation_problem(parts.physics, batch, problem);
+  if (!rotation) {
+    parts.oriented_poses = static_cast<int>(std::count_if(batch.measurements.begin(), batch.measurements.end(),
+                                                          [](const Measurement& m) { return m.R_WT.has_value(); }));
+    return {};
+  }
+  const Result<BiasModel> learned = BiasModel::fit(*rotation, options);
+  if (!learned) return tl::make_unexpected(learned.error());
+  parts.rotation_bias = learned->state();
+  parts.rotation_bias->features.clear();
+  return {};
+}
+
 /// The bias of `kernel` or, for `auto`, the one that is worth it. `left_out`: of `all`, without suspects.
 Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, const std::string& kernel,
                 const LeftOut& left_out, std::uint64_t seed, const std::function<bool(double)>& progress) {
   parts.bias.reset();
+  parts.rotation_bias.reset();
+  parts.oriented_poses = 0;
   parts.bias_choice.reset();
   parts.bias_contexts.clear();
   parts.prior_share_limit = 0;
@@ -112,16 +147,19 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   BiasOptions options;
   options.kernel = kernel;
   options.seed = seed;
-  options.progress = progress;
+  options.progress = [&](double share) { return progress(0.6 * share); };
   std::optional<BiasModel> bias;
+  BiasProblem problem;
   if (kernel == kAutoBias) {
-    Result<std::optional<BiasModel>> chosen = chosen_bias(parts, problem_of(parts, batch, true), options, left_out);
+    problem = problem_of(parts, batch, true);
+    Result<std::optional<BiasModel>> chosen = chosen_bias(parts, problem, options, left_out);
     if (!chosen) return tl::make_unexpected(chosen.error());
     bias = std::move(*chosen);
   } else {
     const Result<SpelledBias> spelled = spelled_bias(kernel);
     if (!spelled) return tl::make_unexpected(spelled.error());
-    Result<BiasModel> fitted = BiasModel::fit(problem_of(parts, batch, !spelled->blocks.empty()), options);
+    problem = problem_of(parts, batch, !spelled->blocks.empty());
+    Result<BiasModel> fitted = BiasModel::fit(problem, options);
     if (!fitted) return tl::make_unexpected(fitted.error());
     bias = std::move(*fitted);
   }
@@ -132,7 +170,9 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     for (const Measurement& m : batch.measurements) parts.bias_contexts.push_back(m.context);
   }
   parts.prior_share_limit = domain_limit(*bias);
-  return {};
+  options.kernel = bias->state().kernel;
+  options.progress = [&](double share) { return progress(0.6 + 0.4 * share); };
+  return add_rotation_bias(parts, batch, problem, options);
 }
 
 /// What to take the arm's temperature for where a request does not say it.

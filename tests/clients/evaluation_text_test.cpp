@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "server/base/units.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel::cli {
@@ -20,6 +21,23 @@ Evaluation evaluation() {
   evaluation.calibrated.rms = 4e-4;
   evaluation.compensated = {1e-4, 9e-5, 2e-4, 3e-4, Vector3(1e-5, 2e-5, -3e-5), Vector3(4e-5, 5e-5, 6e-5)};
   return evaluation;
+}
+
+TEST(EvaluationJson, HasAnOrientationInDegreesWhereOneWasMeasuredAndSoHasTheText) {
+  EXPECT_FALSE(evaluation_json(evaluation()).contains("orientation"));
+  Evaluation turned = evaluation();
+  turned.orientation = {5, kPi / 180, kPi / 360, kPi / 1800, std::nullopt};
+  auto json = evaluation_json(turned)["orientation"];
+  EXPECT_EQ(json["poses"], 5);
+  EXPECT_DOUBLE_EQ(json["nominal"]["rms_deg"], 1.0);
+  EXPECT_DOUBLE_EQ(json["calibrated"]["rms_deg"], 0.5);
+  EXPECT_DOUBLE_EQ(json["compensated"]["rms_deg"], 0.1);
+  EXPECT_FALSE(json.contains("coverage_95"));
+  turned.orientation->coverage_95 = .95;
+  EXPECT_EQ(evaluation_json(turned)["orientation"]["coverage_95"], .95);
+  EXPECT_NE(evaluation_table(turned).find("orientation, deg rms of 5 poses: nominal 1.0000, calibrated 0.5000, "
+                                          "compensated 0.1000; 95.0 % of rotations"),
+            std::string::npos);
 }
 
 TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {

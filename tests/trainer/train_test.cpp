@@ -279,6 +279,10 @@ TEST_F(RealRobot, ABiasWithJointMapsAndParametersTakesUr10ToATenthOfAMillimetre)
     RecordProperty(fmt::format("series_{}_mm", name), fmt::format("{:.4f}", to_mm(evaluation.compensated.rms)));
     EXPECT_LE(to_mm(evaluation.compensated.rms), 0.105) << name;
     EXPECT_GE(evaluation.coverage_95, 0.90) << name;
+    const OrientationFigures& turned = evaluation.orientation.value();
+    RecordProperty(fmt::format("series_{}_deg", name), fmt::format("{:.4f}", to_deg(turned.compensated)));
+    EXPECT_LE(turned.compensated, 0.4 * turned.calibrated) << name;
+    EXPECT_GE(turned.coverage_95.value(), 0.92) << name;
   }
 }
 
