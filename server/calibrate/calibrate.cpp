@@ -27,6 +27,8 @@ constexpr double kHuberPosition = 4.03;     // norm that 1 in 1000 exceeds, 3 no
 constexpr double kHuberPose = 4.74;         // the same, 6 axes
 constexpr double kSuspect = 5.5;            // norm of 3 axes that 1 in 10^6 exceeds
 constexpr double kIdentifiedShare = 0.5;    // of the prior's standard deviation, at most, is left of what was not known
+constexpr double kNoModelError = 0.025;     // m rms: what no model of a robot leaves,
+constexpr double kNoModelShare = 0.05;      // and of how far the positions spread
 constexpr double kHeld = 1e-6;              // of the priors of sources that are not to change
 constexpr double kUnknownWidening = 500;    // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
@@ -380,6 +382,22 @@ Information decomposed(const Eigen::MatrixXd& information) {
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
+/// Whether joints and positions can be of one robot at all: what identification leaves, `rms` (m), is no model's error
+/// where it is a good part of the way that the tool went.
+Status check_belongs(const MeasurementBatch& batch, double rms) {
+  Vector3 mean = Vector3::Zero();
+  for (const Measurement& m : batch.measurements) mean += m.p_W / static_cast<double>(batch.measurements.size());
+  double square = 0;
+  for (const Measurement& m : batch.measurements) square += (m.p_W - mean).squaredNorm();
+  const double spread = std::sqrt(square / static_cast<double>(batch.measurements.size()));
+  if (rms < std::max(kNoModelError, kNoModelShare * spread)) return {};
+  return refused(
+      "batch {}: {:.0f} mm rms are left after identification, of positions that spread over {:.0f} mm: these joints do "
+      "not lead to these positions (look at the order of the joints, their signs and zeros, and which row belongs to "
+      "which position)",
+      batch.id, to_mm(rms), to_mm(spread));
+}
+
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const PhysicalModel& model = problem.model;
   const Tracker& tracker = model.cell->tracker;
@@ -432,6 +450,8 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.message = minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;
+  if (const Status belongs = check_belongs(problem.batch, result.rms); !belongs)
+    return tl::make_unexpected(belongs.error());
 
   const Information seen = decomposed(minimum.last.information);
   const Eigen::VectorXd variance = (seen.singular_values.array().square() + 1).inverse();

@@ -64,7 +64,8 @@ struct CalibrationResult {
 /// scales, residuals in units of sigma), source section 3.3.2. Orientation errors are rotation vectors. Where the model
 /// cannot reach the measurement's sigma, the surplus is estimated as a discrepancy and added to it, so that positions
 /// and orientations, good and bad points keep their proper weights. Refuses: fewer equations than identifiable
-/// parameters; a base or tool that the data cannot determine.
+/// parameters; a base or tool that the data cannot determine; joints that do not lead to the positions (more than 25 mm
+/// rms and 5 % of their spread are left).
 [[nodiscard]] Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options);
 
 /// Calibrates `cell` with the sources that `specs` name. Where a cause has several forms, the one under which the data

@@ -250,6 +250,24 @@ TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {
   }
 }
 
+TEST(Calibrate, RefusesJointsThatDoNotLeadToThePositionsBesideThem) {
+  const auto cell = cell_7();
+  const MeasurementBatch batch = measured(chapter_5_robot(cell), 60, 12);
+  MeasurementBatch swapped = batch;
+  for (Measurement& m : swapped.measurements) std::swap(m.context.q(1), m.context.q(2));
+  MeasurementBatch moved = batch;
+  for (std::size_t i = 0; i < moved.measurements.size(); ++i)
+    moved.measurements[i].context.q = batch.measurements[(i + 1) % batch.measurements.size()].context.q;
+  for (const MeasurementBatch& wrong : {swapped, moved}) {
+    const auto result = calibrate(cell, {"base", "geometry"}, wrong, {});
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::kRefused);
+    EXPECT_NE(result.error().message.find("do not lead to these positions"), std::string::npos)
+        << result.error().message;
+  }
+  EXPECT_TRUE(calibrate(cell, {"base", "geometry"}, batch, {}));
+}
+
 TEST(Calibrate, RefusesWhatCannotBeFound) {
   const auto cell = test::cell_7_unlocated();
   MeasurementBatch few = measured(chapter_5_robot(cell), 120, 14, false);
