@@ -13,7 +13,6 @@ using Eigen::VectorXd;
 
 constexpr Index kOutputs = 3;
 constexpr Index kFewestObservations = 10;
-constexpr Index kMostCoupled = 4000;  // observations: half a gigabyte while they are learned from
 constexpr std::string_view kAxis[] = {"x", "y", "z"};
 
 Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {

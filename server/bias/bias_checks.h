@@ -9,6 +9,9 @@
 /// What a bias cannot be learned or restored from, in sentences that name row, value and limit.
 namespace trammel {
 
+/// Observations that a kernel with blocks may have: half a gigabyte while they are learned from.
+inline constexpr Eigen::Index kMostCoupled = 4000;
+
 [[nodiscard]] Status check_observations(const Eigen::MatrixXd& q, const Eigen::MatrixXd& residual_B,
                                         const Eigen::VectorXd& sigma);
 /// Of a kernel with blocks and `n` observations.

@@ -162,8 +162,9 @@ struct Best {
 
 class Choosing {
  public:
-  Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without)
-      : problem_(problem), options_(options) {
+  Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without,
+           Index most_coupled)
+      : problem_(problem), options_(options), most_coupled_(most_coupled) {
     if (problem.q.rows() < kFewest) return;
     in_time_ = folds(problem, blocks_in_time(problem.q.rows()), residual_without);
     in_joint_space_ = folds(problem, blocks_in_joint_space(problem.q), residual_without);
@@ -201,7 +202,14 @@ class Choosing {
   }
 
   Status ask(const std::string& kernel) {
-    if (problem_.features.empty() && !spelled_bias(kernel)->blocks.empty()) return {};
+    if (!spelled_bias(kernel)->blocks.empty()) {
+      if (problem_.features.empty()) return {};
+      if (problem_.q.rows() > most_coupled_) {
+        choice_.candidates.push_back(
+            {.kernel = kernel, .verdict = fmt::format("more than {} poses", most_coupled_), .skipped = true});
+        return {};
+      }
+    }
     BiasOptions options = options_;
     options.kernel = kernel;
     const double most = kCheap.size() + kDear.size();
@@ -257,8 +265,9 @@ class Choosing {
           to_mm(taken.joint_block_rms));
     } else {
       const auto other =
-          std::min_element(choice_.candidates.begin() + 1, choice_.candidates.end(),
-                           [](const auto& a, const auto& b) { return a.leave_one_out_nlpd < b.leave_one_out_nlpd; });
+          std::min_element(choice_.candidates.begin() + 1, choice_.candidates.end(), [](const auto& a, const auto& b) {
+            return a.skipped != b.skipped ? b.skipped : a.leave_one_out_nlpd < b.leave_one_out_nlpd;
+          });
       choice_.sentence =
           fmt::format("no bias helps: leave-one-out {:.4f} mm without, {:.4f} mm with {}, which {}; left out",
                       to_mm(none.leave_one_out_rms), to_mm(other->leave_one_out_rms), other->kernel,
@@ -269,6 +278,7 @@ class Choosing {
 
   const BiasProblem& problem_;
   const BiasOptions& options_;
+  const Index most_coupled_;
   std::vector<Fold> in_time_, in_joint_space_;
   MatrixXd without_in_time_, without_in_joint_space_;  // N x 3, m: what `none` misses there
   BiasChoice choice_;
@@ -279,11 +289,11 @@ class Choosing {
 }  // namespace
 
 Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
-                               const ResidualWithout& residual_without) {
+                               const ResidualWithout& residual_without, Index most_coupled) {
   BiasOptions nothing = options;
   nothing.kernel = "none";
   if (const Result<BiasModel> fine = BiasModel::fit(problem, nothing); !fine) return tl::make_unexpected(fine.error());
-  return Choosing(problem, options, residual_without).run();
+  return Choosing(problem, options, residual_without, most_coupled).run();
 }
 
 }  // namespace trammel

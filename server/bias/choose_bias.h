@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "server/bias/bias_checks.h"
 #include "server/bias/bias_model.h"
 
 namespace trammel {
@@ -18,6 +19,7 @@ struct BiasCandidate {
   double gain = 0;                ///< m², of the mean square by blocks in time, against `none`
   double gain_stddev = 0;         ///< m², of that mean, from its scatter over the blocks
   std::string verdict;            ///< why it was not taken, or `taken`
+  bool skipped = false;           ///< not fitted: no figures, the verdict says why
 };
 
 struct BiasChoice {
@@ -45,10 +47,11 @@ using ResidualWithout = std::function<Eigen::MatrixXd(const std::vector<Eigen::I
 /// counts only where leaving out blocks of neighbouring observations (`problem` in the order of measuring), with the
 /// hyperparameters as found and the physics as `residual_without` says (empty: as in `problem`), confirms it: in time
 /// the mean square error falls by more than twice its standard error over the blocks, in joint space it does not rise
-/// by as much. Kernels with blocks are asked only where `problem` has features. At most five fits; same problem and
-/// seed, same choice. Of `options` the kernel is not used. Refuses what BiasModel::fit() refuses; with fewer than 30
-/// observations nothing is taken.
+/// by as much. Kernels with blocks are asked only where `problem` has features, and skipped beyond `most_coupled`
+/// observations. At most five fits; same problem and seed, same choice. Of `options` the kernel is not used. Refuses
+/// what BiasModel::fit() refuses; with fewer than 30 observations nothing is taken.
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
-                                             const ResidualWithout& residual_without = {});
+                                             const ResidualWithout& residual_without = {},
+                                             Eigen::Index most_coupled = kMostCoupled);
 
 }  // namespace trammel

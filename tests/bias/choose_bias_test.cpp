@@ -91,6 +91,26 @@ TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
   EXPECT_EQ(chosen.choice.kernel, "none");
 }
 
+TEST(ChooseBias, KernelsWithBlocksAreSkippedWhereThereAreMoreObservationsThanTheyMayHave) {
+  BiasProblem problem = noise_alone(40, 6);
+  std::mt19937_64 random(6);
+  for (Index i = 0; i < 40; ++i) {
+    BiasFeatures at{MatrixXd::Zero(6, problem.q.cols()), MatrixXd(6, 2)};
+    for (double& value : at.by_parameter.reshaped()) value = 1e-4 * normal(&random);
+    problem.features.push_back(at);
+  }
+  const auto last_of = [&](Index most_coupled) {
+    return choose_bias(problem, {}, {}, most_coupled).value().choice.candidates.back();
+  };
+  EXPECT_FALSE(last_of(40).skipped);
+  const BiasCandidate skipped = last_of(39);
+  EXPECT_EQ(skipped.kernel, "se + parameters");
+  EXPECT_TRUE(skipped.skipped);
+  EXPECT_EQ(skipped.verdict, "more than 39 poses");
+  const ChosenBias chosen = choose_bias(problem, {}, {}, 39).value();
+  EXPECT_EQ(chosen.choice.sentence.find("se + parameters"), std::string::npos) << chosen.choice.sentence;
+}
+
 TEST(ChooseBias, TooFewObservationsAreNotJudged) {
   const ChosenBias chosen = choose_bias(smooth_problem(29, 1), {}).value();
   EXPECT_EQ(chosen.choice.kernel, "none");
