@@ -80,6 +80,27 @@ Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
 }
 
+/// What an observation of the bias says of its pose, for `joints` joints; `row` counts from 1.
+Status check_context(const PoseContext& context, Eigen::Index joints, std::size_t row) {
+  const auto not_finite = [](const std::optional<double>& value) { return value && !std::isfinite(*value); };
+  const std::vector<int>& directions = context.direction;
+  if (!directions.empty() && static_cast<Eigen::Index>(directions.size()) != joints)
+    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints);
+  for (const int direction : directions) {
+    if (direction < -1 || direction > 1)
+      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction);
+  }
+  if (context.velocity && context.velocity->size() != joints)
+    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints);
+  if (context.velocity && !context.velocity->allFinite())
+    return refused("model: pose {} of the bias has a velocity that is not finite", row);
+  if (not_finite(context.time)) return refused("model: pose {} of the bias has a time that is not finite", row);
+  if (not_finite(context.temperature))
+    return refused("model: pose {} of the bias has a temperature that is not finite", row);
+  if (context.index < 0) return refused("model: pose {} of the bias has the index {}", row, context.index);
+  return {};
+}
+
 /// At the observations of a bias with blocks.
 Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& parts, const BiasPhysics& physics) {
   const BiasState& bias = *parts.bias;
@@ -90,6 +111,8 @@ Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& par
   std::vector<BiasFeatures> features;
   for (std::size_t i = 0; i < parts.bias_contexts.size(); ++i) {
     PoseContext context = parts.bias_contexts[i];
+    if (const Status fine = check_context(context, bias.q.cols(), i + 1); !fine)
+      return tl::make_unexpected(fine.error());
     context.q = bias.q.row(static_cast<Eigen::Index>(i)).transpose();
     const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
     if (!parts.physics.tools.contains(context.tool) || !known_payload) {

@@ -36,6 +36,18 @@ Eigen::MatrixXd matrix_from(const Json& json) {
   return m;
 }
 
+Eigen::VectorXd vector_from(const Json& json) {
+  const Eigen::MatrixXd m = matrix_from(json);
+  if (m.cols() != 1) throw Json::other_error::create(501, "a vector that is not one column", &json);
+  return m;
+}
+
+Vector3 vector3_from(const Json& json) {
+  const Eigen::VectorXd v = vector_from(json);
+  if (v.size() != 3) throw Json::other_error::create(501, "a vector that is not 3 x 1", &json);
+  return v;
+}
+
 Json to_json(const Pose& X) { return to_json(Eigen::MatrixXd(X.matrix().topRows<3>())); }
 
 Pose pose_from(const Json& json) {
@@ -61,8 +73,8 @@ ErrorFigures figures_from(const Json& json) {
   f.mean = json.at("mean_m");
   f.p997 = json.at("p997_m");
   f.max = json.at("max_m");
-  f.axis_mean = matrix_from(json.at("axis_mean_m"));
-  f.axis_stddev = matrix_from(json.at("axis_stddev_m"));
+  f.axis_mean = vector3_from(json.at("axis_mean_m"));
+  f.axis_stddev = vector3_from(json.at("axis_stddev_m"));
   return f;
 }
 
@@ -119,11 +131,11 @@ BiasState bias_from(const Json& json) {
   bias.kernel = json.at("kernel");
   bias.q = matrix_from(json.at("q"));
   bias.residual_B = matrix_from(json.at("residual_B"));
-  bias.sigma = matrix_from(json.at("sigma"));
-  bias.offset = matrix_from(json.at("offset"));
+  bias.sigma = vector_from(json.at("sigma"));
+  bias.offset = vector_from(json.at("offset"));
   bias.hyperparameters = matrix_from(json.at("hyperparameters"));
   if (json.contains("block_hyperparameters")) {
-    bias.block_hyperparameters = matrix_from(json.at("block_hyperparameters"));
+    bias.block_hyperparameters = vector_from(json.at("block_hyperparameters"));
   }
   return bias;
 }
@@ -145,7 +157,7 @@ PoseContext context_from(const Json& json) {
   context.index = json.at("index");
   if (json.contains("time_s")) context.time = json.at("time_s").get<double>();
   if (json.contains("temperature_c")) context.temperature = json.at("temperature_c").get<double>();
-  if (json.contains("velocity")) context.velocity = matrix_from(json.at("velocity"));
+  if (json.contains("velocity")) context.velocity = vector_from(json.at("velocity"));
   if (json.contains("direction")) json.at("direction").get_to(context.direction);
   return context;
 }
@@ -161,6 +173,7 @@ Json to_json(const BiasChoice& choice) {
                           {"gain_m2", c.gain},
                           {"gain_stddev_m2", c.gain_stddev},
                           {"verdict", c.verdict}});
+    if (c.skipped) candidates.back()["skipped"] = true;
   }
   return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", std::move(candidates)}};
 }
@@ -170,7 +183,7 @@ BiasChoice choice_from(const Json& json) {
   for (const Json& c : json.at("candidates")) {
     choice.candidates.push_back({c.at("kernel"), c.at("leave_one_out_rms_m"), c.at("leave_one_out_nlpd_of_m"),
                                  c.at("time_block_rms_m"), c.at("joint_block_rms_m"), c.at("gain_m2"),
-                                 c.at("gain_stddev_m2"), c.at("verdict")});
+                                 c.at("gain_stddev_m2"), c.at("verdict"), c.value("skipped", false)});
   }
   return choice;
 }
@@ -258,7 +271,7 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.physics = std::move(*physics);
   parts.physics.X_WB = pose_from(content.at("X_WB"));
   for (auto& [name, X_FT] : parts.physics.tools) X_FT = pose_from(content.at("tools").at(name));
-  parts.physics.values = matrix_from(content.at("values"));
+  parts.physics.values = vector_from(content.at("values"));
   parts.covariance = matrix_from(content.at("covariance"));
   const std::vector<Parameter> known = parts.physics.parameters();
   const Json& parameters = content.at("parameters");
@@ -279,11 +292,11 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   }
   content.at("cost_record").get_to(parts.cost_record);
   parts.discrepancy = content.at("discrepancy_m");
-  parts.q_min = matrix_from(content.at("q_min"));
-  parts.q_max = matrix_from(content.at("q_max"));
+  parts.q_min = vector_from(content.at("q_min"));
+  parts.q_max = vector_from(content.at("q_max"));
   parts.prior_share_limit = content.at("prior_share_limit");
   if (content.contains("extrapolation_slope")) {
-    parts.extrapolation_slope = matrix_from(content.at("extrapolation_slope"));
+    parts.extrapolation_slope = vector_from(content.at("extrapolation_slope"));
   }
   content.at("trained_with").get_to(parts.trained_with);
   parts.training = evaluation_from(content.at("training"));

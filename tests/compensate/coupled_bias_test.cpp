@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "server/base/hash.h"
@@ -92,6 +93,41 @@ TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThe
   file["hash"] = sha256_hex(file["content"].dump());
   EXPECT_EQ(deserialize(file.dump(), "cell.model").error().message,
             "cell.model: model: 0 poses are described for 120 observations of the bias");
+}
+
+TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
+  const auto message = [](const auto& spoil) {
+    CompensatedModel::Parts parts = model_->parts();
+    PoseContext& pose = parts.bias_contexts[3];
+    pose.direction = {1, 0, -1, 1, 1, 1};
+    pose.velocity = JointVector::Constant(6, 0.1);
+    pose.time = pose.temperature = 20;
+    spoil(pose);
+    const Result<CompensatedModel> made = CompensatedModel::make(std::move(parts));
+    return made ? "accepted" : made.error().message;
+  };
+  static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(message([](PoseContext&) {}), "accepted");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.direction.pop_back(); }),
+            "model: pose 4 of the bias has 5 directions for 6 joints");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.direction[2] = 2; }),
+            "model: pose 4 of the bias has a direction 2, expected -1, 0 or 1");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.velocity = JointVector::Zero(5); }),
+            "model: pose 4 of the bias has 5 velocities for 6 joints");
+  EXPECT_EQ(message([](PoseContext& pose) { (*pose.velocity)(1) = kNan; }),
+            "model: pose 4 of the bias has a velocity that is not finite");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.time = kNan; }),
+            "model: pose 4 of the bias has a time that is not finite");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.temperature = kNan; }),
+            "model: pose 4 of the bias has a temperature that is not finite");
+  EXPECT_EQ(message([](PoseContext& pose) { pose.index = -1; }), "model: pose 4 of the bias has the index -1");
+
+  nlohmann::json file = nlohmann::json::parse(serialize(*model_));
+  file["content"]["bias"]["poses"][3]["velocity"] = {{"rows", 3}, {"columns", 2}, {"values", {0, 0, 0, 0, 0, 0}}};
+  file["hash"] = sha256_hex(file["content"].dump());
+  const Result<CompensatedModel> read = deserialize(file.dump(), "cell.model");
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("a vector that is not one column"), std::string::npos) << read.error().message;
 }
 
 TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {
