@@ -148,4 +148,8 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   return names;
 }
 
+std::string level_of(const std::vector<std::string>& sources) {
+  return sources.empty() ? "M0" : fmt::format("{}", fmt::join(sources, ","));
+}
+
 }  // namespace trammel

@@ -79,5 +79,7 @@ using ErrorSourcePtr = std::shared_ptr<const ErrorSource>;
 
 /// Expands a level into source names: `M0`..`M3`, a list, or a level and more: `M2,gear_transmission:3`.
 [[nodiscard]] Result<std::vector<std::string>> parse_level(const std::string& level);
+/// Its inverse: what parse_level() reads as these sources; `M0` where there are none.
+[[nodiscard]] std::string level_of(const std::vector<std::string>& sources);
 
 }  // namespace trammel

@@ -20,7 +20,7 @@ bool contains(const std::vector<std::string>& list, const std::string& word) {
 /// One of two trainings: its progress is half of the whole.
 Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                                  const std::vector<std::string>& sources, double done, TrainOptions options) {
-  options.level = fmt::format("{}", fmt::join(sources, ","));
+  options.level = level_of(sources);
   if (const auto whole = options.progress) {
     options.progress = [whole, done](const std::string& stage, double share) { return whole(stage, done + share / 2); };
   }

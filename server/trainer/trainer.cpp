@@ -128,7 +128,7 @@ std::optional<std::string> level_with_additions(const Cell& cell, const Compensa
     if (!listed(name)) level.push_back(name);
   }
   if (level.size() == own) return std::nullopt;
-  return fmt::format("{}", fmt::join(level, ","));
+  return level_of(level);
 }
 
 /// Against the nominal model: the first one of a cell, or the first with a tool that the one in force does not know.

@@ -123,7 +123,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
                                                     : std::string(to_string(diagnosis->verdict)));
   }
   StoredJob extended = job;
-  extended.level = fmt::format("{}", fmt::join(extended_sources(*served, *diagnosis), ","));
+  extended.level = level_of(extended_sources(*served, *diagnosis));
   TrainOptions training = train_options(extended, *cell_found, progress, stop);
   training.progress = [report = training.progress](const std::string& stage, double share) {
     return report(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);

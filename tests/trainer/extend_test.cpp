@@ -84,6 +84,16 @@ TEST_F(Extend, IsJudgedByAllPosesWhereMoreThanATenthFitNeitherModel) {
   EXPECT_EQ(judges_of(diagnosis_, rows).left_out.size(), 2U) << "one that was learned from is not held out";
 }
 
+TEST_F(Extend, BeginsWithTheNominalModelWhereTheCellListsNoSources) {
+  Cell nominal = *cell_;
+  nominal.model.error_sources.clear();
+  diagnosis_.sources_before = {};
+  diagnosis_.sources_after = {"base"};
+  const Extension extension = test::demand(extend(std::make_shared<const Cell>(nominal), batch_, diagnosis_, {}));
+  EXPECT_TRUE(extension.before.parts().physics.sources.empty());
+  EXPECT_EQ(extension.after.provenance().level, "base");
+}
+
 TEST_F(Extend, IsRefusedWhereNothingWasNamed) {
   diagnosis_.verdict = Verdict::kUnknown;
   diagnosis_.sentence = "Something depends on joint 4.";
