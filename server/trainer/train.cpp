@@ -139,6 +139,11 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     return std::any_of(parts.suspects.begin(), parts.suspects.end(),
                        [&](const SuspectPose& pose) { return pose.pose_id == m.pose_id && pose.row == m.row; });
   });
+  if (batch.measurements.size() < kLeastBiasPoses && kernel == kAutoBias) {
+    const std::string why = fmt::format("no bias: {} poses are too few to learn one from", batch.measurements.size());
+    parts.bias_choice = BiasChoice{"none", {}, why};
+    return {};
+  }
   if (batch.measurements.size() < kLeastBiasPoses) {
     return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
                    batch.measurements.size(), kLeastBiasPoses);

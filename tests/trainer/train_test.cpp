@@ -179,6 +179,17 @@ TEST(Train, RefusesUnknownSourcesKernelsAndTooFewPoses) {
   EXPECT_FALSE(train(cell, test::measured(robot, 9, 45), quick("M1", "se")));
 }
 
+TEST(Train, AutoGoesOnWithoutABiasWhereThePosesAreTooFewForOne) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch nine = test::measured(test::chapter_5_robot(cell), 9, 45);
+  const CompensatedModel model = test::demand(train(cell, nine, quick("M1", "auto")));
+  EXPECT_FALSE(model.parts().bias);
+  ASSERT_TRUE(model.parts().bias_choice);
+  EXPECT_EQ(model.parts().bias_choice->kernel, "none");
+  EXPECT_EQ(model.parts().bias_choice->sentence, "no bias: 9 poses are too few to learn one from");
+  EXPECT_TRUE(deserialize(serialize(model), "memory"));
+}
+
 TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointMap) {
   const auto cell = test::cell_7();
   VirtualRobot robot = test::chapter_5_robot(cell);
