@@ -75,9 +75,14 @@ std::string rotation_text(const CompensatedModel::Parts& parts) {
 
 std::string choice_text(const BiasChoice& choice) {
   std::string text = choice.sentence + "\n";
+  if (choice.candidates.empty()) return text;
   text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "left out", "in time", "in space",
                       "nlpd (mm)");
   for (const BiasCandidate& c : choice.candidates) {
+    if (c.skipped) {
+      text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
+      continue;
+    }
     text += fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
                         to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
   }
@@ -87,6 +92,10 @@ std::string choice_text(const BiasChoice& choice) {
 ordered_json choice_json(const BiasChoice& choice) {
   ordered_json candidates = ordered_json::array();
   for (const BiasCandidate& c : choice.candidates) {
+    if (c.skipped) {
+      candidates.push_back({{"kernel", c.kernel}, {"verdict", c.verdict}});
+      continue;
+    }
     candidates.push_back({{"kernel", c.kernel},
                           {"leave_one_out_rms_mm", to_mm(c.leave_one_out_rms)},
                           {"leave_one_out_nlpd", nlpd_in_mm(c.leave_one_out_nlpd)},
