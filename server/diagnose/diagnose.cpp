@@ -209,6 +209,9 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     const bool at_a_row = !sorted || finding.cause.pose_id.empty();
     if (!finding.source.empty() && sure && at_a_row) diagnosis.sources_after.push_back(finding.source);
   }
+  if (!found.reformed_from.empty() && diagnosis.sources_after.size() > diagnosis.sources_before.size())
+    std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), found.reformed_from,
+                 found.reformed_to);
   if (split.validation.measurements.empty()) {
     const HeldOut held_out = held_out_of(before, served);
     diagnosis.held_out_before = held_out.before;

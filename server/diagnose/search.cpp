@@ -22,6 +22,7 @@ constexpr double kUnnamedMargin = 2;    // nat, by which no name must be better 
 constexpr double kContender = 0.3;      // of the best score, to be among those that folds choose from
 constexpr double kSimplerMargin = 5;    // nat
 constexpr int kFewestHarmonics = 4;
+constexpr const char* kOfManyForms = "compliance";
 constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
 
 Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
@@ -41,6 +42,7 @@ class Search {
     result_.all = result_.batch = batch;
     const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
     if (!calibration) return tl::make_unexpected(calibration.error());
+    form_is_open_ = std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
     result_.before = {calibration->model, priors_of(*calibration)};
     result_.after = result_.before;
     return {};
@@ -93,6 +95,43 @@ class Search {
     return prune_unnamed(problem);
   }
 
+  /// Chooses the form of the compliance anew beside all that was found since: chosen while much was missing it may be
+  /// another, and what a wrong form leaves over would be given other names.
+  void reform() {
+    const auto& sources = result_.after.model.sources;
+    const auto present = std::find_if(sources.begin(), sources.end(), [](const ErrorSourcePtr& source) {
+      return source->name().starts_with(fmt::format("{}_", kOfManyForms));
+    });
+    if (present == sources.end()) return;
+    const std::string form = (*present)->name();
+    const auto finding = std::find_if(result_.accepted.begin(), result_.accepted.end(),
+                                      [&](const Accepted& one) { return one.in_model == form; });
+    if (finding == result_.accepted.end() && !form_is_open_) return;
+    const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
+    const VectorXd values = result_.after.model.values(places_of_source(result_.after.model, form));
+    const PriorModel now = result_.after;
+    double least = held_out_square(now, weight);
+    for (const std::string& other : alternatives(kOfManyForms, *cell_)) {
+      if (other == form) continue;
+      PriorModel changed = now;
+      remove_from(changed, form);
+      if (!add_to(changed, other)) continue;
+      const std::vector<Index> places = places_of_source(changed.model, other);
+      if (static_cast<Index>(places.size()) == values.size()) changed.model.values(places) = values;
+      refine(changed, result_.batch, result_.unnamed);
+      const double square = held_out_square(changed, weight);
+      if (square >= least) continue;
+      least = square;
+      result_.after = std::move(changed);
+      if (finding != result_.accepted.end()) {
+        finding->in_model = other;
+      } else {
+        if (result_.reformed_from.empty()) result_.reformed_from = form;
+        result_.reformed_to = other;
+      }
+    }
+  }
+
   /// Asks of every finding again, all others in place, what it is: while they were missing another cause may have
   /// looked more like it.
   Status reconsider() {
@@ -116,6 +155,7 @@ class Search {
     // What was tried and dropped leaves no trace.
     if (!extended) {
       result_.after = result_.before;
+      result_.reformed_from.clear();
       refine(result_.after, result_.batch, result_.unnamed);
     }
     result_.chance = std::move(chance_);
@@ -372,6 +412,7 @@ class Search {
   const DiagnoseOptions& options_;
   SearchResult result_;
   Chance chance_;
+  bool form_is_open_ = false;    // of the compliance that the cell's own list has
   std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
   std::vector<Cause> closed_;    // were tried and did not hold
 };
@@ -390,6 +431,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
     if (more && !*more) more = search.prune();
     if (!more) return tl::make_unexpected(more.error());
     changed = *more;
+    if (changed) search.reform();
   }
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
   return search.take();

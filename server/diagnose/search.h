@@ -35,6 +35,8 @@ struct SearchResult {
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
   Chance chance;
+  /// The form of the model's own compliance that gave way to another beside what was found; empty where none did.
+  std::string reformed_from, reformed_to;
   bool too_many_outliers = false;  ///< there are more than a tenth; the rest stayed in
 };
 

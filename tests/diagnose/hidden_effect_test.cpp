@@ -230,6 +230,26 @@ TEST(MapsOfJoints, AreOneFindingAJointAlsoWhereFineDetailShowsOnlyBesideAllElse)
   EXPECT_LT(diagnosis.after.rms, 0.05 * diagnosis.before.rms);
 }
 
+TEST(FormOfACompliance, IsChosenAgainBesideWhatIsFoundLaterSoThatNothingElseIsNamedForIt) {
+  const auto shipped = test::cell_7();
+  for (const bool own : {false, true}) {
+    Cell lacking = *shipped;
+    lacking.model.error_sources =
+        own ? std::vector<std::string>{"base", "compliance"} : std::vector<std::string>{"base"};
+    const auto cell = std::make_shared<const Cell>(lacking);
+    const Diagnosis diagnosis =
+        test::demand(diagnose(cell, test::measured(test::chapter_5_robot(shipped), 200, 5), quick()));
+    std::set<std::string> causes;
+    for (const Finding& finding : diagnosis.findings) causes.insert(finding.cause.cause);
+    EXPECT_EQ(causes, own ? std::set<std::string>{"geometry"} : (std::set<std::string>{"compliance", "geometry"}))
+        << diagnosis.sentence;
+    EXPECT_FALSE(diagnosis.unexplained.present) << diagnosis.sentence;
+    if (own) {
+      EXPECT_EQ(diagnosis.sources_after, (std::vector<std::string>{"base", "compliance_linear", "geometry"}));
+    }
+  }
+}
+
 TEST(NextPoses, TellApartWhatTheBatchConfoundsMoreThanRandomOnesWould) {
   test::Trial trial{.row = "next",
                     .spec = {.kind = "encoder_eccentricity",
