@@ -25,7 +25,10 @@ Eigen::MatrixXd matrix_from(const Json& json) {
   const auto rows = json.at("rows").get<Eigen::Index>();
   const auto columns = json.at("columns").get<Eigen::Index>();
   const Json& values = json.at("values");
-  if (rows < 0 || columns < 0 || static_cast<std::size_t>(rows * columns) != values.size()) {
+  const auto count = static_cast<Eigen::Index>(values.size());
+  // Divided, not multiplied: a product may overflow.
+  if (rows < 0 || columns < 0 ||
+      (columns == 0 || rows == 0 ? count != 0 : count % rows != 0 || count / rows != columns)) {
     throw Json::other_error::create(501, "a matrix whose size does not fit its values", &json);
   }
   Eigen::MatrixXd m(rows, columns);

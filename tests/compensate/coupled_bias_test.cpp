@@ -128,6 +128,13 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
   const Result<CompensatedModel> read = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().message.find("a vector that is not one column"), std::string::npos) << read.error().message;
+
+  constexpr std::int64_t kHuge = std::int64_t{1} << 32;  // whose square overflows to 0
+  file["content"]["covariance"] = {{"rows", kHuge}, {"columns", kHuge}, {"values", nlohmann::json::array()}};
+  file["hash"] = sha256_hex(file["content"].dump());
+  const Result<CompensatedModel> huge = deserialize(file.dump(), "cell.model");
+  ASSERT_FALSE(huge);
+  EXPECT_NE(huge.error().message.find("a matrix whose size"), std::string::npos) << huge.error().message;
 }
 
 TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {
