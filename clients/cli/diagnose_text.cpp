@@ -237,15 +237,19 @@ std::string extension_text(const Extension& extension) {
   return fmt::format("\nWith bias, on {} poses held out from diagnosis and training:\n", poses) +
          fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
          extended_line("before", extension.before) + extended_line("extended", extension.after) +
-         fmt::format("  {}\n", to_string(extension.gain));
+         fmt::format("  {}\n", to_string(extension.gain)) +
+         (extension.left_out.empty() ? "" : fmt::format("  {}\n", to_string(extension.left_out)));
 }
 
 ordered_json extension_json(const Extension& extension) {
+  ordered_json left_out = ordered_json::array();
+  for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
   return {{"better", extension.gain.beyond_chance()},
           {"z", extension.gain.z},
           {"z_limit", PairedGain::kBeyondChance},
           {"judged_without", extension.gain.left_out},
           {"error_sources", extension.sources},
+          {"left_out", std::move(left_out)},
           {"of_the_cell", extension.lasting},
           {"held_out_poses", extension.after.parts().validation->poses},
           {"before", figures_json(extension.before.parts().validation->compensated)},

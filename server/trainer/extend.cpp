@@ -17,14 +17,29 @@ bool contains(const std::vector<std::string>& list, const std::string& word) {
   return std::find(list.begin(), list.end(), word) != list.end();
 }
 
-/// One of two trainings: its progress is half of the whole.
+constexpr double kSupportShare = 0.2;  // of the progress, the rest is two trainings
+
+/// One of two trainings: its progress is half of theirs.
 Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                                  const std::vector<std::string>& sources, double done, TrainOptions options) {
   options.level = level_of(sources);
   if (const auto whole = options.progress) {
-    options.progress = [whole, done](const std::string& stage, double share) { return whole(stage, done + share / 2); };
+    options.progress = [whole, done](const std::string& stage, double share) {
+      return whole(stage, kSupportShare + (1 - kSupportShare) * (done + share / 2));
+    };
   }
   return train(cell, batch, options);
+}
+
+/// The rows to judge by, of `batch` checked against the cell; refuses where there are none.
+Result<BatchSplit> split_to_judge(const Cell& cell, const MeasurementBatch& batch, std::uint64_t seed) {
+  Result<MeasurementBatch> checked = check_against_cell(batch, cell);
+  if (!checked) return tl::make_unexpected(checked.error());
+  fill_velocity(*checked);
+  BatchSplit split = split_batch(*checked, 0, seed);
+  if (split.validation.measurements.empty())
+    return refused("batch {}: no rows are held out to judge an extended model by", batch.id);
+  return split;
 }
 
 }  // namespace
@@ -44,12 +59,13 @@ std::vector<std::string> lasting_sources(const std::vector<std::string>& sources
   return lasting;
 }
 
-std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& diagnosis) {
-  std::vector<std::string> sources = cell.model.error_sources;
-  for (const std::string& source : diagnosis.sources_after) {
-    if (!contains(diagnosis.sources_before, source) && !contains(sources, source)) sources.push_back(source);
-  }
-  return sources;
+std::vector<std::string> added_sources(const Cell& cell, const Diagnosis& diagnosis) {
+  std::vector<std::string> added;
+  std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
+               [&](const std::string& source) {
+                 return !contains(diagnosis.sources_before, source) && !contains(cell.model.error_sources, source);
+               });
+  return added;
 }
 
 std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell,
@@ -88,24 +104,35 @@ Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
   return judges;
 }
 
+Result<Supported> supported_sources(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                    const Diagnosis& diagnosis, std::uint64_t seed,
+                                    const std::function<bool(double share)>& progress) {
+  const Result<BatchSplit> split = split_to_judge(*cell, batch, seed);
+  if (!split) return tl::make_unexpected(split.error());
+  return supported_by(cell, cell->model.error_sources, added_sources(*cell, diagnosis), split->train,
+                      judges_of(diagnosis, split->validation).batch, progress);
+}
+
 Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                          const Diagnosis& diagnosis, TrainOptions options) {
   if (const Status allowed = check_can_extend(diagnosis); !allowed) return tl::make_unexpected(allowed.error());
-  const bool judged = std::any_of(batch.measurements.begin(), batch.measurements.end(),
-                                  [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
-  if (!judged) return refused("batch {}: no rows are held out to judge an extended model by", batch.id);
-  const std::vector<std::string> sources = extended_sources(*cell, diagnosis);
+  Result<Supported> supported = supported_sources(cell, batch, diagnosis, options.seed, [&options](double share) {
+    return !options.progress || options.progress("asking of each cause what it is worth", kSupportShare * share);
+  });
+  if (!supported) return tl::make_unexpected(supported.error());
+  std::vector<std::string> sources = cell->model.error_sources;
+  sources.insert(sources.end(), supported->sources.begin(), supported->sources.end());
   auto before = trained(cell, batch, cell->model.error_sources, 0, options);
   if (!before) return tl::make_unexpected(before.error());
   auto after = trained(cell, batch, sources, 0.5, options);
   if (!after) return tl::make_unexpected(after.error());
-  Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
-  if (!checked) return tl::make_unexpected(checked.error());
-  fill_velocity(*checked);
-  Judges judges = judges_of(diagnosis, split_batch(*checked, 0, options.seed).validation);
+  const Result<BatchSplit> split = split_to_judge(*cell, batch, options.seed);
+  if (!split) return tl::make_unexpected(split.error());
+  Judges judges = judges_of(diagnosis, split->validation);
   PairedGain gain = paired_gain(*before, *after, judges.batch);
   gain.left_out = std::move(judges.left_out);
-  return Extension{sources, lasting_sources(sources), std::move(*before), std::move(*after), gain};
+  return Extension{sources, lasting_sources(sources),      std::move(*before), std::move(*after),
+                   gain,    std::move(supported->left_out)};
 }
 
 }  // namespace trammel

@@ -6,16 +6,18 @@
 
 #include "server/diagnose/diagnosis.h"
 #include "server/trainer/paired_gain.h"
+#include "server/trainer/supported.h"
 #include "server/trainer/train.h"
 
 namespace trammel {
 
 /// What extending a cell's error sources by what a diagnosis found is worth: the same training without and with them.
 struct Extension {
-  std::vector<std::string> sources;  ///< all that the extended model was trained with
-  std::vector<std::string> lasting;  ///< of them, those that belong into the cell file
-  CompensatedModel before, after;    ///< both with figures on the same poses held out
-  PairedGain gain;                   ///< of the one over the other
+  std::vector<std::string> sources;   ///< all that the extended model was trained with
+  std::vector<std::string> lasting;   ///< of them, those that belong into the cell file
+  CompensatedModel before, after;     ///< both with figures on the same poses held out
+  PairedGain gain;                    ///< of the one over the other
+  std::vector<Unsupported> left_out;  ///< found, but the poses held out do as well without
 };
 
 /// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why not.
@@ -25,8 +27,8 @@ struct Extension {
 /// did meanwhile.
 [[nodiscard]] std::vector<std::string> lasting_sources(const std::vector<std::string>& sources);
 
-/// The cell's own list as its owner spells it, and what the diagnosis adds to it.
-[[nodiscard]] std::vector<std::string> extended_sources(const Cell& cell, const Diagnosis& diagnosis);
+/// What the diagnosis adds to the cell's own list.
+[[nodiscard]] std::vector<std::string> added_sources(const Cell& cell, const Diagnosis& diagnosis);
 
 /// The sources that `model` was trained with, a compliance as `cell` spells it; those of one batch only where it is
 /// `batch` that the model was trained from.
@@ -45,8 +47,15 @@ struct Judges {
 /// were measured. Where these are more than a tenth it is no matter of single poses, and all of them judge.
 [[nodiscard]] Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out);
 
-/// Trains on the training rows of `batch` with the cell's error sources and with those of the diagnosis. Refuses what
-/// check_can_extend() and train() refuse, and a batch without rows held out: nothing could be judged.
+/// Of what the diagnosis adds to the cell's own list, what the rows of `batch` held out speak for, cause by cause.
+/// `seed`: of training. Refuses a batch without rows held out: nothing could be judged.
+[[nodiscard]] Result<Supported> supported_sources(const std::shared_ptr<const Cell>& cell,
+                                                  const MeasurementBatch& batch, const Diagnosis& diagnosis,
+                                                  std::uint64_t seed,
+                                                  const std::function<bool(double share)>& progress);
+
+/// Trains on the training rows of `batch` with the cell's error sources and with those of the diagnosis that are
+/// supported. Refuses what check_can_extend(), supported_sources() and train() refuse.
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                                        const Diagnosis& diagnosis, TrainOptions options);
 

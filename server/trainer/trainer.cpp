@@ -512,7 +512,8 @@ Status Trainer::attempt(std::int64_t id, const std::stop_token& stop) {
 
   const auto model = train(*cell_found, *batch, train_options(*job, **cell_found, progress, stop));
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), Bar::kNotWorse, *looked_at);
+  return keep(*model, *batch, std::move(progress), Bar::kNotWorse,
+              looked_at->empty() ? "" : "the batch: " + *looked_at);
 }
 
 std::function<bool(const std::string&, double)> Trainer::reporter(const JobProgress& progress,
@@ -577,7 +578,7 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
     Acceptance verdict =
         judge(model, registry_.in_force(progress.cell).get(), judges.batch, bar, options_.accept_ratio);
     verdict.message += judged_without(judges.left_out);
-    if (!note.empty()) verdict.message += "; the batch: " + note;
+    if (!note.empty()) verdict.message += "; " + note;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());
     const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});

@@ -17,7 +17,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kDiagnosisShare = 0.7;     // of a diagnosis that is applied, the rest is the training
+constexpr double kDiagnosisShare = 0.6;     // of a diagnosis that is applied
+constexpr double kSupportShare = 0.1;       // asking each cause; the rest is the training
 constexpr std::size_t kIdOfSentBatch = 12;  // characters of its hash
 
 std::string findings_text(const Diagnosis& diagnosis) {
@@ -122,15 +123,23 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
     return finish(std::move(progress), asked->apply ? "nothing applied: " + can_apply.error().message + stays
                                                     : std::string(to_string(diagnosis->verdict)));
   }
+  const auto supported =
+      supported_sources(served, *batch, *diagnosis, options_.seed, [report = reporter(progress, stop)](double share) {
+        return report("asking of each cause what it is worth", kDiagnosisShare + kSupportShare * share);
+      });
+  if (!supported) return tl::make_unexpected(supported.error());
+  std::vector<std::string> sources = served->model.error_sources;
+  sources.insert(sources.end(), supported->sources.begin(), supported->sources.end());
   StoredJob extended = job;
-  extended.level = level_of(extended_sources(*served, *diagnosis));
+  extended.level = level_of(sources);
   TrainOptions training = train_options(extended, *cell_found, progress, stop);
   training.progress = [report = training.progress](const std::string& stage, double share) {
-    return report(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
+    constexpr double kDone = kDiagnosisShare + kSupportShare;
+    return report(stage, kDone + (1 - kDone) * share);
   };
   const auto model = train(cell_found, *batch, training);
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), Bar::kBetter, "", &*diagnosis);
+  return keep(*model, *batch, std::move(progress), Bar::kBetter, to_string(supported->left_out), &*diagnosis);
 }
 
 Status Trainer::finish(JobProgress progress, const std::string& outcome) {

@@ -46,6 +46,27 @@ TEST_F(Extend, ByAnotherCauseIsNotCalledBetterThanItIs) {
   EXPECT_GT(extension.after.parts().validation->compensated.rms, 0.15e-3);
 }
 
+TEST_F(Extend, LeavesOutWhatThePosesHeldOutDoNotSpeakForHoweverGoodTheRestIs) {
+  diagnosis_.sources_after = {"base", "joint_map:5@16", kGear};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_EQ(extension.sources, (std::vector<std::string>{"base", kGear}));
+  ASSERT_EQ(extension.left_out.size(), 1U);
+  EXPECT_EQ(extension.left_out.front().source, "joint_map:5@16");
+  EXPECT_LE(extension.left_out.front().z, 0);
+  EXPECT_EQ(extension.after.provenance().level, "base,gear_transmission:3@2");
+}
+
+TEST_F(Extend, KeepsEveryCauseThatLowersTheErrorByItself) {
+  VirtualRobot robot{
+      test::demand(make_physical_model(cell_, {"base", kGear, "encoder_eccentricity:2"})), 20e-6, 60e-6, {}};
+  robot.truth.values.tail<4>() = Eigen::Vector4d(1e-4, 2e-4, 2e-4, 1e-4);
+  batch_ = with_held_out(test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
+  diagnosis_.sources_after = {"base", kGear, "encoder_eccentricity:2"};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_EQ(extension.sources, diagnosis_.sources_after);
+  EXPECT_TRUE(extension.left_out.empty());
+}
+
 /// Row of a pose held out, and the batch with that pose off by `by` (m).
 std::pair<int, MeasurementBatch> with_one_off(MeasurementBatch batch, const Vector3& by) {
   for (Measurement& m : batch.measurements) {

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/measurement/measurement.h"
+#include "server/robot/cell.h"
+
+namespace trammel {
+
+/// A source that poses held out do not speak for.
+struct Unsupported {
+  std::string source;
+  double z = 0;  ///< of its paired gain, PairedGain: not above 0
+};
+
+struct Supported {
+  std::vector<std::string> sources;   ///< of those found, in their order
+  std::vector<Unsupported> left_out;  ///< in the order in which they were dropped
+};
+
+/// Which of the sources `found` lower the squared error of the poses in `judges` by themselves, so that no false one
+/// rides on a true one: `own` and all of them are identified on `train`, and again without each in turn. While one is
+/// there that the poses do without as well or better, the least is dropped and the rest is asked again. Physics
+/// only: a bias would take over what is missing. A single one is not asked: it is what the whole is judged by.
+/// `progress`: the share done; false gives up. Refusals as calibrate().
+[[nodiscard]] Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell,
+                                             const std::vector<std::string>& own, const std::vector<std::string>& found,
+                                             const MeasurementBatch& train, const MeasurementBatch& judges,
+                                             const std::function<bool(double share)>& progress);
+
+/// `encoder_eccentricity:6 is left out: the poses held out do as well without it (z -0.40)`; empty for none.
+[[nodiscard]] std::string to_string(const std::vector<Unsupported>& left_out);
+
+}  // namespace trammel
