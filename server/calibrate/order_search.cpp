@@ -2,10 +2,21 @@
 
 #include <algorithm>
 
+#include "server/calibrate/identify.h"
+#include "server/calibrate/weighting.h"
+
 namespace trammel {
 
 namespace {
 
+/// An order, and what a sine and a cosine of it explain of a joint's share of the residuals.
+struct FoundOrder {
+  double order = 0;  // cycles a turn of the joint
+  double gain = 0;   // weighted sum of squares explained
+};
+
+/// `q`: joint angles, rad; `along`: weighted residual along the joint's Jacobian column; `square`: weighted square of
+/// that column. All of size N.
 FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
                      double order) {
   const Eigen::ArrayXd sine = (order * q.array()).sin();
@@ -18,11 +29,10 @@ FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, con
   normal += 1e-9 * normal.trace() * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d right((along.array() * sine).sum(), (along.array() * cosine).sum());
   const Eigen::Vector2d amplitude = normal.inverse() * right;
-  return {order, amplitude(0), amplitude(1), amplitude.dot(right)};
+  return {order, amplitude.dot(right)};
 }
 
-}  // namespace
-
+/// Periodogram in joint space with unequal weights: over `search`, then refined to a hundredth of its step.
 FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
                         const ErrorSource::Search& search) {
   FoundOrder best;
@@ -36,6 +46,93 @@ FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, 
     for (int k = -4; k <= 4; ++k) consider(centre + k * step);
   }
   return best;
+}
+
+/// First value index of each source.
+std::vector<Eigen::Index> first_values(const PhysicalModel& model) {
+  std::vector<Eigen::Index> first;
+  Eigen::Index next = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    first.push_back(next);
+    next += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  return first;
+}
+
+/// `model` without the sources in `left_out` (indices).
+PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>& left_out) {
+  PhysicalModel less = model;
+  less.sources.clear();
+  std::vector<double> values;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (std::find(left_out.begin(), left_out.end(), k) != left_out.end()) continue;
+    less.sources.push_back(model.sources[k]);
+    for (std::size_t i = 0; i < model.sources[k]->parameters().size(); ++i) {
+      values.push_back(model.values(first[k] + static_cast<Eigen::Index>(i)));
+    }
+  }
+  less.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return less;
+}
+
+/// The order of `source` that explains most of the residuals through its joint's Jacobian column.
+FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, const MeasurementBatch& batch,
+                      const Residuals& r, const Weights& weights) {
+  const auto n = r.position.cols();
+  Eigen::VectorXd q(n);
+  Eigen::VectorXd along(n);   // weighted residual along the column
+  Eigen::VectorXd square(n);  // weighted square of the column
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
+    const Pose X_FT = model.tools.at(context.tool);
+    const Vector3 column =
+        model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(source.joint()).head<3>();
+    const double weight = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
+    q(i) = context.q(source.joint());
+    along(i) = weight * column.dot(r.position.col(i));
+    square(i) = weight * column.squaredNorm();
+  }
+  return search_order(q, along, square, *source.search());
+}
+
+}  // namespace
+
+Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options) {
+  PhysicalModel& model = problem.model;
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (model.sources[k]->search()) open.push_back(k);
+  }
+  const std::vector<Eigen::Index> first = first_values(model);
+  while (!open.empty()) {
+    const Result<CalibrationResult> found = identify({without(model, open), problem.batch}, options);
+    if (!found) return tl::make_unexpected(found.error());
+    const Residuals r = residuals_of(found->model, problem.batch, found->model.values);
+    const Weights weights{found->discrepancy, found->discrepancy_rotation, true};
+    FoundOrder best;
+    std::size_t strongest = open.front();
+    for (const std::size_t k : open) {
+      const FoundOrder candidate = best_order(*model.sources[k], found->model, problem.batch, r, weights);
+      if (candidate.gain > best.gain) {
+        best = candidate;
+        strongest = k;
+      }
+    }
+    model.values(first[strongest]) = best.order;
+    open.erase(std::find(open.begin(), open.end(), strongest));
+  }
+  return {};
+}
+
+std::map<std::string, std::string> found_orders(const PhysicalModel& model) {
+  std::map<std::string, std::string> found;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const ErrorSource& source = *model.sources[k];
+    if (source.search()) found[source.name()] = fmt::format("{}@{:.4f}", source.name(), model.values(first[k]));
+  }
+  return found;
 }
 
 }  // namespace trammel

@@ -1,22 +1,19 @@
 #pragma once
 
-#include <Eigen/Dense>
+#include <map>
+#include <string>
 
-#include "server/error_sources/error_source.h"
+#include "server/calibrate/calibrate.h"
 
+/// Orders of periodic sources that nobody told.
 namespace trammel {
 
-/// A sine and a cosine of one order, fitted to a joint's share of the residuals.
-struct FoundOrder {
-  double order = 0;             ///< cycles a turn of the joint
-  double sine = 0, cosine = 0;  ///< rad
-  double gain = 0;              ///< weighted sum of squares explained
-};
+/// Sources to be searched are found one after the other, the strongest first, each by a periodogram of what the model
+/// found so far leaves over; their values in the model become the start and the centre of the priors (amplitudes stay
+/// free).
+[[nodiscard]] Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options);
 
-/// Periodogram in joint space with unequal weights: over `search`, then refined to a hundredth of its step. `q`: joint
-/// angles, rad; `along`: weighted residual along the joint's Jacobian column; `square`: weighted square of that column.
-/// All of size N.
-[[nodiscard]] FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along,
-                                      const Eigen::VectorXd& square, const ErrorSource::Search& search);
+/// `name@order` of the sources that were searched, by their names: with these specs the search need not be repeated.
+[[nodiscard]] std::map<std::string, std::string> found_orders(const PhysicalModel& model);
 
 }  // namespace trammel

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "server/calibrate/calibrate.h"
+
+/// What a model leaves over, and with what sigma it is therefore weighed.
+namespace trammel {
+
+/// Standard deviations that the model's own error adds to the measurement's.
+struct Weights {
+  double discrepancy = 0;           ///< m per axis
+  double discrepancy_rotation = 0;  ///< rad per axis
+  bool estimated = false;           ///< false: still at the measurement's sigma alone
+};
+
+/// Of one axis of the measured position, m: its own, else the tracker's.
+[[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
+
+/// Measured - predicted in W, SI.
+struct Residuals {
+  Eigen::Matrix3Xd position;  ///< 3 x N
+  Eigen::Matrix3Xd rotation;  ///< 3 x M, rotation vectors of the poses that have an orientation
+  Eigen::VectorXd sigma;      ///< N, of the measured positions
+};
+
+/// At the parameter `values` instead of the model's own.
+[[nodiscard]] Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch,
+                                     const Eigen::VectorXd& values);
+
+/// The discrepancies under which the residuals, after `freedom` parameters were fitted to them, are as large as they
+/// should be. `drop_suspects`: positions that are suspects under `before` do not count.
+[[nodiscard]] Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects,
+                                        double sigma_rotation);
+/// Whether the sigmas that weigh a measurement of `tracker` are as good as the same under both.
+[[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
+
+/// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.
+[[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,
+                                                   const Weights& weights);
+
+/// nat; a suspect counts as far off, not as proof against the model.
+[[nodiscard]] double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation);
+
+}  // namespace trammel
