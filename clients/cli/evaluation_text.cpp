@@ -76,8 +76,8 @@ std::string rotation_text(const CompensatedModel::Parts& parts) {
 std::string choice_text(const BiasChoice& choice) {
   std::string text = choice.sentence + "\n";
   if (choice.candidates.empty()) return text;
-  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "left out", "in time", "in space",
-                      "nlpd (mm)");
+  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "one by one", "in time",
+                      "in space", "nlpd (mm)");
   for (const BiasCandidate& c : choice.candidates) {
     if (c.skipped) {
       text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
@@ -86,6 +86,10 @@ std::string choice_text(const BiasChoice& choice) {
     text += fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
                         to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
   }
+  text +=
+      "  one by one, nlpd: left out of the bias, not of the physics, so that `none` is its residual; in time, in "
+      "space: "
+      "eighths left out of both\n";
   return text;
 }
 

@@ -143,7 +143,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   if (!found)
     return refused("bias fit: no start of {} gave a positive definite covariance of {} observations", options.starts,
                    problem.q.rows());
-  if (found->given_up) return refused("bias fit: given up on request");
+  if (found->given_up) return failure(ErrorCode::kBusy, "bias fit: given up on request");
   state.hyperparameters = as_columns(found->found.outputs);
   state.block_hyperparameters = found->found.blocks;
 

@@ -73,7 +73,7 @@ class BiasModel {
   /// residual as its stddev. The noise of observation i has variance σ_n² sigma_i²/median(sigma²), the ratio kept
   /// within [1/4, 4]; σ_n is learned for each output, with a weak prior against values below metrology's. Refuses fewer
   /// than 10 observations, non-finite numbers, a kernel that cannot be spelled, more than 4000 observations or missing
-  /// features where it has blocks, and to go on when told to stop.
+  /// features where it has blocks; kBusy when `progress` gives up.
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
   /// Same state, same predictions, bit for bit on processors that run the same build of numerics.h (the last bits
   /// differ between AVX2 and AVX-512). Refuses what fit refuses, and hyperparameters of the wrong shape.

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/units.h"
+#include "server/bias/halves.h"
 #include "server/bias/kernel_spelling.h"
 
 namespace trammel {
@@ -18,57 +19,18 @@ using Eigen::VectorXd;
 
 constexpr std::array kCheap = {"se", "matern52", "se + parameters"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
-constexpr int kHalvings = 3;         // of the observations: eight blocks
-constexpr Index kFewest = 30;        // observations; of fewer no block could be left out and judged
-constexpr double kBeyondChance = 2;  // standard errors
-constexpr double kLeavesMore = 1.3;  // of metrology's noise, rms: worth the dear ones
-
-using Blocks = std::vector<std::vector<Index>>;
+constexpr Index kBlocks = 8;
+constexpr std::size_t kFewestBlocks = 4;  // to judge by
+constexpr Index kFewest = 30;             // observations; of fewer no block could be left out and judged
+constexpr double kBeyondChance = 2;       // standard errors
+constexpr double kOfNone = 3;             // hyperparameters: the residual's stddev, of each coordinate
+constexpr double kFit = 0.5;              // of the time that a candidate takes
+constexpr double kLeavesMore = 1.3;       // of metrology's noise, rms: worth the dear ones
 
 std::vector<Index> in_order(Index count) {
   std::vector<Index> all(static_cast<std::size_t>(count));
   std::iota(all.begin(), all.end(), Index{0});
   return all;
-}
-
-/// Halves and halves again; `before` says in which order a part is cut.
-template <typename Before>
-void halve(std::vector<Index> part, int times, const Before& before, Blocks* blocks) {
-  if (times == 0) {
-    std::sort(part.begin(), part.end());
-    blocks->push_back(std::move(part));
-    return;
-  }
-  const auto order = before(part);
-  std::stable_sort(part.begin(), part.end(), order);
-  const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
-  halve(std::vector<Index>(part.begin(), middle), times - 1, before, blocks);
-  halve(std::vector<Index>(middle, part.end()), times - 1, before, blocks);
-}
-
-Blocks blocks_in_time(Index count) {
-  Blocks blocks;
-  halve(
-      in_order(count), kHalvings, [](const std::vector<Index>&) { return std::less<>(); }, &blocks);
-  return blocks;
-}
-
-/// Each part is cut across the joint that spreads widest in it.
-Blocks blocks_in_joint_space(const MatrixXd& q) {
-  Blocks blocks;
-  const auto along_widest = [&q](const std::vector<Index>& part) {
-    Index widest = 0;
-    double width = -1;
-    for (Index j = 0; j < q.cols(); ++j) {
-      const VectorXd column = q.col(j)(part);
-      const double spread = column.maxCoeff() - column.minCoeff();
-      if (spread > width) widest = j;
-      width = std::max(width, spread);
-    }
-    return [&q, widest](Index a, Index b) { return q(a, widest) < q(b, widest); };
-  };
-  halve(in_order(q.rows()), kHalvings, along_widest, &blocks);
-  return blocks;
 }
 
 double rms(const MatrixXd& error) { return std::sqrt(error.squaredNorm() / static_cast<double>(error.rows())); }
@@ -86,11 +48,14 @@ struct Fold {
   MatrixXd residual_B;  // N x 3
 };
 
-std::vector<Fold> folds(const BiasProblem& problem, const Blocks& blocks, const ResidualWithout& residual_without) {
+/// Eighths of the observations that are neighbours in `table`, N x n; without those that the physics cannot spare.
+std::vector<Fold> folds(const BiasProblem& problem, const MatrixXd& table, const ResidualWithout& residual_without) {
   const std::vector<Index> observations = in_order(problem.q.rows());
   std::vector<Fold> all;
-  for (const std::vector<Index>& block : blocks) {
-    Fold fold{block, {}, residual_without ? residual_without(block) : problem.residual_B};
+  for (const std::vector<Index>& block : halved(table, (table.rows() + kBlocks - 1) / kBlocks)) {
+    std::optional<MatrixXd> residual_B = residual_without ? residual_without(block) : problem.residual_B;
+    if (!residual_B) continue;
+    Fold fold{block, {}, *std::move(residual_B)};
     std::set_difference(observations.begin(), observations.end(), block.begin(), block.end(),
                         std::back_inserter(fold.rest));
     all.push_back(std::move(fold));
@@ -98,11 +63,23 @@ std::vector<Fold> folds(const BiasProblem& problem, const Blocks& blocks, const 
   return all;
 }
 
-/// N x 3: what `none` misses of each observation when its block is left out.
-MatrixXd missed_by_none(const std::vector<Fold>& folds, Index count) {
-  MatrixXd error(count, 3);
-  for (const Fold& fold : folds) error(fold.block, Eigen::all) = fold.residual_B(fold.block, Eigen::all);
+/// What is missed of the observations of each fold's block.
+using Missed = std::vector<MatrixXd>;
+
+Missed missed_by_none(const std::vector<Fold>& folds) {
+  Missed error;
+  for (const Fold& fold : folds) error.emplace_back(fold.residual_B(fold.block, Eigen::all));
   return error;
+}
+
+double rms(const Missed& error) {
+  double squares = 0;
+  Index count = 0;
+  for (const MatrixXd& block : error) {
+    squares += block.squaredNorm();
+    count += block.rows();
+  }
+  return std::sqrt(squares / static_cast<double>(count));
 }
 
 template <typename T>
@@ -114,9 +91,10 @@ std::vector<T> at(const std::vector<T>& all, const std::vector<Index>& rows) {
   return some;
 }
 
-/// The same with the bias conditioned on the rest; the hyperparameters stay.
-Result<MatrixXd> missed(const BiasState& state, const std::vector<Fold>& folds) {
-  MatrixXd error(state.q.rows(), 3);
+/// The same with the bias conditioned on the rest; the hyperparameters stay. `progress` is told the share done.
+Result<Missed> missed(const BiasState& state, const std::vector<Fold>& folds,
+                      const std::function<bool(double)>& progress) {
+  Missed error;
   for (const Fold& fold : folds) {
     BiasState part = state;
     part.q = state.q(fold.rest, Eigen::all);
@@ -125,8 +103,10 @@ Result<MatrixXd> missed(const BiasState& state, const std::vector<Fold>& folds) 
     part.features = at(state.features, fold.rest);
     const Result<BiasModel> rest = BiasModel::restore(part);
     if (!rest) return tl::make_unexpected(rest.error());
-    error(fold.block, Eigen::all) = fold.residual_B(fold.block, Eigen::all) -
-                                    rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
+    error.emplace_back(fold.residual_B(fold.block, Eigen::all) -
+                       rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block)));
+    if (!progress(static_cast<double>(error.size()) / static_cast<double>(folds.size())))
+      return failure(ErrorCode::kBusy, "bias choice: given up on request");
   }
   return error;
 }
@@ -142,21 +122,41 @@ Mean mean_of(const VectorXd& samples) {
 }
 
 /// By how much the mean square of `without` falls in `with`, block by block, m².
-Mean gain_of(const MatrixXd& without, const MatrixXd& with, const std::vector<Fold>& folds) {
-  VectorXd gain(static_cast<Index>(folds.size()));
-  for (Index b = 0; b < gain.size(); ++b) {
-    const std::vector<Index>& block = folds[static_cast<std::size_t>(b)].block;
-    gain[b] = (without(block, Eigen::all).squaredNorm() - with(block, Eigen::all).squaredNorm()) /
-              static_cast<double>(block.size());
-  }
+Mean gain_of(const Missed& without, const Missed& with) {
+  VectorXd gain(static_cast<Index>(without.size()));
+  for (std::size_t b = 0; b < without.size(); ++b)
+    gain[static_cast<Index>(b)] =
+        (without[b].squaredNorm() - with[b].squaredNorm()) / static_cast<double>(without[b].rows());
   return mean_of(gain);
+}
+
+/// What an observation is expected to be without a bias: the residual's deviation, of each coordinate.
+VectorXd negative_log_density_of_none(const MatrixXd& error) {
+  const Vector3 stddev = (error.colwise().squaredNorm() / static_cast<double>(error.rows())).cwiseSqrt().cwiseMax(1e-9);
+  return negative_log_density(error, stddev.transpose().replicate(error.rows(), 1));
+}
+
+VectorXd negative_log_density_left_out(const BiasProblem& problem, const BiasModel& model) {
+  return negative_log_density(problem.residual_B - model.leave_one_out_mean_B(), model.leave_one_out_stddev_B());
+}
+
+double hyperparameters_of(const BiasModel& model) {
+  const BiasState& state = model.state();
+  return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
+}
+
+/// Of each observation. The hyperparameters were found with the one left out, too: each lends the sum a nat (Akaike
+/// 1974).
+bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
+  const Mean likelier = mean_of(other - nlpd);
+  return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) > kBeyondChance * likelier.stddev;
 }
 
 /// The one that no other asked so far beats.
 struct Best {
   std::size_t candidate = 0;
-  VectorXd nlpd;               // of each observation
-  double hyperparameters = 3;  // the residual's stddev, of each coordinate
+  VectorXd nlpd;  // of each observation
+  double hyperparameters = kOfNone;
   std::optional<BiasModel> model;
 };
 
@@ -166,14 +166,22 @@ class Choosing {
            Index most_coupled)
       : problem_(problem), options_(options), most_coupled_(most_coupled) {
     if (problem.q.rows() < kFewest) return;
-    in_time_ = folds(problem, blocks_in_time(problem.q.rows()), residual_without);
-    in_joint_space_ = folds(problem, blocks_in_joint_space(problem.q), residual_without);
+    const Index count = problem.q.rows();
+    in_time_ = folds(problem, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
+    in_joint_space_ = folds(problem, problem.q, residual_without);
   }
 
   Result<ChosenBias> run() {
     if (problem_.q.rows() < kFewest) {
       choice_.sentence =
           fmt::format("no bias: {} observations are too few to judge one, at least {}", problem_.q.rows(), kFewest);
+      choice_.kernel = "none";
+      return ChosenBias{choice_, std::nullopt};
+    }
+    if (std::min(in_time_.size(), in_joint_space_.size()) < kFewestBlocks) {
+      choice_.sentence =
+          "no bias: too little is left to identify the physics from without blocks of the poses, "
+          "so none can be judged";
       choice_.kernel = "none";
       return ChosenBias{choice_, std::nullopt};
     }
@@ -192,11 +200,9 @@ class Choosing {
  private:
   void ask_none() {
     const MatrixXd& error = problem_.residual_B;
-    const Vector3 stddev =
-        (error.colwise().squaredNorm() / static_cast<double>(error.rows())).cwiseSqrt().cwiseMax(1e-9);
-    best_.nlpd = negative_log_density(error, stddev.transpose().replicate(error.rows(), 1));
-    without_in_time_ = missed_by_none(in_time_, error.rows());
-    without_in_joint_space_ = missed_by_none(in_joint_space_, error.rows());
+    best_.nlpd = negative_log_density_of_none(error);
+    without_in_time_ = missed_by_none(in_time_);
+    without_in_joint_space_ = missed_by_none(in_joint_space_);
     choice_.candidates.push_back(
         {"none", rms(error), best_.nlpd.mean() / 3, rms(without_in_time_), rms(without_in_joint_space_), 0, 0, ""});
   }
@@ -213,31 +219,28 @@ class Choosing {
     BiasOptions options = options_;
     options.kernel = kernel;
     const double most = kCheap.size() + kDear.size();
-    options.progress = [this, most, done = asked_++](double share) {
+    const auto report = [this, most, done = asked_++](double share) {
       return !options_.progress || options_.progress((done + share) / most);
     };
+    options.progress = [&](double share) { return report(kFit * share); };
     Result<BiasModel> model = BiasModel::fit(problem_, options);
     if (!model) return tl::make_unexpected(model.error());
     const MatrixXd error = problem_.residual_B - model->leave_one_out_mean_B();
-    const VectorXd nlpd = negative_log_density(error, model->leave_one_out_stddev_B());
-    const auto in_time = missed(model->state(), in_time_);
+    const VectorXd nlpd = negative_log_density_left_out(problem_, *model);
+    constexpr double kBoth = (1 - kFit) / 2;
+    const auto in_time = missed(model->state(), in_time_, [&](double share) { return report(kFit + kBoth * share); });
     if (!in_time) return tl::make_unexpected(in_time.error());
-    const auto in_joint_space = missed(model->state(), in_joint_space_);
+    const auto in_joint_space =
+        missed(model->state(), in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); });
     if (!in_joint_space) return tl::make_unexpected(in_joint_space.error());
-    const Mean gain = gain_of(without_in_time_, *in_time, in_time_);
-    const Mean far = gain_of(without_in_joint_space_, *in_joint_space, in_joint_space_);
+    const Mean gain = gain_of(without_in_time_, *in_time);
+    const Mean far = gain_of(without_in_joint_space_, *in_joint_space);
     choice_.candidates.push_back(
         {kernel, rms(error), nlpd.mean() / 3, rms(*in_time), rms(*in_joint_space), gain.value, gain.stddev, ""});
     BiasCandidate& candidate = choice_.candidates.back();
 
-    // The hyperparameters were found with the observation left out, too: each lends the sum a nat (Akaike 1974).
-    const BiasState& state = model->state();
-    const auto count = static_cast<double>(nlpd.size());
-    const double hyperparameters =
-        static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
-    const Mean likelier = mean_of(best_.nlpd - nlpd);
-    const double lent = (hyperparameters - best_.hyperparameters) / count;
-    if (likelier.value - lent <= kBeyondChance * likelier.stddev) {
+    const double hyperparameters = hyperparameters_of(*model);
+    if (!clearly_likelier(nlpd, best_.nlpd, hyperparameters - best_.hyperparameters)) {
       candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
     } else if (gain.value <= kBeyondChance * gain.stddev) {
       candidate.verdict = "does not help beyond chance where neighbours in time are left out";
@@ -259,8 +262,8 @@ class Choosing {
     const BiasCandidate& none = choice_.candidates.front();
     if (best_.candidate > 0) {
       choice_.sentence = fmt::format(
-          "bias {}: leave-one-out {:.4f} mm, {:.4f} mm without; blocks left out in time {:.4f} mm, in joint space "
-          "{:.4f} mm",
+          "bias {}: leave-one-out {:.4f} mm, the residual is {:.4f} mm; blocks left out in time {:.4f} mm, in joint "
+          "space {:.4f} mm",
           taken.kernel, to_mm(taken.leave_one_out_rms), to_mm(none.leave_one_out_rms), to_mm(taken.time_block_rms),
           to_mm(taken.joint_block_rms));
     } else {
@@ -269,9 +272,13 @@ class Choosing {
             return a.skipped != b.skipped ? b.skipped : a.leave_one_out_nlpd < b.leave_one_out_nlpd;
           });
       choice_.sentence =
-          fmt::format("no bias helps: leave-one-out {:.4f} mm without, {:.4f} mm with {}, which {}; left out",
+          fmt::format("no bias helps: the residual is {:.4f} mm, leave-one-out {:.4f} mm with {}, which {}; left out",
                       to_mm(none.leave_one_out_rms), to_mm(other->leave_one_out_rms), other->kernel,
                       other->verdict.starts_with("not clearly") ? "is not clearly likelier" : other->verdict);
+    }
+    if (const std::size_t unjudged = 2 * kBlocks - in_time_.size() - in_joint_space_.size(); unjudged > 0) {
+      choice_.sentence += fmt::format("; {} of {} blocks do not judge: without them the physics cannot be identified",
+                                      unjudged, 2 * kBlocks);
     }
     return {std::move(choice_), std::move(best_.model)};
   }
@@ -280,13 +287,18 @@ class Choosing {
   const BiasOptions& options_;
   const Index most_coupled_;
   std::vector<Fold> in_time_, in_joint_space_;
-  MatrixXd without_in_time_, without_in_joint_space_;  // N x 3, m: what `none` misses there
+  Missed without_in_time_, without_in_joint_space_;  // by `none`
   BiasChoice choice_;
   Best best_;
   int asked_ = 0;
 };
 
 }  // namespace
+
+bool is_worth_it(const BiasProblem& problem, const BiasModel& model) {
+  return clearly_likelier(negative_log_density_left_out(problem, model),
+                          negative_log_density_of_none(problem.residual_B), hyperparameters_of(model) - kOfNone);
+}
 
 Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                const ResidualWithout& residual_without, Index most_coupled) {

@@ -12,7 +12,7 @@ namespace trammel {
 /// What a bias is worth: errors of observations that it was conditioned without.
 struct BiasCandidate {
   std::string kernel;             ///< as spelled; `none` first
-  double leave_one_out_rms = 0;   ///< m, Euclidean
+  double leave_one_out_rms = 0;   ///< m, Euclidean, under the physics identified with all; of `none` the residual
   double leave_one_out_nlpd = 0;  ///< mean over coordinates of -log density, nat, of positions in m
   double time_block_rms = 0;      ///< m, Euclidean; every eighth of the observations in their order left out at once
   double joint_block_rms = 0;     ///< m; the same of eighths of joint space
@@ -36,9 +36,14 @@ struct ChosenBias {
 /// The word for it in place of a kernel.
 inline constexpr std::string_view kAutoBias = "auto";
 
-/// N x 3, m: the residuals of all observations under a physics identified without these. Observations that helped to
-/// identify it fit it too well: a bias could seem to predict what is only the imprint of those left out.
-using ResidualWithout = std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>;
+/// N x 3, m: the residuals of all observations under a physics identified without these; empty where that cannot be.
+/// Observations that helped to identify it fit it too well: a bias could seem to predict what is only the imprint of
+/// those left out.
+using ResidualWithout = std::function<std::optional<Eigen::MatrixXd>(const std::vector<Eigen::Index>&)>;
+
+/// Whether `model`, fitted to `problem`, is clearly likelier leave-one-out than none: by more than a nat for each
+/// hyperparameter that it has more and twice the standard error.
+[[nodiscard]] bool is_worth_it(const BiasProblem& problem, const BiasModel& model);
 
 /// Takes the simplest of `none`, `se`, `matern52`, `se + parameters` and, where even the best of these leaves clearly
 /// more than metrology's noise, `matern52 + joint_map + parameters` and `se + joint_map` that no other beats. One
@@ -48,8 +53,9 @@ using ResidualWithout = std::function<Eigen::MatrixXd(const std::vector<Eigen::I
 /// hyperparameters as found and the physics as `residual_without` says (empty: as in `problem`), confirms it: in time
 /// the mean square error falls by more than twice its standard error over the blocks, in joint space it does not rise
 /// by as much. Kernels with blocks are asked only where `problem` has features, and skipped beyond `most_coupled`
-/// observations. At most five fits; same problem and seed, same choice. Of `options` the kernel is not used. Refuses
-/// what BiasModel::fit() refuses; with fewer than 30 observations nothing is taken.
+/// observations. A block that the physics cannot spare does not judge, and the sentence says so; where fewer than half
+/// are left, nothing is taken. At most five fits; same problem and seed, same choice. Of `options` the kernel is not
+/// used. Refuses what BiasModel::fit() refuses; with fewer than 30 observations nothing is taken.
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                              const ResidualWithout& residual_without = {},
                                              Eigen::Index most_coupled = kMostCoupled);

@@ -54,6 +54,26 @@ class CompositeKernel : public Kernel {
       place.kernel->features(place.of(parameters), q, table + place.feature * ld, ld);
   }
 
+  void diagonal(const VectorXd& parameters, const FeatureBlock& a, double* k) const override {
+    auto total = columns_of(k, a.rows, 1, a.rows).array();
+    total = neutral();
+    MatrixXd own(a.rows, 1);
+    for (const Place& place : places_for(parameters)) {
+      place.kernel->diagonal(place.of(parameters), place.of(a), own.data());
+      join(place, parameters, own.array(), total);
+    }
+  }
+
+  void tile(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,
+            Index ldk) const override {
+    auto total = columns_of(k, a.rows, b.rows, ldk).array();
+    total = neutral();
+    for (const Place& place : places_for(parameters)) {
+      const AlignedMatrix own = tile_of(*place.kernel, place.of(parameters), place.of(a), place.of(b));
+      join(place, parameters, own.map().topRows(a.rows).array(), total);
+    }
+  }
+
  protected:
   /// Where a part finds its own.
   struct Place {
@@ -83,9 +103,15 @@ class CompositeKernel : public Kernel {
     return places(joints_of(*this, parameters.size()));
   }
 
+  using Table = Eigen::Ref<Eigen::ArrayXXd, 0, Eigen::OuterStride<>>;
+  using ConstTable = Eigen::Ref<const Eigen::ArrayXXd, 0, Eigen::OuterStride<>>;
+
  private:
   // How many log amplitudes stand before the parameters of a part: one or none.
   virtual Index amplitudes(std::size_t part) const = 0;
+  // What `total` is before any part, and how a part enters it.
+  virtual double neutral() const = 0;
+  virtual void join(const Place& place, const VectorXd& parameters, const ConstTable& own, Table total) const = 0;
 
   std::vector<KernelPtr> parts_;
   std::string name_;
@@ -94,26 +120,6 @@ class CompositeKernel : public Kernel {
 class SumKernel : public CompositeKernel {
  public:
   explicit SumKernel(std::vector<KernelPtr> parts) : CompositeKernel(std::move(parts), " + ") {}
-
-  void diagonal(const VectorXd& parameters, const FeatureBlock& a, double* k) const override {
-    Eigen::Map<VectorXd> total(k, a.rows);
-    VectorXd own(a.rows);
-    total.setZero();
-    for (const Place& place : places_for(parameters)) {
-      place.kernel->diagonal(place.of(parameters), place.of(a), own.data());
-      total += variance(place, parameters) * own;
-    }
-  }
-
-  void tile(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,
-            Index ldk) const override {
-    auto total = columns_of(k, a.rows, b.rows, ldk);
-    total.setZero();
-    for (const Place& place : places_for(parameters)) {
-      const AlignedMatrix own = tile_of(*place.kernel, place.of(parameters), place.of(a), place.of(b));
-      total += variance(place, parameters) * own.map().topRows(a.rows);
-    }
-  }
 
   void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
                      Index ldg, double* gradient) const override {
@@ -150,31 +156,15 @@ class SumKernel : public CompositeKernel {
   }
 
   Index amplitudes(std::size_t part) const override { return part == 0 ? 0 : 1; }
+  double neutral() const override { return 0; }
+  void join(const Place& place, const VectorXd& parameters, const ConstTable& own, Table total) const override {
+    total += variance(place, parameters) * own;
+  }
 };
 
 class ProductKernel : public CompositeKernel {
  public:
   explicit ProductKernel(std::vector<KernelPtr> parts) : CompositeKernel(std::move(parts), " * ") {}
-
-  void diagonal(const VectorXd& parameters, const FeatureBlock& a, double* k) const override {
-    Eigen::Map<VectorXd> total(k, a.rows);
-    VectorXd own(a.rows);
-    total.setOnes();
-    for (const Place& place : places_for(parameters)) {
-      place.kernel->diagonal(place.of(parameters), place.of(a), own.data());
-      total.array() *= own.array();
-    }
-  }
-
-  void tile(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, double* k,
-            Index ldk) const override {
-    auto total = columns_of(k, a.rows, b.rows, ldk);
-    total.setOnes();
-    for (const Place& place : places_for(parameters)) {
-      const AlignedMatrix own = tile_of(*place.kernel, place.of(parameters), place.of(a), place.of(b));
-      total.array() *= own.map().topRows(a.rows).array();
-    }
-  }
 
   // Each part's slope is weighted by the tiles of all the others.
   void tile_gradient(const VectorXd& parameters, const FeatureBlock& a, const FeatureBlock& b, const double* g,
@@ -202,6 +192,10 @@ class ProductKernel : public CompositeKernel {
 
  private:
   Index amplitudes(std::size_t /*part*/) const override { return 0; }
+  double neutral() const override { return 1; }
+  void join(const Place& /*place*/, const VectorXd& /*parameters*/, const ConstTable& own, Table total) const override {
+    total *= own;
+  }
 };
 
 }  // namespace

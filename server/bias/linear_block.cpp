@@ -16,22 +16,11 @@ LinearBlocks::LinearBlocks(std::vector<LinearBlockPtr> blocks, const BiasFeature
   }
 }
 
-VectorXd LinearBlocks::start() const {
+VectorXd LinearBlocks::of_each(VectorXd (LinearBlock::*figure)(const BiasFeatures&) const) const {
   VectorXd all(parameters_);
   Index first = 0;
   for (const LinearBlockPtr& block : blocks_) {
-    const VectorXd part = block->start(shape_);
-    all.segment(first, part.size()) = part;
-    first += part.size();
-  }
-  return all;
-}
-
-VectorXd LinearBlocks::spread() const {
-  VectorXd all(parameters_);
-  Index first = 0;
-  for (const LinearBlockPtr& block : blocks_) {
-    const VectorXd part = block->spread(shape_);
+    const VectorXd part = ((*block).*figure)(shape_);
     all.segment(first, part.size()) = part;
     first += part.size();
   }

@@ -57,13 +57,15 @@ class LinearBlocks {
   [[nodiscard]] bool empty() const { return blocks_.empty(); }
   [[nodiscard]] Eigen::Index column_count() const { return columns_; }
   [[nodiscard]] Eigen::Index parameter_count() const { return parameters_; }
-  [[nodiscard]] Eigen::VectorXd start() const;
-  [[nodiscard]] Eigen::VectorXd spread() const;
+  [[nodiscard]] Eigen::VectorXd start() const { return of_each(&LinearBlock::start); }
+  [[nodiscard]] Eigen::VectorXd spread() const { return of_each(&LinearBlock::spread); }
   [[nodiscard]] Eigen::MatrixXd columns(const JointVector& q, const BiasFeatures& features) const;
   void log_variance(const Eigen::VectorXd& parameters, Eigen::VectorXd* log_variance,
                     Eigen::MatrixXd* derivative) const;
 
  private:
+  Eigen::VectorXd of_each(Eigen::VectorXd (LinearBlock::*figure)(const BiasFeatures&) const) const;
+
   std::vector<LinearBlockPtr> blocks_;
   BiasFeatures shape_;  // only its dimensions count
   Eigen::Index columns_ = 0;

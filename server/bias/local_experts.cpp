@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/bias/halves.h"
 
 namespace trammel {
 namespace {
@@ -15,31 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kMostExact = 5000;
-constexpr std::size_t kMostOfAnExpert = 1200;
+constexpr Index kMostOfAnExpert = 1200;
 constexpr double kLeastShare = 1e-12;  // of the prior; keeps the precision of a point known exactly finite
-
-// Halves along the joint that spreads widest, until every part is small enough.
-void halve(const MatrixXd& features, std::vector<Index> points, std::vector<std::vector<Index>>* parts) {
-  if (points.size() <= kMostOfAnExpert) {
-    std::sort(points.begin(), points.end());
-    parts->push_back(std::move(points));
-    return;
-  }
-  Index widest = 0;
-  double width = -1;
-  for (Index k = 0; k < features.cols(); ++k) {
-    const auto column = features.col(k)(points);
-    const double spread = column.maxCoeff() - column.minCoeff();
-    if (spread > width) widest = k;
-    width = std::max(width, spread);
-  }
-  const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
-  std::nth_element(points.begin(), middle, points.end(), [&](Index a, Index b) {
-    return features(a, widest) != features(b, widest) ? features(a, widest) < features(b, widest) : a < b;
-  });
-  halve(features, {points.begin(), middle}, parts);
-  halve(features, {middle, points.end()}, parts);
-}
 
 // In length scales for a kernel that has one of each joint and hardly more; for others, which tell neighbours in more
 // than one way or in none, in rad.
@@ -51,12 +29,8 @@ MatrixXd joints_as_seen_by(const Kernel& kernel, const VectorXd& parameters, con
 }
 
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
-  std::vector<Index> all(static_cast<std::size_t>(q.rows()));
-  std::iota(all.begin(), all.end(), Index{0});
-  if (q.rows() <= kMostExact) return {all};
-  std::vector<std::vector<Index>> parts;
-  halve(joints_as_seen_by(kernel, parameters, q), all, &parts);
-  return parts;
+  if (q.rows() <= kMostExact) return halved(q, q.rows());
+  return halved(joints_as_seen_by(kernel, parameters, q), kMostOfAnExpert);
 }
 
 }  // namespace

@@ -12,7 +12,8 @@ namespace {
 /// `compliance` has three forms; any of them will do.
 bool has_source(const PhysicalModel& physics, const std::string& name) {
   return std::any_of(physics.sources.begin(), physics.sources.end(), [&](const ErrorSourcePtr& source) {
-    return source->name() == name || source->name().starts_with(name + "_");
+    const std::string cause = source->name().substr(0, source->name().find_first_of(":@"));
+    return cause == name || (name == "compliance" && cause.starts_with("compliance_"));
   });
 }
 

@@ -100,7 +100,7 @@ Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, con
                                              const BiasOptions& options, const LeftOut& left_out) {
   Result<ChosenBias> chosen = choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
     const auto without = left_out.without(observations);
-    return without ? without->residual_B : problem.residual_B;
+    return without ? std::optional(without->residual_B) : std::nullopt;
   });
   if (!chosen) return tl::make_unexpected(chosen.error());
   parts.bias_choice = std::move(chosen->choice);
@@ -108,6 +108,7 @@ Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, con
 }
 
 /// The orientation by a process of its own, of the same kernel: what is learned of the positions stays what it is.
+/// Where the kernel was chosen for the positions, it must be worth it here too.
 Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const BiasProblem& problem,
                          const BiasOptions& options) {
   const std::optional<BiasProblem> rotation = rotation_problem(parts.physics, batch, problem);
@@ -118,6 +119,10 @@ Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch&
   }
   const Result<BiasModel> learned = BiasModel::fit(*rotation, options);
   if (!learned) return tl::make_unexpected(learned.error());
+  if (parts.bias_choice && !is_worth_it(*rotation, *learned)) {
+    parts.bias_choice->sentence += "; of the orientations it explains nothing beyond chance and corrects none";
+    return {};
+  }
   parts.rotation_bias = learned->state();
   parts.rotation_bias->features.clear();
   return {};
@@ -285,6 +290,7 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Me
   if (!checked) return tl::make_unexpected(checked.error());
   if (checked->measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
   CompensatedModel::Parts parts = calibrated.parts();
+  if (calibrated.provenance().batch_hash != batch_hash(batch)) parts.suspects.clear();  // of other poses
   CalibrationResult as_it_is;
   as_it_is.model = parts.physics;
   as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());

@@ -25,7 +25,7 @@ TEST(ChooseBias, TakesNoneOfNoise) {
       EXPECT_EQ(chosen.choice.kernel, "none") << count << " " << seed << ": " << chosen.choice.sentence;
       EXPECT_FALSE(chosen.model);
       EXPECT_EQ(chosen.choice.candidates.front().verdict, "taken");
-      EXPECT_TRUE(chosen.choice.sentence.starts_with("no bias helps: leave-one-out ")) << chosen.choice.sentence;
+      EXPECT_TRUE(chosen.choice.sentence.starts_with("no bias helps: the residual is ")) << chosen.choice.sentence;
       EXPECT_TRUE(chosen.choice.sentence.ends_with("; left out")) << chosen.choice.sentence;
     }
   }
@@ -89,6 +89,56 @@ TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
   EXPECT_EQ(asked, std::vector<std::size_t>(16, 10));  // eight blocks in time, eight in joint space
   EXPECT_GT(chosen.choice.candidates[0].time_block_rms, 0.9);
   EXPECT_EQ(chosen.choice.kernel, "none");
+}
+
+TEST(ChooseBias, ABlockThatThePhysicsCannotSpareDoesNotJudgeAndTheSentenceSaysSo) {
+  const BiasProblem problem = smooth_problem(80, 5);
+  int asked = 0;
+  const auto choice_where_fail = [&](int blocks) {
+    asked = 0;
+    return choose_bias(problem, {},
+                       [&](const std::vector<Index>& block) -> std::optional<MatrixXd> {
+                         if (asked++ < blocks) return std::nullopt;
+                         MatrixXd residual = problem.residual_B;
+                         residual(block, Eigen::all).setConstant(0.5);  // m
+                         return residual;
+                       })
+        .value()
+        .choice;
+  };
+  const BiasChoice some = choice_where_fail(3);
+  EXPECT_NEAR(some.candidates.front().time_block_rms, std::sqrt(3 * 0.25), 1e-12) << "of the other five blocks alone";
+  EXPECT_TRUE(some.sentence.ends_with("; 3 of 16 blocks do not judge: without them the physics cannot be identified"))
+      << some.sentence;
+  const BiasChoice few = choice_where_fail(5);
+  EXPECT_EQ(few.kernel, "none");
+  EXPECT_TRUE(few.candidates.empty());
+  EXPECT_NE(few.sentence.find("too little is left to identify the physics"), std::string::npos) << few.sentence;
+}
+
+TEST(ChooseBias, SaysHowFarItIsAndStopsWhenToldToWhileBlocksAreLeftOut) {
+  BiasOptions options;
+  std::vector<double> shares;
+  options.progress = [&](double share) {
+    shares.push_back(share);
+    return true;
+  };
+  const BiasProblem problem = noise_alone(60, 7);
+  ASSERT_TRUE(choose_bias(problem, options));
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  // Of five kernels the first: fitted at a tenth of the whole, each of its sixteen blocks left out by a fifth.
+  EXPECT_EQ(std::count_if(shares.begin(), shares.end(), [](double share) { return share > 0.1 && share <= 0.2; }), 16);
+  options.progress = [](double share) { return share < 0.15; };
+  const auto stopped = choose_bias(problem, options);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kBusy);
+}
+
+TEST(ChooseBias, ABiasIsWorthItWhereItIsClearlyLikelierThanNone) {
+  const BiasProblem smooth = smooth_problem(100, 8);
+  EXPECT_TRUE(is_worth_it(smooth, BiasModel::fit(smooth, {}).value()));
+  const BiasProblem noise = noise_alone(100, 8);
+  EXPECT_FALSE(is_worth_it(noise, BiasModel::fit(noise, {}).value()));
 }
 
 TEST(ChooseBias, KernelsWithBlocksAreSkippedWhereThereAreMoreObservationsThanTheyMayHave) {

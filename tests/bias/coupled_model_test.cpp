@@ -163,6 +163,7 @@ TEST(CoupledModel, StopsWhenTold) {
   const auto model = BiasModel::fit(gear_problem(60, 6), options);
   ASSERT_FALSE(model.has_value());
   EXPECT_EQ(model.error().message, "bias fit: given up on request");
+  EXPECT_EQ(model.error().code, ErrorCode::kBusy);
 }
 
 }  // namespace

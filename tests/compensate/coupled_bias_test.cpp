@@ -173,6 +173,16 @@ TEST_F(CoupledBias, TheCovarianceOfAPredictionIsTheBiasOwnAndTheNoise) {
   }
 }
 
+TEST(BiasPhysics, AToolThatChangedIsNotTheToolThatNobodyKnows) {
+  const auto cell = test::cell_7_unlocated();
+  const PhysicalModel without = test::demand(make_physical_model(cell, {"base", "geometry"}));
+  const PhysicalModel changed = test::demand(make_physical_model(cell, {"base", "geometry", "tool_changed@10"}));
+  const auto columns = [](const PhysicalModel& physics) {
+    return BiasPhysics(physics).at(posed(inside())).by_parameter.cols();
+  };
+  EXPECT_EQ(columns(changed), columns(without) + changed.values.size() - without.values.size());
+}
+
 TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {
   const PhysicalModel& physics = model_->parts().physics;
   const BiasFeatures features = model_->features(posed(inside()));
