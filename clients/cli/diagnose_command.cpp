@@ -105,7 +105,7 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   const Result<MeasurementBatch> batch = batch_to_diagnose(arguments);
   if (!batch) return tl::make_unexpected(batch.error());
   const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
-  if (!diagnosis) return tl::make_unexpected(diagnosis.error());
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
   ordered_json json = diagnosis_json(*diagnosis);
   say(diagnosis_text(json), arguments);
   std::optional<Result<Extension>> applied;

@@ -108,7 +108,8 @@ Status add_learned(const std::string& level, const CompensatedModel& model, cons
                    const MeasurementBatch& batch, Study& study) {
   const Eigen::Matrix3Xd left = left_by_bias(model, batch);
   study.rows.push_back({set, level + "+GP", model.provenance().training_poses,
-                        static_cast<int>(batch.measurements.size()), figures_of(left), model.evaluate(batch)});
+                        static_cast<int>(batch.measurements.size()), figures_of(left), model.evaluate(batch),
+                        !model.bias()});
   return {};
 }
 

@@ -31,6 +31,7 @@ struct StudyRow {
   int poses = 0;                     ///< in the set
   ErrorFigures figures;              ///< with the learned bias applied at every pose, as the source does
   std::optional<Evaluation> served;  ///< of a learned bias: as answers are given, with the calibrated model off domain
+  bool bias_left_out = false;        ///< `M3+GP` where none was worth it: the calibrated model as it is
 };
 
 /// A parameter of the virtual robot and what the levels take it for, in the parameter's unit.

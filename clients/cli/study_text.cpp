@@ -20,6 +20,11 @@ std::optional<PrintedFigures> row_printed(const Study& study, const StudyRow& ro
   return printed_figures(study.name, row.set, row.model);
 }
 
+/// `M3+none` where a bias was asked for and none was worth it.
+std::string shown_model(const StudyRow& row) {
+  return row.bias_left_out ? row.model.substr(0, row.model.find('+')) + "+none" : row.model;
+}
+
 bool reached(const Aim& aim, const StudyRow& row) {
   return to_mm(row.figures.rms) >= aim.least_mm && to_mm(row.figures.rms) <= aim.most_mm;
 }
@@ -44,11 +49,14 @@ std::string error_table(const Study& study) {
   for (const StudyRow& row : study.rows) {
     const std::optional<PrintedFigures> printed = row_printed(study, row);
     text += fmt::format(
-        "{:<28}{:<8}{:>6}{:>7} |{:>8}{:>9} |{:>9.4f}{:>9.4f}{:>9.4f}{:>9.4f} | {}\n", row.set, row.model,
+        "{:<28}{:<8}{:>6}{:>7} |{:>8}{:>9} |{:>9.4f}{:>9.4f}{:>9.4f}{:>9.4f} | {}\n", row.set, shown_model(row),
         row.training_poses, row.poses, printed ? fmt::format("{:.3f}", printed->rms_mm) : "-",
         printed ? fmt::format("{:.3f}", printed->max_mm) : "-", to_mm(row.figures.rms), to_mm(row.figures.mean),
         to_mm(row.figures.p997), to_mm(row.figures.max), aim_text(row_aim(study, row), row));
   }
+  const auto left_out = [](const StudyRow& row) { return row.bias_left_out; };
+  if (std::any_of(study.rows.begin(), study.rows.end(), left_out))
+    text += "+none: no bias was worth it, so this is the calibrated model\n";
   return text;
 }
 
@@ -60,7 +68,7 @@ std::string axis_table(const Study& study) {
     text += fmt::format("{:>17}{:>17}{:>17}{}", "x", "y", "z", side == 0 ? "|" : "\n");
   for (const StudyRow& row : study.rows) {
     const std::optional<PrintedFigures> printed = row_printed(study, row);
-    text += fmt::format("{:<28}{:<8}|", row.set, row.model);
+    text += fmt::format("{:<28}{:<8}|", row.set, shown_model(row));
     for (std::size_t k = 0; k < 3; ++k) {
       text += fmt::format("{:>17}",
                           printed ? fmt::format("{:.3f} ({:.3f})", printed->mean_mm[k], printed->stddev_mm[k]) : "-");
@@ -85,7 +93,7 @@ std::string served_table(const Study& study) {
                          "in domain", "inside 95 %", "nlpd (mm)");
     }
     text +=
-        fmt::format("{:<28}{:<8}{:>6}{:>16.4f}{:>14}{:>12.1f} %{:>14}\n", row.set, row.model, row.training_poses,
+        fmt::format("{:<28}{:<8}{:>6}{:>16.4f}{:>14}{:>12.1f} %{:>14}\n", row.set, shown_model(row), row.training_poses,
                     to_mm(row.served->compensated.rms),
                     fmt::format("{} of {}", row.served->in_domain, row.served->poses), 100 * row.served->coverage_95,
                     number_or_dash(row.served->nlpd ? std::optional(nlpd_in_mm(*row.served->nlpd)) : std::nullopt, 3));
@@ -170,6 +178,7 @@ ordered_json row_json(const Study& study, const StudyRow& row) {
     json["aim"] = {{"rms_least_mm", aim->least_mm}, {"rms_most_mm", aim->most_mm}, {"reached", reached(*aim, row)}};
   }
   if (row.served) json["served"] = evaluation_json(*row.served);
+  if (row.bias_left_out) json["bias_left_out"] = true;
   return json;
 }
 

@@ -72,6 +72,21 @@ std::string figures_table(const Evaluation& evaluation) {
   return table;
 }
 
+std::string orientation_table(const Evaluation& evaluation) {
+  if (!evaluation.orientation) return "";
+  const OrientationFigures& turned = *evaluation.orientation;
+  const auto degrees = [](double angle) { return fmt::format("{:.4f}", to_deg(angle)); };
+  std::vector<std::string> names = {fmt::format("orientation, deg rms of {} poses", turned.poses), "nominal",
+                                    "calibrated", "compensated"};
+  std::vector<std::string> cells = {"angle between measured and predicted", degrees(turned.nominal),
+                                    degrees(turned.calibrated), degrees(turned.compensated)};
+  if (turned.coverage_95) {
+    names.emplace_back("inside their 95 % interval");
+    cells.push_back(fmt::format("{:.1f} %", 100 * *turned.coverage_95));
+  }
+  return "<table class=\"figures orientation\">\n" + html_row(names, "th") + html_row(cells) + "</table>\n";
+}
+
 std::string date_of(std::int64_t unix_time) {
   const std::time_t time = unix_time;
   std::tm utc{};
@@ -84,8 +99,9 @@ std::string date_of(std::int64_t unix_time) {
 std::string bias_text(const CompensatedModel::Parts& parts) {
   const std::string chosen = parts.bias_choice ? "; chosen: " + parts.bias_choice->sentence : "";
   if (!parts.bias) return "none" + chosen;
-  return fmt::format("Gaussian process on the joints, kernel {}, {} observations{}", parts.bias->kernel,
-                     parts.bias->q.rows(), chosen);
+  return fmt::format("Gaussian process on the joints, kernel {}, {} observations, {}{}", parts.bias->kernel,
+                     parts.bias->q.rows(), parts.rotation_bias ? "positions and orientations" : "positions only",
+                     chosen);
 }
 
 std::string trained_ranges(const CompensatedModel& model) {
@@ -261,6 +277,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"tiles", tiles(compared.evaluation)},
                   {"compared", html_text(compared.text)},
                   {"figures", figures_table(compared.evaluation)},
+                  {"orientation", orientation_table(compared.evaluation)},
                   {"provenance", provenance_table(model, compared.evaluation)},
                   {"parameters", parameter_table(model)},
                   {"unidentifiable", unidentifiable_text(model.parts())},

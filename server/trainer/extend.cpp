@@ -87,6 +87,14 @@ MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64
   return batch;
 }
 
+Error with_rows_set_aside(Error error, const MeasurementBatch& batch) {
+  const auto aside = std::count_if(batch.measurements.begin(), batch.measurements.end(),
+                                   [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
+  if (error.code == ErrorCode::kRefused && aside > 0)
+    error.message += fmt::format(" ({} of {} rows are set aside to judge by)", aside, batch.measurements.size());
+  return error;
+}
+
 Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
   constexpr double kMostLeftOut = 0.1;
   std::set<int> rows;

@@ -38,6 +38,9 @@ struct Extension {
 /// `batch` with a set for every row: as its `set` column says, else `share` of the rows drawn for validation.
 [[nodiscard]] MeasurementBatch with_held_out(MeasurementBatch batch, double share, std::uint64_t seed);
 
+/// `error` of diagnosing `batch`, and how many of its rows are set aside: they are not among those diagnosed.
+[[nodiscard]] Error with_rows_set_aside(Error error, const MeasurementBatch& batch);
+
 /// Rows that one model is judged against another by.
 struct Judges {
   MeasurementBatch batch;

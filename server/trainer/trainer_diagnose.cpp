@@ -114,7 +114,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   const auto present = registry_.in_force(job.cell);
   const auto served = as_served(cell_found, present.get(), *batch);
   const auto diagnosis = trammel::diagnose(served, *batch, options);
-  if (!diagnosis) return tl::make_unexpected(diagnosis.error());
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
   const Status stored = store_.store_findings(job.id, findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
   if (!stored) return stored;
   const Status can_apply = check_can_extend(*diagnosis);

@@ -53,6 +53,21 @@ TEST(Study, SameSeedSameTableAndAnotherSeedAnother) {
   EXPECT_NE(table, study_text(run_study("cal", shipped_robot(), other).value()));
 }
 
+TEST(StudyText, NamesABiasThatWasAskedForAndLeftOut) {
+  Study study;
+  study.name = "6dim-l";
+  study.rows = {{"validation", "M2+GP", 300, 100, {}, Evaluation{}, false},
+                {"validation", "M3+GP", 300, 100, {}, Evaluation{}, true}};
+  const std::string text = study_text(study);
+  EXPECT_EQ(text.find("M3+GP"), std::string::npos) << text;
+  EXPECT_NE(text.find("validation                  M3+none"), std::string::npos) << text;
+  EXPECT_NE(text.find("validation                  M2+GP"), std::string::npos) << text;
+  EXPECT_NE(text.find("+none: no bias was worth it"), std::string::npos) << text;
+  EXPECT_EQ(study_json(study)["rows"][1]["bias_left_out"], true);
+  EXPECT_EQ(study_json(study)["rows"][1]["model"], "M3+GP");
+  EXPECT_FALSE(study_json(study)["rows"][0].contains("bias_left_out"));
+}
+
 TEST(StudyCommand, WritesTheSourcesFiguresBesideOurs) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("study.json");

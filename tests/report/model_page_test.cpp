@@ -45,6 +45,16 @@ TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
   }
 }
 
+TEST_F(ModelPage, ShowsWhatIsLeftOfTheOrientationsWhereTheyWereMeasured) {
+  CompensatedModel::Parts parts = trained("none").parts();
+  parts.training.orientation = OrientationFigures{30, 0.02, 0.002, 0.001, 0.934};
+  const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
+  EXPECT_TRUE(has(page, "orientation, deg rms of 30 poses"));
+  EXPECT_TRUE(has(page, "<td>1.1459</td><td>0.1146</td><td>0.0573</td><td>93.4 %</td>"));
+  parts.training.orientation.reset();
+  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "orientation, deg"));
+}
+
 TEST_F(ModelPage, OpensWithoutANetwork) {
   const std::string page = model_page(trained("none"), std::nullopt);
   EXPECT_TRUE(has(page, "Chart.js v"));

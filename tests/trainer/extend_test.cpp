@@ -29,6 +29,13 @@ class Extend : public testing::Test {
   Diagnosis diagnosis_;
 };
 
+TEST_F(Extend, ARefusalSaysHowManyRowsWereSetAside) {
+  const Error few{ErrorCode::kRefused, "batch b1: 10 poses to diagnose, at least 12"};
+  EXPECT_EQ(with_rows_set_aside(few, batch_).message, few.message + " (30 of 120 rows are set aside to judge by)");
+  for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kTrain;
+  EXPECT_EQ(with_rows_set_aside(few, batch_).message, few.message);
+}
+
 TEST_F(Extend, ByTheTrueCauseLowersTheErrorOnPosesHeldOut) {
   diagnosis_.sources_after = {"base", kGear};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
