@@ -25,8 +25,15 @@ constexpr std::size_t kRivals = 3;         // of one output, on all points
 constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
 constexpr double kUnexplainedNoise = 1.4;  // in logs, above metrology's
 constexpr Index kFinerPoints = 400;
+constexpr Index kAroundPoints = 2000;  // most to look around on
+constexpr double kBeyondBox = 1.0;     // in logs: what starts there is finer or idler than any start on few points
+constexpr double kWeak = 0.5;          // in logs, below the box: what is longer has no strong influence
+constexpr double kLessNoise = 1.4;     // in logs of the variance, for what finer length scales may explain
+constexpr double kFineLogRatio = -4.0;
+constexpr double kGain = 0.5;         // nat, of an optimum worth moving to
 constexpr double kWideSpread = 10.0;  // in logs, of the prior on kernel parameters
 constexpr double kWorseLeaveOneOut = 1.1;
+constexpr double kRefined = 0.4;  // of the progress of an output, before looking around
 
 GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output, Index outputs) {
   GpData part{MatrixXd(count, data.q.cols()), MatrixXd(count, outputs), VectorXd(count)};
@@ -72,7 +79,7 @@ class Search {
   // noise is left than metrology knows of, more points are asked once whether shorter length scales explain it.
   void look_finer(ProfiledLikelihood* likelihood, std::vector<Optimum>* rivals) {
     const Optimum& best = rivals->front();
-    const double unexplained = log_noise(best) - std::log(prior_.noise_stddev);
+    const double unexplained = unexplained_noise(best);
     const bool tried = std::any_of(rivals->begin(), rivals->end(), [&](const Optimum& rival) {
       return other_kind(rival, best) && log_noise(rival) < log_noise(best);
     });
@@ -83,6 +90,60 @@ class Search {
     start[count] = std::max(start[count] - unexplained, kLeastLogRatio);
     Optimum finer = counted(searched(likelihood, start, {.max_evaluations = 40, .tolerance = 0.02}), *likelihood);
     if (finer.defined) rivals->push_back(std::move(finer));
+  }
+
+  // In logs, above metrology's.
+  double unexplained_noise(const Optimum& optimum) const { return log_noise(optimum) - std::log(prior_.noise_stddev); }
+
+  // Functions finer than the spacing of the points that the search was on show on all points only, and joints whose
+  // influence is too weak for these hide each other. Where that much noise is left: all joints fine at once; then,
+  // until none gains, all weak joints idle at once, and each idle joint awake and fine.
+  Optimum looked_around(Index d, const Optimum& from, double share_before, double share_after) {
+    ProfiledLikelihood many = likelihood(std::min(all(), kAroundPoints), d, 1);
+    Optimum best = counted(searched(&many, from.x, {.max_evaluations = 1}), many);
+    double left = share_after - share_before;  // nobody knows how many tries: each takes a tenth of it
+    const auto worthwhile = [&] { return !result_.given_up && unexplained_noise(best) >= kUnexplainedNoise; };
+    const auto gains = [&](const VectorXd& kernel, double log_ratio) {
+      VectorXd start(kernel.size() + 1);
+      start << kernel, std::max(log_ratio, kLeastLogRatio);
+      Optimum end = counted(searched(&many, start, {.max_evaluations = 25, .tolerance = 1.0}), many);
+      report(share_after - (left *= 0.9));
+      const bool better = end.defined && end.value < best.value - kGain;
+      if (better) best = std::move(end);
+      return better;
+    };
+    if (!best.defined || !worthwhile()) return from;
+
+    const Index count = box_.low.size();
+    const VectorXd fine = box_.low.array() - kBeyondBox;
+    const VectorXd idle = box_.high.array() + kBeyondBox;
+    gains(fine, std::min(best.x[count] - kLessNoise, kFineLogRatio));
+    for (bool gained = true; gained && worthwhile();) {
+      const VectorXd known = best.x.head(count);
+      const auto weak = known.array() > box_.low.array() - kWeak;
+      gained = gains(weak.select(known.cwiseMax(idle), known), best.x[count]);
+      for (Index k = 0; k < count && worthwhile(); ++k) {
+        if (best.x[k] < box_.high[k]) continue;
+        VectorXd awake = best.x.head(count);
+        awake[k] = fine[k];
+        gained = gains(awake, best.x[count] - kLessNoise) || gained;
+      }
+    }
+    best.x.head(count) = best.x.head(count).cwiseMin(idle);  // farther out nothing changes, and there is no slope back
+    const Optimum end = polished(d, best.x);
+    return end.defined && end.value < from.value ? end : from;
+  }
+
+  // On all points, from where the optimum must be near.
+  Optimum polished(Index d, const VectorXd& start) {
+    ProfiledLikelihood middle = likelihood(std::min(all(), kCurvaturePoints), d, 1);
+    ProfiledLikelihood whole = likelihood(all(), d, 1);
+    Optimum now = searched(&middle, start, {.max_evaluations = 1});
+    if (!now.defined) return now;
+    use_curvature(&middle, 1.0 / std::pow(prior_.parameter_spread, 2), &now);
+    const double grown = static_cast<double>(middle.size()) / static_cast<double>(whole.size());
+    return counted(improved(&whole, start, grown * now.inverse_hessian, {.max_evaluations = 12, .tolerance = 0.02}),
+                   whole);
   }
 
   Optimum counted(Optimum found, const ProfiledLikelihood& likelihood) {
@@ -154,20 +215,10 @@ class Search {
   // From where the last fit ended. What it was is kept where it is no longer defined.
   void refit(Index d) {
     const GpHyperparameters& last = options_.last[static_cast<std::size_t>(d)];
-    ProfiledLikelihood middle = likelihood(std::min(all(), kCurvaturePoints), d, 1);
-    ProfiledLikelihood whole = likelihood(all(), d, 1);
     VectorXd start(last.kernel.size() + 1);
     start << last.kernel, 2.0 * (last.log_noise_stddev - last.log_signal_stddev);
-    Optimum now = searched(&middle, start, {.max_evaluations = 1});
-    GpHyperparameters next = last;
-    if (now.defined) {
-      use_curvature(&middle, 1.0 / std::pow(prior_.parameter_spread, 2), &now);
-      const double grown = static_cast<double>(middle.size()) / static_cast<double>(whole.size());
-      now = counted(improved(&whole, start, grown * now.inverse_hessian, {.max_evaluations = 12, .tolerance = 0.02}),
-                    whole);
-      if (now.defined) next = hyperparameters_at(now);
-    }
-    result_.outputs.push_back(next);
+    const Optimum now = polished(d, start);
+    result_.outputs.push_back(now.defined ? hyperparameters_at(now) : last);
     report(static_cast<double>(d + 1) / static_cast<double>(data_.y.cols()));
   }
 
@@ -226,11 +277,18 @@ class Search {
       if (stage.curvature) {
         for (Optimum& rival : rivals) use_curvature(&part, 1.0 / std::pow(prior_.parameter_spread, 2), &rival);
       }
-      report(0.4 + 0.6 * (static_cast<double>(d) + static_cast<double>(s) / static_cast<double>(all_stages.size())) /
+      report(0.4 + 0.6 *
+                       (static_cast<double>(d) +
+                        kRefined * static_cast<double>(s + 1) / static_cast<double>(all_stages.size())) /
                        outputs);
     }
+    Optimum best = rivals.front();
+    if (all() > kCurvaturePoints && !result_.given_up) {
+      const auto share = [&](double of_output) { return 0.4 + 0.6 * (static_cast<double>(d) + of_output) / outputs; };
+      best = looked_around(d, best, share(kRefined), share(1));
+    }
     report(0.4 + 0.6 * static_cast<double>(d + 1) / outputs);
-    result_.outputs.push_back(hyperparameters_at(rivals.front()));
+    result_.outputs.push_back(hyperparameters_at(best));
   }
 
   std::shared_ptr<const Kernel> kernel_;

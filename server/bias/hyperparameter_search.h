@@ -24,7 +24,8 @@ struct SearchResult {
 /// Most probable hyperparameters. Many starts on a small subset with shared length scales; different optima are carried
 /// to more points, checked there by leave-one-out, and refined for each output on growing subsets, at last on all
 /// points up to 2500; the best by likelihood wins. Where much more noise is left than metrology knows of, shorter
-/// length scales are tried on more points too. The same seed gives the same answer, bit for bit. Empty when no start
+/// length scales are tried on more points too, and where there are more than 1000, finer and idler ones on up to 2000
+/// of them. The same seed gives the same answer, bit for bit. Empty when no start
 /// gave a positive definite covariance.
 [[nodiscard]] std::optional<SearchResult> search_hyperparameters(const std::shared_ptr<const Kernel>& kernel,
                                                                  const GpData& data, double metrology_stddev,
