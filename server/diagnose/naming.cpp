@@ -13,16 +13,16 @@ using Eigen::VectorXd;
 constexpr Index kRepetitions = 100;
 constexpr double kSureFrequency = 0.9;
 constexpr double kRivalFrequency = 0.03;
-constexpr double kMargin = 3;           // nat: odds of 20 to 1
-constexpr double kBeyondDoubt = 5;      // nat: odds of 150 to 1
+constexpr double kMargin = 1.5;         // nat: odds of 4.5 to 1
+constexpr double kSafeMargin = 2.5;     // nat: odds of 12 to 1
 constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
 constexpr double kRelated = 0.4;        // the same of 0.63
 constexpr double kTouches = 0.1;        // less is a coincidence
 constexpr double kAsGood = 6;           // of strength
+constexpr double kBeyondDoubt = 8;      // nat: even the same effect, from so many more numbers, is no accident
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kPathStep = 0.2;       // rad
 constexpr double kAtOnce = 0.05;        // of the poses
-constexpr double kShapeOdds = 0.05;     // nat, of strength: the same
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
 bool no_rival(const Cause& named, const Cause& other) {
@@ -120,23 +120,23 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
   for (std::size_t f = 0; f < families.size(); ++f) {
     if (!families[f]->named() || !families[f]->predicts() || !contends(f)) continue;
     const Cause other = families[f]->cause(seen.best[f]);
+    // Repetitions tell how often such data decide; these data may have decided.
+    const double margin = naming.frequency < kSureFrequency ? kSafeMargin : kMargin;
+    const double gap = seen.score[place] - seen.score[f];
+    const bool decided = gap > std::max(margin, kShapeError * best.strength);
     // A more general description that is as likely says that the special one is not sure.
     const bool only_describes =
-        no_rival(cause, other) && !(other.cause == "joint_map" && cause.cause == "gear_transmission" &&
-                                    seen.score[place] - seen.score[f] < kMargin);
+        no_rival(cause, other) && (decided || other.cause != "joint_map" || cause.cause != "gear_transmission");
     if (f == place || only_describes || begins_at_once(other, seen.best[f], problem.poses())) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);
-    const bool as_good = same_effect && lacks < std::max(kAsGood, kShapeError * best.strength);
+    const bool as_good = same_effect && lacks < std::max(kAsGood, kShapeError * best.strength) && gap < kBeyondDoubt;
     // Another cause may be there as well: only what makes much of this effect is a rival for it.
     const bool related = of_effect.strength > kRelated * whole;
-    const bool as_likely = related && seen.score[place] - seen.score[f] < kMargin;
-    // Repetitions tell how often such data decide; these data may have decided.
-    const bool decided = seen.score[place] - seen.score[f] > std::max(kBeyondDoubt, kShapeOdds * best.strength);
-    const bool wins = naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency &&
-                      of_effect.strength > kTouches * whole && !decided;
-    if (as_good || as_likely || wins) naming.could_also_be.push_back(other);
+    const bool wins =
+        naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency && of_effect.strength > kTouches * whole;
+    if (as_good || (!decided && (related || wins))) naming.could_also_be.push_back(other);
   }
   for (const Cause& rival : untestable_rivals(cause, problem.batch())) {
     if (std::find(naming.could_also_be.begin(), naming.could_also_be.end(), rival) == naming.could_also_be.end())
