@@ -1,435 +1,19 @@
 #include "server/calibrate/circle_point.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 
-#include "server/base/text_file.h"
 #include "server/base/units.h"
-#include "server/measurement/csv_table.h"
-#include "server/measurement/pose_columns.h"
+#include "server/calibrate/axis_fit.h"
+#include "server/calibrate/links_from_axes.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kSameAngle = 1e-6;          // rad, of a joint that is held
-constexpr double kAngleLimit = from_deg(1);  // turned against commanded
-constexpr double kLengthDeviation = 0.1;     // m, beyond it is another robot
+constexpr double kLengthDeviation = 0.1;  // m, beyond it is another robot
 constexpr double kAngleDeviation = from_deg(10);
-constexpr double kParallel = 0.02;   // sine of two axes' angle, below which their common normal is nowhere
-constexpr double kCoverage = 2;      // k of U
-constexpr double kPointLimit = 1e5;  // m
-
-}  // namespace
-
-Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<PoseColumns> posture = PoseColumns::find(*table);
-  if (!posture) return tl::make_unexpected(posture.error());
-  const std::size_t held = posture->joint_types().size();
-  if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
-    return refused("{}: {} posture columns, robot {} has {} joints", where, held, robot.name(), robot.size());
-  }
-  std::array<std::size_t, 5> columns{};
-  for (std::size_t k = 0; const char* name : {"joint", "q_deg", "x_mm", "y_mm", "z_mm"}) {
-    const Result<std::size_t> column = table->require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns[k++] = *column;
-  }
-  const std::optional<std::size_t> reflector = table->find("reflector");
-  ArcList arcs{where, {}};
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    const Result<int> joint = table->integer(row, columns[0], 1, robot.size());
-    if (!joint) return tl::make_unexpected(joint.error());
-    ArcPoint point;
-    point.joint = *joint - 1;
-    point.row = table->line(row);
-    point.q = JointVector::Zero(robot.size());
-    if (held != 0) {
-      const Result<JointVector> q = posture->joints(*table, row);
-      if (!q) return tl::make_unexpected(q.error());
-      point.q = *q;
-    }
-    const Result<double> angle = table->number(row, columns[1]);
-    if (!angle) return tl::make_unexpected(angle.error());
-    point.q(point.joint) = from_deg(*angle);
-    for (int k = 0; k < 3; ++k) {
-      const Result<double> mm = table->number(row, columns[static_cast<std::size_t>(2 + k)], to_mm(kPointLimit));
-      if (!mm) return tl::make_unexpected(mm.error());
-      point.p_W(k) = from_mm(*mm);
-    }
-    if (reflector) point.reflector = table->field(row, *reflector);
-    arcs.points.push_back(std::move(point));
-  }
-  return arcs;
-}
-
-Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_arcs_csv(text, path, robot); });
-}
-
-namespace {
-
-/// The points of one joint, arc by arc.
-struct JointArcs {
-  int joint = 0;
-  JointVector posture;  ///< its own value stands for nothing
-  std::vector<std::vector<const ArcPoint*>> arcs;
-};
-
-/// Orthonormal u, v across `n`.
-Eigen::Matrix<double, 3, 2> across(const Vector3& n) {
-  Eigen::Matrix<double, 3, 2> uv;
-  uv.col(0) = n.unitOrthogonal();
-  uv.col(1) = n.cross(uv.col(0));
-  return uv;
-}
-
-/// Circles around one line. Its small changes: two turns of n and two shifts of c along `across(n)`, then plane height
-/// and radius of each arc.
-struct AxisFit {
-  Vector3 n, c;
-  std::vector<double> height, radius;
-  Eigen::MatrixXd normal_inverse;  ///< covariance of the small changes for residuals of unit variance
-  double cost = 0;                 ///< sum of squared distances, m^2
-  int freedom = 0;
-
-  [[nodiscard]] Vector3 centre(std::size_t arc) const { return c + height[arc] * n; }
-};
-
-/// Refuses a robot whose joints do not all draw arcs about axes that stand still.
-Status check_robot(const Chain& robot, const ArcList& arcs) {
-  for (int j = 0; j < robot.size(); ++j) {
-    if (robot.joint(j).type == JointType::kPrismatic) {
-      return refused("robot {} joint {} slides and draws no arc; measure the arm without it", robot.name(), j + 1);
-    }
-    for (int before = 0; before < j; ++before) {
-      if (robot.transmission()(before, j) == 0) continue;
-      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1);
-    }
-  }
-  for (const ArcPoint& point : arcs.points) {
-    if (point.q.size() == robot.size() && point.joint >= 0 && point.joint < robot.size()) continue;
-    return refused("{} row {}: {} joints, robot {} has {}", arcs.where, point.row, point.q.size(), robot.name(),
-                   robot.size());
-  }
-  return {};
-}
-
-Result<std::vector<JointArcs>> grouped(const Chain& robot, const ArcList& arcs, bool sigma_stated) {
-  if (const Status fits = check_robot(robot, arcs); !fits) return tl::make_unexpected(fits.error());
-  std::map<std::pair<int, std::string>, std::vector<const ArcPoint*>> by_arc;
-  for (const ArcPoint& point : arcs.points) by_arc[{point.joint, point.reflector}].push_back(&point);
-  std::vector<JointArcs> joints(static_cast<std::size_t>(robot.size()));
-  const std::size_t least = sigma_stated ? 3 : 5;
-  for (const auto& [key, points] : by_arc) {
-    JointArcs& group = joints[static_cast<std::size_t>(key.first)];
-    if (points.size() < least) {
-      return refused("{} row {}: the arc of joint {} has {} points, at least {} are needed{}", arcs.where,
-                     points.front()->row, key.first + 1, points.size(), least,
-                     sigma_stated ? "" : " where sigma is not stated");
-    }
-    if (group.arcs.empty()) group.posture = points.front()->q;
-    for (const ArcPoint* point : points) {
-      for (int j = 0; j < robot.size(); ++j) {
-        // Another reflector may be read with the joints beyond it elsewhere; within an arc nothing may move.
-        const double from = j < key.first ? group.posture(j) : points.front()->q(j);
-        if (j == key.first || std::abs(point->q(j) - from) < kSameAngle) continue;
-        return refused("{} row {}: joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", arcs.where,
-                       point->row, j + 1, to_deg(point->q(j)), to_deg(from), key.first + 1);
-      }
-    }
-    group.arcs.push_back(points);
-  }
-  for (int j = 0; j < robot.size(); ++j) {
-    JointArcs& group = joints[static_cast<std::size_t>(j)];
-    group.joint = j;
-    if (group.arcs.empty()) return refused("{}: no arc of joint {}", arcs.where, j + 1);
-  }
-  return joints;
-}
-
-/// Plane by the smallest singular vector of the centred points, circle in it by the linear (algebraic) form.
-Result<AxisFit> rough_fit(const JointArcs& group, const std::string& where) {
-  Matrix3 scatter = Matrix3::Zero();
-  for (const auto& arc : group.arcs) {
-    Vector3 mean = Vector3::Zero();
-    for (const ArcPoint* point : arc) mean += point->p_W / static_cast<double>(arc.size());
-    for (const ArcPoint* point : arc) scatter += (point->p_W - mean) * (point->p_W - mean).transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix3> spread(scatter);
-  const auto on_a_line = [&] {
-    return refused("{} row {}: the points of joint {} lie on a line", where, group.arcs.front().front()->row,
-                   group.joint + 1);
-  };
-  if (!(spread.eigenvalues()(1) > 1e-8 * spread.eigenvalues()(2))) return on_a_line();
-  AxisFit fit;
-  fit.n = spread.eigenvectors().col(0);
-  const auto uv = across(fit.n);
-  // |p|^2 = 2 x u + 2 y v + w: one centre, one w an arc.
-  std::size_t points = 0;
-  for (const auto& arc : group.arcs) points += arc.size();
-  const auto arcs = static_cast<Eigen::Index>(group.arcs.size());
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(points), 2 + arcs);
-  Eigen::VectorXd b(A.rows());
-  const Vector3 origin = group.arcs.front().front()->p_W;
-  Eigen::Index row = 0;
-  for (Eigen::Index k = 0; k < arcs; ++k) {
-    for (const ArcPoint* point : group.arcs[static_cast<std::size_t>(k)]) {
-      const Eigen::Vector2d p = uv.transpose() * (point->p_W - origin);
-      A.row(row).head<2>() = 2 * p.transpose();
-      A(row, 2 + k) = 1;
-      b(row++) = p.squaredNorm();
-    }
-  }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
-  if (qr.rank() < A.cols()) return on_a_line();
-  const Eigen::VectorXd solution = qr.solve(b);
-  fit.c = origin + uv * solution.head<2>();
-  for (Eigen::Index k = 0; k < arcs; ++k) {
-    const auto& arc = group.arcs[static_cast<std::size_t>(k)];
-    double height = 0;
-    double radius = 0;
-    for (const ArcPoint* point : arc) {
-      height += fit.n.dot(point->p_W - fit.c) / static_cast<double>(arc.size());
-      radius += (uv.transpose() * (point->p_W - fit.c)).norm() / static_cast<double>(arc.size());
-    }
-    fit.height.push_back(height);
-    fit.radius.push_back(radius);
-  }
-  return fit;
-}
-
-struct Linearised {
-  Eigen::VectorXd residual;  ///< per point: from the plane, from the circle
-  Eigen::MatrixXd jacobian;  ///< by the small changes of an AxisFit
-};
-
-Linearised linearised(const AxisFit& fit, const JointArcs& group) {
-  std::size_t points = 0;
-  for (const auto& arc : group.arcs) points += arc.size();
-  const auto arcs = static_cast<Eigen::Index>(group.arcs.size());
-  Linearised out{Eigen::VectorXd(2 * static_cast<Eigen::Index>(points)),
-                 Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(points), 4 + 2 * arcs)};
-  const auto uv = across(fit.n);
-  Eigen::Index row = 0;
-  for (Eigen::Index k = 0; k < arcs; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    for (const ArcPoint* point : group.arcs[at]) {
-      const Vector3 from_c = point->p_W - fit.c;
-      const double along = fit.n.dot(from_c);
-      const Vector3 radial = from_c - along * fit.n;
-      const Vector3 outward = radial.normalized();
-      out.residual(row) = along - fit.height[at];
-      out.residual(row + 1) = radial.norm() - fit.radius[at];
-      out.jacobian.block<1, 2>(row, 0) = radial.transpose() * uv;  // n turns by uv * t
-      out.jacobian.block<1, 2>(row + 1, 0) = -along * outward.transpose() * uv;
-      out.jacobian.block<1, 2>(row + 1, 2) = -outward.transpose() * uv;
-      out.jacobian(row, 4 + 2 * k) = -1;
-      out.jacobian(row + 1, 5 + 2 * k) = -1;
-      row += 2;
-    }
-  }
-  return out;
-}
-
-/// Gauss-Newton from the rough fit; arcs are so nearly circles that it needs a few steps.
-Result<AxisFit> axis_fit(const JointArcs& group, const std::string& where) {
-  Result<AxisFit> rough = rough_fit(group, where);
-  if (!rough) return rough;
-  AxisFit fit = *rough;
-  for (int iteration = 0; iteration < 50; ++iteration) {
-    const Linearised now = linearised(fit, group);
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(now.jacobian);
-    if (qr.rank() < now.jacobian.cols()) {
-      return refused("{} row {}: the arcs of joint {} do not determine its axis", where,
-                     group.arcs.front().front()->row, group.joint + 1);
-    }
-    const Eigen::VectorXd step = qr.solve(-now.residual);
-    const auto uv = across(fit.n);
-    const Vector3 turn = uv * step.head<2>();
-    fit.c += uv * step.segment<2>(2);
-    fit.n = (fit.n + turn).normalized();
-    for (std::size_t k = 0; k < group.arcs.size(); ++k) {
-      fit.height[k] += step(4 + 2 * static_cast<Eigen::Index>(k));
-      fit.radius[k] += step(5 + 2 * static_cast<Eigen::Index>(k));
-    }
-    if (step.norm() < 1e-12) break;
-  }
-  const Linearised last = linearised(fit, group);
-  fit.cost = last.residual.squaredNorm();
-  fit.freedom = static_cast<int>(last.jacobian.rows() - last.jacobian.cols());
-  fit.normal_inverse = (last.jacobian.transpose() * last.jacobian)
-                           .ldlt()
-                           .solve(Eigen::MatrixXd::Identity(last.jacobian.cols(), last.jacobian.cols()));
-  return fit;
-}
-
-/// Angles turned about the axis against angles commanded: turns `fit` so that it points in the commanded sense. Returns
-/// the rms of the difference, rad.
-Result<double> orient(AxisFit& fit, const JointArcs& group, const std::string& where) {
-  double sum_with = 0;
-  double sum_against = 0;
-  double worst_with = 0;
-  double worst_against = 0;
-  int worst_row = 0;
-  int count = 0;
-  const auto uv = across(fit.n);
-  for (const auto& arc : group.arcs) {
-    std::vector<double> with, against;
-    const Vector3 first = arc.front()->p_W - fit.c;
-    for (const ArcPoint* point : arc) {
-      const Eigen::Vector2d a = uv.transpose() * first;
-      const Eigen::Vector2d b = uv.transpose() * (point->p_W - fit.c);
-      const double turned = std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
-      const double commanded = point->q(group.joint) - arc.front()->q(group.joint);
-      with.push_back(std::remainder(turned - commanded, 2 * kPi));
-      against.push_back(std::remainder(turned + commanded, 2 * kPi));
-    }
-    const auto gather = [&](const std::vector<double>& values, double& sum, double& worst) {
-      double mean = 0;
-      for (const double value : values) mean += value / static_cast<double>(values.size());
-      for (std::size_t k = 0; k < values.size(); ++k) {
-        sum += (values[k] - mean) * (values[k] - mean);
-        if (std::abs(values[k] - mean) > worst) {
-          worst = std::abs(values[k] - mean);
-          worst_row = arc[k]->row;
-        }
-      }
-    };
-    gather(against, sum_against, worst_against);
-    gather(with, sum_with, worst_with);
-    count += static_cast<int>(arc.size());
-  }
-  if (sum_against < sum_with) {
-    // The columns of across(-n) differ from those of across(n): the covariance of the changes turns with them.
-    AxisFit turned = fit;
-    turned.n = -fit.n;
-    const Eigen::Matrix2d change = across(turned.n).transpose() * uv;
-    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(fit.normal_inverse.rows(), fit.normal_inverse.cols());
-    basis.topLeftCorner<2, 2>() = -change;
-    basis.block<2, 2>(2, 2) = change;
-    for (std::size_t k = 0; k < fit.height.size(); ++k) {
-      const auto row = 4 + 2 * static_cast<Eigen::Index>(k);
-      turned.height[k] = -fit.height[k];
-      basis(row, row) = -1;
-    }
-    turned.normal_inverse = basis * fit.normal_inverse * basis.transpose();
-    fit = std::move(turned);
-  }
-  const double worst = std::min(worst_with, worst_against);
-  if (worst > kAngleLimit) {
-    return refused("{} row {}: joint {} turned {:.3f} deg away from its commanded angle, limit {:.0f} deg", where,
-                   worst_row, group.joint + 1, to_deg(worst), to_deg(kAngleLimit));
-  }
-  return std::sqrt(std::min(sum_with, sum_against) / count);
-}
-
-struct Line {
-  Vector3 n, c;
-};
-
-/// Lines as measured at their postures -> with the joints before them at zero, in their kinematic sense.
-std::vector<Line> at_zero(const Chain& robot, const std::vector<JointArcs>& groups, const std::vector<Line>& measured) {
-  std::vector<Line> lines;
-  for (int i = 0; i < robot.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    Line line = measured[at];
-    line.n *= robot.joint(i).sign;
-    const Eigen::VectorXd value = robot.transmission() * groups[at].posture;
-    for (int j = 0; j < i; ++j) {
-      const Line& axis = lines[static_cast<std::size_t>(j)];
-      const Matrix3 back = Eigen::AngleAxisd(-value(j), axis.n).toRotationMatrix();
-      line.n = back * line.n;
-      line.c = axis.c + back * (line.c - axis.c);
-    }
-    lines.push_back(line);
-  }
-  return lines;
-}
-
-double near(double angle, double nominal) { return nominal + std::remainder(angle - nominal, 2 * kPi); }
-
-/// The row that leads from a frame to the next axis `line`, seen in that frame.
-Result<LinkGeometry> row_to(const Line& line, const Joint& nominal, int joint, const std::string& robot) {
-  LinkGeometry link = nominal.link;
-  const Vector3& n = line.n;
-  if (nominal.hayati) {
-    const double side = nominal.link.a < 0 ? -1 : 1;
-    const Vector3 p = line.c - n * (line.c.z() / n.z());
-    link.a = side * p.head<2>().norm();
-    link.theta = near(std::atan2(side * p.y(), side * p.x()), nominal.link.theta);
-    const Vector3 m = Eigen::AngleAxisd(-link.theta, Vector3::UnitZ()) * n;
-    link.beta = near(std::asin(std::clamp(m.x(), -1.0, 1.0)), nominal.link.beta);
-    link.alpha = near(std::atan2(-m.y(), m.z()), nominal.link.alpha);
-    return link;
-  }
-  const double sine = n.head<2>().norm();
-  if (sine < kParallel) {
-    return refused("robot {} link {}: axes {} and {} are parallel to {:.3f} deg; the row must be a Hayati one", robot,
-                   joint + 1, joint + 1, joint + 2, to_deg(std::asin(sine)));
-  }
-  const double side = std::sin(nominal.link.alpha) < 0 ? -1 : 1;
-  link.theta = near(std::atan2(side * n.x(), -side * n.y()), nominal.link.theta);
-  link.alpha = near(std::atan2(side * sine, n.z()), nominal.link.alpha);
-  Matrix3 A;  // a (cos theta, sin theta, 0) + d z = c + t n
-  A << std::cos(link.theta), 0, -n.x(), std::sin(link.theta), 0, -n.y(), 0, 1, -n.z();
-  const Vector3 a_d_t = A.partialPivLu().solve(line.c);
-  link.a = a_d_t(0);
-  link.d = a_d_t(1);
-  return link;
-}
-
-Pose row_pose(const LinkGeometry& link, bool hayati) {
-  Pose X = Pose::Identity();
-  if (!hayati) X.translate(link.d * Vector3::UnitZ());
-  X.rotate(Eigen::AngleAxisd(link.theta, Vector3::UnitZ()));
-  X.translate(link.a * Vector3::UnitX());
-  X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX()));
-  if (hayati) X.rotate(Eigen::AngleAxisd(link.beta, Vector3::UnitY()));
-  return X;
-}
-
-Line seen_from(const Pose& X, const Line& line) {
-  const Pose back = X.inverse();
-  return {back.linear() * line.n, back * line.c};
-}
-
-struct Links {
-  std::vector<LinkGeometry> links;
-  Pose X_WB = Pose::Identity();
-};
-
-/// The DH procedure on axes at zero, source section 4.1.1 and Figure 4.1.
-Result<Links> links_of(const Chain& robot, const std::vector<Line>& lines) {
-  Links out;
-  // Any frame on axis 1 first; then it is turned and shifted along z0 until q1 and d1 are nominal.
-  Pose X = Pose::Identity();
-  X.linear().col(2) = lines.front().n;
-  X.linear().leftCols<2>() = across(lines.front().n);
-  X.translation() = lines.front().c;
-  if (robot.size() > 1) {
-    const Joint& nominal = robot.joint(0);
-    const Result<LinkGeometry> first = row_to(seen_from(X, lines[1]), nominal, 0, robot.name());
-    if (!first) return tl::make_unexpected(first.error());
-    X.translate((nominal.hayati ? 0 : first->d - nominal.link.d) * Vector3::UnitZ());
-    X.rotate(Eigen::AngleAxisd(first->theta - nominal.link.theta, Vector3::UnitZ()));
-  }
-  out.X_WB = X;
-  for (int i = 0; i + 1 < robot.size(); ++i) {
-    const Joint& nominal = robot.joint(i);
-    const Result<LinkGeometry> link =
-        row_to(seen_from(X, lines[static_cast<std::size_t>(i) + 1]), nominal, i, robot.name());
-    if (!link) return tl::make_unexpected(link.error());
-    out.links.push_back(*link);
-    X = X * row_pose(*link, nominal.hayati);
-  }
-  out.links.push_back(robot.joint(robot.size() - 1).link);
-  return out;
-}
+constexpr double kCoverage = 2;  // k of U
 
 struct NamedMember {
   int joint;
@@ -476,8 +60,8 @@ struct Fits {
   std::vector<double> widening;  ///< of a covariance whose variance was itself estimated
 };
 
-std::vector<Line> lines_of(const Fits& fits) {
-  std::vector<Line> lines;
+std::vector<AxisLine> lines_of(const Fits& fits) {
+  std::vector<AxisLine> lines;
   for (const AxisFit& fit : fits.axes) lines.push_back({fit.n, fit.c});
   return lines;
 }
@@ -496,7 +80,7 @@ Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointAr
       const double step = std::max(std::sqrt(small(k, k)), 1e-9);
       Eigen::VectorXd sides[2];
       for (const int side : {0, 1}) {
-        std::vector<Line> lines = lines_of(fits);
+        std::vector<AxisLine> lines = lines_of(fits);
         const Vector3 move = uv.col(k % 2) * (side == 0 ? -step : step);
         if (k < 2) {
           lines[i].n = (fit.n + move).normalized();
@@ -569,7 +153,7 @@ Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& li
 
 Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
                                                 const CirclePointOptions& options) {
-  const Result<std::vector<JointArcs>> groups = grouped(robot, arcs, options.sigma.has_value());
+  const Result<std::vector<JointArcs>> groups = sorted_by_joint(robot, arcs, options.sigma.has_value());
   if (!groups) return tl::make_unexpected(groups.error());
   CirclePointResult result;
   Fits fits;
@@ -594,7 +178,7 @@ Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcLis
     describe_circles(group, *fit, variance, result.circles);
     fits.axes.push_back(std::move(*fit));
   }
-  const std::vector<Line> lines = at_zero(robot, *groups, lines_of(fits));
+  const std::vector<AxisLine> lines = at_zero(robot, *groups, lines_of(fits));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     result.axes[i].direction_W = lines[i].n;
     result.axes[i].point_W = lines[i].c;

@@ -4,33 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "server/base/result.h"
-#include "server/robot/chain.h"
+#include "server/calibrate/arc_list.h"
 
 /// Circle-point analysis, source section 4.1: a reflector on the arm while one joint turns and all others are held
 /// draws an arc; the arcs give the joints' axes, and the axes the link parameters by the DH procedure.
 namespace trammel {
-
-/// One position of a reflector.
-struct ArcPoint {
-  int joint = 0;          ///< that turns, from 0
-  std::string reflector;  ///< which of several; may be empty
-  JointVector q;          ///< rad, all joints as commanded
-  Vector3 p_W = Vector3::Zero();
-  int row = 0;  ///< line in its file
-};
-
-struct ArcList {
-  std::string where;  ///< the file as messages name it
-  std::vector<ArcPoint> points;
-};
-
-/// Reads `joint,q_deg,x_mm,y_mm,z_mm` (joint from 1, its angle, the reflector in W) with, where recorded, `reflector`
-/// and the posture that the other joints are held at, `q1_deg` ... `qn_deg`; joints without such columns are at zero.
-/// Refuses, naming file, row, value and limit: a missing column, numbers that are none, a joint the robot has not,
-/// postures with another number of joints.
-[[nodiscard]] Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot);
-[[nodiscard]] Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot);
 
 /// One arc: the circle that fits its points best in space.
 struct CircleFit {
