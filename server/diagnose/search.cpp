@@ -138,7 +138,8 @@ class Search {
     if (result_.accepted.size() < 2) return {};
     for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
       Accepted& one = result_.accepted[k];
-      if (one.source.empty() || one.best.evidence > kBeyondDoubt * chance_.limit) continue;
+      const bool beyond_doubt = one.could_also_be.empty() && one.best.evidence > kBeyondDoubt * chance_.limit;
+      if (one.source.empty() || beyond_doubt) continue;
       const PriorModel with = result_.after;
       remove_from(result_.after, one.in_model);
       refine(result_.after, result_.batch, result_.unnamed);
