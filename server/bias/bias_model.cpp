@@ -252,6 +252,11 @@ MatrixXd BiasModel::leave_one_out_mean_B() const { return fitted_->leave_one_out
 
 MatrixXd BiasModel::leave_one_out_stddev_B() const { return fitted_->outputs->leave_one_out_variance().cwiseSqrt(); }
 
+std::optional<MatrixXd> BiasModel::left_out_error_B(const MatrixXd& residual_B,
+                                                    const std::vector<Index>& observations) const {
+  return fitted_->outputs->left_out_error(residual_B.rowwise() - fitted_->state.offset.transpose(), observations);
+}
+
 const BiasState& BiasModel::state() const { return fitted_->state; }
 
 const BiasFitReport& BiasModel::report() const { return fitted_->report; }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -107,6 +108,10 @@ class BiasModel {
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
   /// N x 3: of the measurement of every training pose given all the others (beyond 5000, of its expert), m.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_stddev_B() const;
+  /// What of `residual_B` (N x 3, m; measured instead of what it was fitted to) these observations miss by when they
+  /// are predicted from all others, hyperparameters as found; empty where the kernel has blocks and beyond 5000.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> left_out_error_B(const Eigen::MatrixXd& residual_B,
+                                                                const std::vector<Eigen::Index>& observations) const;
 
   [[nodiscard]] const BiasState& state() const;
   [[nodiscard]] const BiasFitReport& report() const;

@@ -46,6 +46,13 @@ class BiasOutputs {
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_variance() const = 0;
   [[nodiscard]] virtual Eigen::VectorXd leave_one_out_share() const = 0;
 
+  /// What of `y` (N x D, instead of the observations) these points miss by when they are predicted from all others;
+  /// empty where only conditioning anew says it.
+  [[nodiscard]] virtual std::optional<Eigen::MatrixXd> left_out_error(
+      const Eigen::MatrixXd& /*y*/, const std::vector<Eigen::Index>& /*points*/) const {
+    return std::nullopt;
+  }
+
   /// With more points, or without some (rising indices); null where only conditioning anew does it.
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const { return nullptr; }
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> without(const std::vector<Eigen::Index>& /*points*/) const {

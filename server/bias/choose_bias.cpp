@@ -91,20 +91,29 @@ std::vector<T> at(const std::vector<T>& all, const std::vector<Index>& rows) {
   return some;
 }
 
-/// The same with the bias conditioned on the rest; the hyperparameters stay. `progress` is told the share done.
-Result<Missed> missed(const BiasState& state, const std::vector<Fold>& folds,
+/// The block of `fold` from a bias conditioned on the rest; the hyperparameters stay.
+Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
+  if (auto error = model.left_out_error_B(fold.residual_B, fold.block)) return *std::move(error);
+  const BiasState& state = model.state();
+  BiasState part = state;
+  part.q = state.q(fold.rest, Eigen::all);
+  part.residual_B = fold.residual_B(fold.rest, Eigen::all);
+  part.sigma = state.sigma(fold.rest);
+  part.features = at(state.features, fold.rest);
+  const Result<BiasModel> rest = BiasModel::restore(part);
+  if (!rest) return tl::make_unexpected(rest.error());
+  return fold.residual_B(fold.block, Eigen::all) -
+         rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
+}
+
+/// `progress` is told the share done.
+Result<Missed> missed(const BiasModel& model, const std::vector<Fold>& folds,
                       const std::function<bool(double)>& progress) {
   Missed error;
   for (const Fold& fold : folds) {
-    BiasState part = state;
-    part.q = state.q(fold.rest, Eigen::all);
-    part.residual_B = fold.residual_B(fold.rest, Eigen::all);
-    part.sigma = state.sigma(fold.rest);
-    part.features = at(state.features, fold.rest);
-    const Result<BiasModel> rest = BiasModel::restore(part);
-    if (!rest) return tl::make_unexpected(rest.error());
-    error.emplace_back(fold.residual_B(fold.block, Eigen::all) -
-                       rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block)));
+    Result<MatrixXd> of_block = missed(model, fold);
+    if (!of_block) return tl::make_unexpected(of_block.error());
+    error.push_back(*std::move(of_block));
     if (!progress(static_cast<double>(error.size()) / static_cast<double>(folds.size())))
       return failure(ErrorCode::kBusy, "bias choice: given up on request");
   }
@@ -228,10 +237,10 @@ class Choosing {
     const MatrixXd error = problem_.residual_B - model->leave_one_out_mean_B();
     const VectorXd nlpd = negative_log_density_left_out(problem_, *model);
     constexpr double kBoth = (1 - kFit) / 2;
-    const auto in_time = missed(model->state(), in_time_, [&](double share) { return report(kFit + kBoth * share); });
+    const auto in_time = missed(*model, in_time_, [&](double share) { return report(kFit + kBoth * share); });
     if (!in_time) return tl::make_unexpected(in_time.error());
     const auto in_joint_space =
-        missed(model->state(), in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); });
+        missed(*model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); });
     if (!in_joint_space) return tl::make_unexpected(in_joint_space.error());
     const Mean gain = gain_of(without_in_time_, *in_time);
     const Mean far = gain_of(without_in_joint_space_, *in_joint_space);

@@ -96,6 +96,10 @@ class GaussianProcess {
   [[nodiscard]] GaussianProcess without(const std::vector<Eigen::Index>& points,
                                         VarianceForm form = VarianceForm::kExact) const;
 
+  /// What of `y` (N, m; observations instead of those conditioned on) these points miss by when they are predicted from
+  /// all others, in N operations a pair of them.
+  [[nodiscard]] Eigen::VectorXd left_out_error(const Eigen::VectorXd& y, const std::vector<Eigen::Index>& points) const;
+
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
   void mean(const Eigen::MatrixXd& q, double* out) const;
 

@@ -60,6 +60,26 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   return gp;
 }
 
+// With G = L⁻¹ and M⁻¹ = Gᵀ G: (M⁻¹)_pp⁻¹ (M⁻¹ y)_p, the blocks of Rasmussen & Williams, eqs. 5.10-5.12.
+VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<Index>& points) const {
+  TRAMMEL_CHECK(y.size() == size_);
+  const std::vector<double> rows = exact_.rows(0);
+  const auto count = static_cast<Index>(points.size());
+  MatrixXd columns = MatrixXd::Zero(size_, count);
+  VectorXd whitened(size_);
+  for (Index i = 0; i < size_; ++i) {
+    const Eigen::Map<const VectorXd> row(rows.data() + i * (i + 1) / 2, i + 1);
+    whitened[i] = row.dot(y.head(i + 1));
+    for (Index c = 0; c < count; ++c) {
+      const Index point = points[static_cast<std::size_t>(c)];
+      if (point <= i) columns(i, c) = row[point];
+    }
+  }
+  MatrixXd inverse = MatrixXd::Zero(count, count);
+  inverse.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  return Eigen::LLT<MatrixXd>(inverse).solve(columns.transpose() * whitened);
+}
+
 GaussianProcess GaussianProcess::without(const std::vector<Index>& points, VarianceForm form) const {
   InverseRoot root(exact_.rows(0), size_);
   VectorXd weights = weights_.map().col(0).head(size_);

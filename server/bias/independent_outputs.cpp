@@ -77,6 +77,16 @@ class IndependentOutputs final : public BiasOutputs {
     return share;
   }
 
+  std::optional<MatrixXd> left_out_error(const MatrixXd& y, const std::vector<Index>& points) const override {
+    MatrixXd error(static_cast<Index>(points.size()), count());
+    for (Index d = 0; d < count(); ++d) {
+      const std::optional<VectorXd> output = at(d).left_out_error(y.col(d), points);
+      if (!output) return std::nullopt;
+      error.col(d) = *output;
+    }
+    return error;
+  }
+
   BiasOutputsPtr with(const OutputData& more) const override {
     std::vector<LocalExperts> grown;
     for (Index d = 0; d < count(); ++d) {

@@ -26,6 +26,13 @@ class LocalExperts {
                                                  const Eigen::VectorXd& noise_shape) const;
   [[nodiscard]] LocalExperts without(const std::vector<Eigen::Index>& points) const;
 
+  /// As GaussianProcess has it; empty where there is more than one expert.
+  [[nodiscard]] std::optional<Eigen::VectorXd> left_out_error(const Eigen::VectorXd& y,
+                                                              const std::vector<Eigen::Index>& points) const {
+    if (experts_.size() > 1) return std::nullopt;
+    return experts_.front().left_out_error(y, points);
+  }
+
   void mean(const Eigen::MatrixXd& q, double* out) const;
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
 

@@ -259,6 +259,22 @@ TEST(BiasModel, WithoutAKernelSaysZeroAndTheSpreadOfTheResidual) {
   EXPECT_TRUE(BiasModel::restore(model.state()).has_value());
 }
 
+TEST(BiasModel, WhatABlockLeftOutMissesIsWhatAModelOfTheRestMisses) {
+  const BiasProblem problem = smooth_problem(90, 23);
+  const BiasModel model = BiasModel::fit(problem, {}).value();
+  Eigen::MatrixXd residual_B = problem.residual_B;
+  residual_B.col(1).array() += 1e-4;  // the physics identified without the block says otherwise
+  std::vector<Eigen::Index> block, rest;
+  for (Eigen::Index i = 0; i < 90; ++i) (i % 7 == 3 ? block : rest).push_back(i);
+  BiasState part = model.state();
+  part.q = problem.q(rest, Eigen::all);
+  part.residual_B = residual_B(rest, Eigen::all);
+  part.sigma = problem.sigma(rest);
+  const Eigen::MatrixXd known = BiasModel::restore(part).value().mean_all_B(problem.q(block, Eigen::all));
+  const Eigen::MatrixXd error = model.left_out_error_B(residual_B, block).value();
+  EXPECT_LT((error - (residual_B(block, Eigen::all) - known)).norm(), 1e-9 * residual_B.norm());
+}
+
 TEST(BiasModel, ReportsProgressAndStopsWhenToldTo) {
   double last = 0;
   BiasOptions options;
