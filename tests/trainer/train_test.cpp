@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <random>
 
 #include "server/base/units.h"
 #include "server/plan/plan.h"
@@ -206,6 +207,42 @@ TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointM
   EXPECT_LT(mapped.compensated.rms, 0.5 * plain.compensated.rms);
   EXPECT_GT(mapped.coverage_95, 0.91);
   EXPECT_LT(mapped.coverage_95, 0.985);
+}
+
+TEST(LearnBias, ASuspectOfTheCalibrationIsAnotherPoseInAnotherBatch) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch batch = test::measured(robot, 80, 64);
+  batch.measurements[5].p_W += Vector3(0.01, 0, 0);
+  const CompensatedModel calibrated = test::demand(train(cell, batch, quick("M3", "none")));
+  ASSERT_EQ(calibrated.parts().suspects.size(), 1u);
+  const CompensatedModel own = test::demand(learn_bias(calibrated, batch, quick("M3", "se")));
+  EXPECT_EQ(own.parts().bias->q.rows(), 79);
+  const MeasurementBatch other = test::measured(robot, 60, 65);
+  ASSERT_EQ(other.measurements[5].pose_id, batch.measurements[5].pose_id);
+  const CompensatedModel elsewhere = test::demand(learn_bias(calibrated, other, quick("M3", "se")));
+  EXPECT_EQ(elsewhere.parts().bias->q.rows(), 60);
+  EXPECT_TRUE(elsewhere.parts().suspects.empty());
+}
+
+TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 100, 66);
+  const auto judged = [&] { return test::demand(train(cell, batch, quick("M2", "auto"))).parts(); };
+  CompensatedModel::Parts parts = judged();
+  ASSERT_TRUE(parts.bias);
+  EXPECT_TRUE(parts.rotation_bias) << "what gives way turns the tool too";
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> turn(0.0, 0.05);  // rad, ten times what gives way
+  for (Measurement& m : batch.measurements) {
+    for (const Vector3& axis : {Vector3(Vector3::UnitX()), Vector3(Vector3::UnitY()), Vector3(Vector3::UnitZ())})
+      m.R_WT = Matrix3(Eigen::AngleAxisd(turn(random), axis) * *m.R_WT);
+  }
+  parts = judged();
+  ASSERT_TRUE(parts.bias);
+  EXPECT_FALSE(parts.rotation_bias);
+  EXPECT_NE(parts.bias_choice->sentence.find("of the orientations it explains nothing"), std::string::npos)
+      << parts.bias_choice->sentence;
 }
 
 TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
