@@ -226,6 +226,13 @@ MatrixXd BiasModel::mean_all_B(const MatrixXd& q, const std::vector<BiasFeatures
   return fitted_->outputs->mean(q, features).rowwise() + fitted_->state.offset.transpose();
 }
 
+VectorXd BiasModel::parameter_weights() const { return fitted_->outputs->parameter_weights(); }
+
+MatrixXd BiasModel::nearby_mean_all_B(const MatrixXd& q) const {
+  if (fitted_->coupled) return fitted_->outputs->nearby_mean(q);
+  return mean_all_B(q);
+}
+
 BiasPrediction BiasModel::predict(const JointVector& q, const BiasFeatures& features) const {
   if (!fitted_->coupled) return predict_all(q.transpose()).front();
   return predict_all(q.transpose(), {features}).front();
@@ -237,6 +244,7 @@ std::vector<BiasPrediction> BiasModel::predict_all(const MatrixXd& q, const std:
   for (const OutputPrediction& at : fitted_->outputs->predict(q, features)) {
     BiasPrediction prediction;
     prediction.mean_B = at.mean + fitted_->state.offset;
+    prediction.nearby_B = fitted_->coupled ? Vector3(at.nearby) : prediction.mean_B;
     prediction.covariance_B = at.covariance;
     prediction.stddev_B = prediction.covariance_B.diagonal().cwiseSqrt();
     prediction.measured_stddev_B = (prediction.covariance_B.diagonal() + noise).cwiseSqrt();

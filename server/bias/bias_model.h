@@ -35,7 +35,10 @@ struct BiasOptions {
 
 /// At one joint vector, for the three coordinates in B.
 struct BiasPrediction {
-  Vector3 mean_B = Vector3::Zero();             ///< m
+  Vector3 mean_B = Vector3::Zero();  ///< m
+  /// m: what of mean_B rests on training poses nearby: what the kernel says, without blocks all of it. The rest is H w
+  /// of the blocks and the mean residual.
+  Vector3 nearby_B = Vector3::Zero();
   Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
   Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one measurement as noisy as the mean of them
   Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
@@ -94,6 +97,11 @@ class BiasModel {
   [[nodiscard]] BiasPrediction predict(const JointVector& q, const BiasFeatures& features = {}) const;
   /// The mean alone: what an iteration needs.
   [[nodiscard]] Vector3 mean_B(const JointVector& q, const BiasFeatures& features = {}) const;
+  /// M x 3, m: BiasPrediction::nearby_B alone; rows of `q` are joint vectors.
+  [[nodiscard]] Eigen::MatrixXd nearby_mean_all_B(const Eigen::MatrixXd& q) const;
+  /// P: what the block `parameters` found of each parameter, in standard deviations that it had before any data; empty
+  /// without that block.
+  [[nodiscard]] Eigen::VectorXd parameter_weights() const;
   /// M x 3, m: the means alone of many; rows of `q` are joint vectors.
   [[nodiscard]] Eigen::MatrixXd mean_all_B(const Eigen::MatrixXd& q,
                                            const std::vector<BiasFeatures>& features = {}) const;

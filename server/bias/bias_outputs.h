@@ -21,9 +21,10 @@ struct OutputData {
 
 /// At one joint vector.
 struct OutputPrediction {
-  Eigen::VectorXd mean;        ///< D
-  Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
-  double prior_share = 0;      ///< as BiasPrediction says, of the first three outputs
+  Eigen::VectorXd mean;         ///< D
+  Eigen::MatrixXd covariance;   ///< D x D, of the functions themselves
+  double prior_share = 0;       ///< as BiasPrediction says, of the first three outputs
+  Eigen::VectorXd nearby = {};  ///< D: what of the mean the kernel says; empty without blocks: all of it
 };
 
 /// D outputs conditioned on their data. Immutable, thread-safe. `features` are as many as joint vectors or, where no
@@ -37,6 +38,10 @@ class BiasOutputs {
                                              const std::vector<BiasFeatures>& features) const = 0;
   [[nodiscard]] virtual std::vector<OutputPrediction> predict(const Eigen::MatrixXd& q,
                                                               const std::vector<BiasFeatures>& features) const = 0;
+  /// M x D: what of the mean the kernel says, without blocks all of it.
+  [[nodiscard]] virtual Eigen::MatrixXd nearby_mean(const Eigen::MatrixXd& q) const { return mean(q, {}); }
+  /// P: of the block `parameters`, what the data say of its weights; empty without.
+  [[nodiscard]] virtual Eigen::VectorXd parameter_weights() const { return {}; }
   /// D, of one measurement.
   [[nodiscard]] virtual Eigen::VectorXd noise_variance() const = 0;
   /// Nat: of each output, or one number where they have one likelihood together.

@@ -39,10 +39,11 @@ CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
 class CoupledOutputs final : public BiasOutputs {
  public:
   CoupledOutputs(LinearBlocks blocks, CoupledPosterior posterior, const CoupledHyperparameters& at,
-                 const VectorXd& noise_shape)
+                 const VectorXd& noise_shape, VectorXd parameter_weights)
       : blocks_(std::move(blocks)),
         posterior_(std::move(posterior)),
         noise_shape_(noise_shape),
+        parameter_weights_(std::move(parameter_weights)),
         widening_(std::max(1.0, posterior_.surprise())) {
     noise_variance_.resize(static_cast<Index>(at.outputs.size()));
     for (Index d = 0; d < count(); ++d)
@@ -66,12 +67,15 @@ class CoupledOutputs final : public BiasOutputs {
       for (CoupledPrediction& at :
            posterior_.predict(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()))) {
         const double share = share_of(at.covariance.diagonal(), at.prior);
-        predictions.push_back({std::move(at.mean), widening_ * at.covariance, share});
+        predictions.push_back({std::move(at.mean), widening_ * at.covariance, share, std::move(at.own_mean)});
       }
     }
     return predictions;
   }
 
+  MatrixXd nearby_mean(const MatrixXd& q) const override { return posterior_.own_mean(q); }
+
+  VectorXd parameter_weights() const override { return parameter_weights_; }
   VectorXd noise_variance() const override { return noise_variance_; }
   VectorXd log_likelihood() const override { return VectorXd::Constant(1, posterior_.log_likelihood()); }
   MatrixXd leave_one_out_mean() const override { return posterior_.leave_one_out_mean(); }
@@ -95,6 +99,7 @@ class CoupledOutputs final : public BiasOutputs {
   LinearBlocks blocks_;
   CoupledPosterior posterior_;
   VectorXd noise_shape_;
+  VectorXd parameter_weights_;
   double widening_;  // of all variances, by what poses left out together show
   VectorXd noise_variance_;
 };
@@ -105,7 +110,15 @@ BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data
   LinearBlocks blocks = blocks_of(bias, data);
   auto posterior = CoupledPosterior::condition(bias.kernel, blocks, coupled(blocks, data), at);
   if (!posterior) return nullptr;
-  return std::make_shared<CoupledOutputs>(std::move(blocks), *std::move(posterior), at, data.noise_shape);
+  VectorXd parameter_weights;
+  Index first = 0;
+  for (const LinearBlockPtr& block : bias.blocks) {
+    const Index count = block->column_count(data.features.front());
+    if (block->name() == "parameters") parameter_weights = posterior->weights().segment(first, count);
+    first += count;
+  }
+  return std::make_shared<CoupledOutputs>(std::move(blocks), *std::move(posterior), at, data.noise_shape,
+                                          std::move(parameter_weights));
 }
 
 std::optional<CoupledSearchResult> search_coupled_outputs(const SpelledBias& bias, const OutputData& data,

@@ -183,7 +183,8 @@ std::vector<CoupledPrediction> CoupledPosterior::predict(const MatrixXd& q,
 void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd>& columns,
                                    std::vector<CoupledPrediction>* out) const {
   const auto outputs = static_cast<Index>(columns.size());
-  MatrixXd means = own_mean(q);
+  const MatrixXd own = own_mean(q);
+  MatrixXd means = own;
   std::vector<Part> parts;
   for (Index d = 0; d < outputs; ++d) {
     const MatrixXd& H = columns[static_cast<std::size_t>(d)];
@@ -191,7 +192,8 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
     parts.push_back(part_of(q, H, d));
   }
   for (Index i = 0; i < q.rows(); ++i) {
-    CoupledPrediction at{means.row(i).transpose(), shared_covariance(parts, i), VectorXd(outputs)};
+    CoupledPrediction at{means.row(i).transpose(), own.row(i).transpose(), shared_covariance(parts, i),
+                         VectorXd(outputs)};
     for (Index d = 0; d < outputs; ++d) {
       const Part& part = parts[static_cast<std::size_t>(d)];
       at.covariance(d, d) += part.known[i];

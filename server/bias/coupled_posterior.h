@@ -7,6 +7,7 @@ namespace trammel {
 /// At one joint vector, of D outputs.
 struct CoupledPrediction {
   Eigen::VectorXd mean;
+  Eigen::VectorXd own_mean;    ///< what of it the outputs' own processes add to H w
   Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
   Eigen::VectorXd prior;       ///< their variances before any data
 };

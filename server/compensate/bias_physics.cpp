@@ -47,6 +47,14 @@ BiasPhysics::BiasPhysics(const PhysicalModel& physics) : whole_(with_standard_so
     prior_stddev_(static_cast<Eigen::Index>(k)) = parameters[k].prior_scale;
 }
 
+Vector3 BiasPhysics::beyond_first_order(const PoseContext& context, const Eigen::VectorXd& shift) const {
+  Eigen::MatrixXd J_W;
+  const Eigen::VectorXd moved = prior_stddev_.cwiseProduct(shift);
+  const Vector3 p_W = whole_.pose_W(context, whole_.values, &J_W).translation();
+  const Vector3 moved_W = whole_.pose_W(context, whole_.values + moved, nullptr).translation() - p_W;
+  return whole_.X_WB.linear().transpose() * (moved_W - J_W.topRows<3>() * moved);
+}
+
 BiasFeatures BiasPhysics::at(const PoseContext& context) const {
   Eigen::MatrixXd J_W;
   whole_.pose_W(context, whole_.values, &J_W);

@@ -19,6 +19,9 @@ class BiasPhysics {
 
   /// At the model's values, exact derivatives.
   [[nodiscard]] BiasFeatures at(const PoseContext& context) const;
+  /// m, in B: what the position makes of `shift` (P, prior standard deviations of each parameter) beyond
+  /// `at(context).by_parameter * shift`.
+  [[nodiscard]] Vector3 beyond_first_order(const PoseContext& context, const Eigen::VectorXd& shift) const;
 
  private:
   PhysicalModel whole_;

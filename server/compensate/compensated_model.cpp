@@ -155,7 +155,7 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     Result<BiasModel> bias = BiasModel::restore(state);
     if (!bias) return tl::make_unexpected(bias.error());
     inside->bias = std::move(*bias);
-    inside->bias_size_B = column_rms(state.residual_B);
+    if (!inside->bias->needs_features()) inside->bias_size_B = column_rms(state.residual_B);
     if (parts.rotation_bias) {
       BiasState rotation = *parts.rotation_bias;
       if (rotation.kernel != state.kernel || rotation.q != state.q)
@@ -164,8 +164,8 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
       for (const BiasFeatures& features : state.features) rotation.features.push_back(turned(features));
       Result<BiasModel> turning = BiasModel::restore(rotation);
       if (!turning) return tl::make_unexpected(turning.error());
+      if (!turning->needs_features()) inside->rotation_bias_size_B = column_rms(rotation.residual_B);
       inside->rotation_bias = std::move(*turning);
-      inside->rotation_bias_size_B = column_rms(rotation.residual_B);
     }
   }
   parts.provenance.hash = content_hash(parts);
@@ -269,10 +269,11 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
                fmt::format("{:.2e} mm left after {} iterations", 1e3 * result.error_after, result.iterations));
   }
   if (!in_domain) {
+    const bool has_blocks = inside_->bias && inside_->bias->needs_features();
     return end(CorrectionStatus::kOutOfDomain,
-               fmt::format("too far from the training poses: corrected by the calibrated model and {:.0f} % of the "
-                           "learned bias",
-                           100 * bias_weight));
+               fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
+                           has_blocks ? ", the blocks of the bias" : "", 100 * bias_weight,
+                           has_blocks ? "its kernel" : "the learned bias"));
   }
   return end(CorrectionStatus::kOk, "");
 }

@@ -57,8 +57,8 @@ struct ErrorPrediction {
   Matrix3 covariance_B = Matrix3::Zero();
   /// Of one measurement of the orientation, rad, about the axes of B; where the model learned orientations.
   std::optional<Vector3> rotation_stddev_B;
-  bool in_domain = false;  ///< false: the learned bias is not, or not fully, in error_B
-  double bias_weight = 0;  ///< how much of the learned bias is, in [0, 1]: 1 in domain, 0 well outside
+  bool in_domain = false;  ///< false: what the bias learned of poses nearby is not, or not fully, in error_B
+  double bias_weight = 0;  ///< how much of it is, in [0, 1]: 1 in domain, 0 well outside. Blocks of a bias stay
 };
 
 enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
@@ -179,7 +179,7 @@ class CompensatedModel {
     std::optional<BiasModel> bias;
     std::optional<BiasModel> rotation_bias;
     bool bias_has_parameters = false;
-    Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses
+    Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses; 0 with blocks
     Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise
   };
   /// What the biases say at a pose.

@@ -12,6 +12,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kFormat = 1;
+constexpr const char* kFades = "kernel";  // beyond the domain, of a bias with blocks
 
 Json to_json(const Eigen::MatrixXd& m) {
   Json values = Json::array();
@@ -249,6 +250,7 @@ Json content_of(const CompensatedModel::Parts& parts) {
   if (parts.bias) {
     content["bias"] = to_json(*parts.bias);
     for (const PoseContext& context : parts.bias_contexts) content["bias"]["poses"].push_back(to_json(context));
+    if (!parts.bias_contexts.empty()) content["bias"]["fades"] = kFades;
     if (parts.rotation_bias) content["rotation_bias"] = to_json(*parts.rotation_bias);
     if (parts.oriented_poses > 0) content["oriented_poses"] = parts.oriented_poses;
   }
@@ -312,6 +314,13 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
     const Json& bias = content.at("bias");
     parts.bias = bias_from(bias);
     if (bias.contains("poses")) {
+      if (bias.value("fades", "") != kFades) {
+        return refused(
+            "{}: its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would "
+            "answer "
+            "otherwise now: train it again",
+            where, parts.bias->kernel);
+      }
       for (const Json& context : bias.at("poses")) parts.bias_contexts.push_back(context_from(context));
     }
     if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));

@@ -52,16 +52,30 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
   return predictions;
 }
 
+namespace {
+
+/// What is taken of a bias: what it knows only of poses nearby fades, what its blocks say lasts.
+Vector3 taken(const Vector3& mean_B, const Vector3& nearby_B, double weight) {
+  return (mean_B - nearby_B) + weight * nearby_B;
+}
+
+Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& features, double weight) {
+  const Vector3 mean_B = bias.mean_B(q, features);
+  return weight == 1 ? mean_B : taken(mean_B, bias.nearby_mean_all_B(q.transpose()).row(0), weight);
+}
+
+}  // namespace
+
 Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) const {
   const PoseContext context = completed(asked);
   Pose X_BT = parts().physics.X_WB.inverse() * parts().physics.pose_W(context);
-  if (!inside_->bias || bias_weight == 0) return X_BT;
+  if (!inside_->bias) return X_BT;
   const std::optional<BiasModel>& rotation = inside_->rotation_bias;
   const BiasFeatures of_position = inside_->bias->needs_features() ? features(context) : BiasFeatures{};
-  X_BT.translation() += bias_weight * inside_->bias->mean_B(context.q, of_position);
+  X_BT.translation() += taken(*inside_->bias, context.q, of_position, bias_weight);
   if (!rotation) return X_BT;
-  const Vector3 turn_B = rotation->mean_B(context.q, rotation->needs_features() ? turned(of_position) : of_position);
-  X_BT.linear() = (rotation_exp(bias_weight * turn_B) * X_BT.linear()).eval();
+  const BiasFeatures of_rotation = rotation->needs_features() ? turned(of_position) : of_position;
+  X_BT.linear() = (rotation_exp(taken(*rotation, context.q, of_rotation, bias_weight)) * X_BT.linear()).eval();
   return X_BT;
 }
 
@@ -98,22 +112,24 @@ namespace {
 struct Uncertainty {
   Matrix3 identified;  ///< what the parameters leave uncertain
   double metrology;    ///< variances of one axis: of the instrument,
-  double unlearned;    ///< and of what the physics leaves over where no bias is taken
-  Vector3 bias_size;   ///< rms over the training poses
-  double left_of_identified;
+  double unlearned;    ///< of what the physics leaves over where no bias is taken,
+  double growth;       ///< and of what is missed the farther out
+  Vector3 bias_size;   ///< of a bias without blocks, rms over the training poses
 };
 
 /// Covariance of one measurement. Noise is never less than the tracker's: a fit to few poses takes some of it for
-/// signal. What the parameters leave uncertain is part of a bias that has them; any other corrects it as far as it
-/// knows anything; where the bias does not count it counts in full. What of the bias is not taken may be missing: as
-/// much as it is there, and as it was at the training poses.
-Matrix3 with_bias(const BiasPrediction& bias, double weight, const Uncertainty& of) {
+/// signal. What the parameters leave uncertain is part of a bias that has them (`has_parameters`); any other corrects
+/// it as far as it knows anything; where the bias does not count it counts in full. What of the bias is not taken may
+/// be missing: as much as it is there, and as it was at the training poses. The covariance of all that the bias knows
+/// stays: far from its poses a kernel has that of before any data, blocks what the data left them.
+Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters, const Uncertainty& of) {
   const Vector3 known = bias.stddev_B.cwiseAbs2();
   const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(of.metrology);
-  const Vector3 untaken = bias.mean_B.cwiseAbs2().cwiseMax(of.bias_size.cwiseAbs2());
-  Matrix3 covariance = bias.covariance_B + (weight * of.left_of_identified + (1 - weight)) * of.identified;
-  covariance.diagonal() +=
-      weight * noise + (1 - weight) * noise.cwiseMax(of.unlearned) + (1 - weight) * (1 - weight) * untaken;
+  const Vector3 untaken = bias.nearby_B.cwiseAbs2().cwiseMax(of.bias_size.cwiseAbs2());
+  const double left_of_identified = has_parameters ? 0 : weight * bias.prior_share + (1 - weight);
+  Matrix3 covariance = bias.covariance_B + left_of_identified * of.identified;
+  covariance.diagonal() += weight * noise + (1 - weight) * noise.cwiseMax(of.unlearned) +
+                           (1 - weight) * (1 - weight) * untaken + Vector3::Constant((1 - weight) * of.growth);
   return covariance;
 }
 
@@ -136,8 +152,8 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
   prediction.in_domain = trained_with && domain.in_range(context.q);
   const double metrology = cell().tracker.sigma * cell().tracker.sigma;
-  const double unlearned = metrology + parts().discrepancy * parts().discrepancy +
-                           domain.growth(context.q, parts().extrapolation_slope, cell().robot);
+  const double growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
+  const double unlearned = metrology + parts().discrepancy * parts().discrepancy + growth;
   Matrix3 covariance = identified + unsaid;
   if (learned == nullptr) {
     covariance.diagonal().array() += unlearned;
@@ -146,19 +162,27 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
     prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
     const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias.prior_share) : 0.0);
     prediction.bias_weight = weight;
-    prediction.X_BT_predicted.translation() += weight * bias.mean_B;
-    const double left = inside_->bias_has_parameters ? 0.0 : bias.prior_share;
-    covariance = with_bias(bias, weight, {identified, metrology, unlearned, inside_->bias_size_B, left}) + unsaid;
+    prediction.X_BT_predicted.translation() += taken(bias.mean_B, bias.nearby_B, weight);
+    const bool has_parameters = inside_->bias_has_parameters;
+    // The slope of a bias with blocks is that of what it misses beyond its own covariance; the others' of the physics.
+    const Uncertainty of = inside_->bias->needs_features()
+                               ? Uncertainty{identified, metrology, metrology, growth, inside_->bias_size_B}
+                               : Uncertainty{identified, metrology, unlearned, 0, inside_->bias_size_B};
+    covariance = with_bias(bias, weight, has_parameters, of) + unsaid;
+    if (has_parameters && weight < 1) {
+      // Near its poses the bias has learned it; part of it went into the weights, so its direction is not known.
+      const Vector3 left_B = inside_->bias_physics.beyond_first_order(context, inside_->bias->parameter_weights());
+      covariance.diagonal().array() += (1 - weight) * left_B.squaredNorm();
+    }
     if (learned->rotation) {
       const BiasPrediction& turn = *learned->rotation;
       const Eigen::MatrixXd turned_B = X_BW.linear() * J_W.bottomRows<3>();
       const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
-      const double unknown = inside_->bias_has_parameters ? 0.0 : turn.prior_share;
       prediction.X_BT_predicted.linear() =
-          (rotation_exp(weight * turn.mean_B) * prediction.X_BT_predicted.linear()).eval();
-      prediction.rotation_stddev_B = with_bias(turn, weight,
+          (rotation_exp(taken(turn.mean_B, turn.nearby_B, weight)) * prediction.X_BT_predicted.linear()).eval();
+      prediction.rotation_stddev_B = with_bias(turn, weight, has_parameters,
                                                {turned_B * parts().covariance * turned_B.transpose(), instrument,
-                                                instrument, inside_->rotation_bias_size_B, unknown})
+                                                instrument, 0, inside_->rotation_bias_size_B})
                                          .diagonal()
                                          .cwiseSqrt();
     }

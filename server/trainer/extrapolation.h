@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/bias/bias_model.h"
 #include "server/trainer/left_out.h"
 
 namespace trammel {
@@ -10,5 +11,8 @@ namespace trammel {
 /// rest, and the poses left out are asked; what they miss by beyond the rest's own residual and the parameters'
 /// uncertainty is growth. The worse end counts. A joint that hardly moved takes the largest of the others.
 [[nodiscard]] JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot);
+/// The same where a bias with blocks, learned from all `poses`, is taken outside but for its kernel: what it misses
+/// there, conditioned on the rest, beyond its own claims.
+[[nodiscard]] JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot, const BiasModel& bias);
 
 }  // namespace trammel

@@ -177,6 +177,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   parts.bias = bias->state();
   parts.bias->features.clear();
   if (bias->needs_features()) {
+    parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, *bias);
     for (const Measurement& m : batch.measurements) parts.bias_contexts.push_back(m.context);
   }
   parts.prior_share_limit = domain_limit(*bias);

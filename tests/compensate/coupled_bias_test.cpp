@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -181,6 +182,94 @@ TEST(BiasPhysics, AToolThatChangedIsNotTheToolThatNobodyKnows) {
     return BiasPhysics(physics).at(posed(inside())).by_parameter.cols();
   };
   EXPECT_EQ(columns(changed), columns(without) + changed.values.size() - without.values.size());
+}
+
+TEST_F(CoupledBias, AModelOfBeforeBlocksLastedIsRefusedNotServedOtherwise) {
+  nlohmann::json file = nlohmann::json::parse(serialize(*model_));
+  file["content"]["bias"].erase("fades");
+  file["hash"] = sha256_hex(file["content"].dump());
+  EXPECT_EQ(deserialize(file.dump(), "cell.model").error().message,
+            "cell.model: its bias `se + joint_map + parameters` was learned when a bias with blocks faded as a whole "
+            "beyond the domain, and would answer otherwise now: train it again");
+}
+
+TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
+  CompensatedModel::Parts parts = model_->parts();
+  parts.q_max(0) = parts.q_min(0) + 0.1;  // as if joint 1 had hardly moved
+  const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
+  const JointVector far = inside();
+  const ErrorPrediction at = model.predict(far, "spindle", "spindle");
+  EXPECT_EQ(at.bias_weight, 0);
+  EXPECT_FALSE(at.in_domain);
+  const BiasPrediction bias = model_->bias()->predict(far, model_->features(posed(far)));
+  const PhysicalModel& physics = model_->parts().physics;
+  const Vector3 calibrated = physics.X_WB.inverse() * physics.pose_W(posed(far)).translation();
+  EXPECT_LT((at.X_BT_predicted.translation() - calibrated - bias.mean_B + bias.nearby_B).norm(), 1e-12);
+  EXPECT_GT(to_mm((bias.mean_B - bias.nearby_B).norm()), 0.3);
+  Target target;
+  target.joint_target = true;
+  target.seed = far;
+  const Correction correction = model.correct(target, "spindle", "spindle");
+  EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
+  EXPECT_LT(correction.error_after, 1e-7);
+  EXPECT_NE(correction.message.find("the blocks of the bias and 0 % of its kernel"), std::string::npos)
+      << correction.message;
+  const Vector3 reached = robot_->truth.pose_W(posed(correction.q)).translation();
+  EXPECT_LT(to_mm((reached - correction.X_BT_wanted.translation()).norm()), 0.15);
+}
+
+TEST_F(CoupledBias, AMapOfJoint2IsUsedWhereJoint2WasMeasuredThoughJoint1IsFarOut) {
+  const auto map_of_2 = [](const PoseContext& at) {
+    return Vector3(3e-4 * std::sin(5 * at.q(1) + 1) * model_->features(at).by_joint.col(1).head<3>());
+  };
+  // Learned from the poses on one side of joint 1 only.
+  CompensatedModel::Parts parts = model_->parts();
+  std::vector<Eigen::Index> rows;
+  std::vector<PoseContext> contexts;
+  for (Eigen::Index i = 0; i < parts.bias->q.rows(); ++i) {
+    PoseContext at = parts.bias_contexts[static_cast<std::size_t>(i)];
+    at.q = parts.bias->q.row(i).transpose();
+    parts.bias->residual_B.row(i) += map_of_2(at).transpose();
+    if (at.q(0) > 0) continue;
+    rows.push_back(i);
+    contexts.push_back(at);
+  }
+  parts.bias->q = parts.bias->q(rows, Eigen::all).eval();
+  parts.bias->residual_B = parts.bias->residual_B(rows, Eigen::all).eval();
+  parts.bias->sigma = parts.bias->sigma(rows).eval();
+  parts.bias->block_hyperparameters.segment<2>(2) << std::log(3e-4), std::log(6.0);
+  parts.bias_contexts = contexts;
+  parts.rotation_bias.reset();
+  parts.q_max(0) = 0;
+  const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
+  double left = 0, of_map = 0;
+  int far = 0, inside = 0;
+  for (const Measurement& m : test::measured(*robot_, 300, 36).measurements) {
+    const PoseContext at = posed(m.context.q);
+    const ErrorPrediction predicted = model.predict(at.q, "spindle", "spindle");
+    if (predicted.bias_weight > 0) continue;
+    ++far;
+    EXPECT_FALSE(predicted.in_domain);
+    const Vector3 true_B = model.parts().physics.X_WB.inverse() * robot_->truth.pose_W(at).translation() + map_of_2(at);
+    const Vector3 error_B = true_B - predicted.X_BT_predicted.translation();
+    left += error_B.squaredNorm();
+    of_map += map_of_2(at).squaredNorm();
+    inside += static_cast<int>((error_B.array().abs() <= 1.96 * predicted.true_stddev_B.array()).count());
+  }
+  ASSERT_GT(far, 50);
+  EXPECT_GT(to_mm(std::sqrt(of_map / far)), 0.2);
+  EXPECT_LT(left, 0.1 * of_map);
+  EXPECT_GT(inside, 0.85 * 3 * far);
+}
+
+TEST_F(CoupledBias, WhatFirstOrderLeavesOutGrowsWithTheSquare) {
+  const BiasPhysics physics(model_->parts().physics);
+  const Eigen::VectorXd found = model_->bias()->parameter_weights();
+  ASSERT_EQ(found.size(), 36);
+  const Vector3 once = physics.beyond_first_order(posed(inside()), 0.01 * found);
+  const Vector3 twice = physics.beyond_first_order(posed(inside()), 0.02 * found);
+  EXPECT_GT(once.norm(), 1e-11);
+  EXPECT_LT((twice - 4 * once).norm(), 0.05 * twice.norm());
 }
 
 TEST_F(CoupledBias, FeaturesAreHowTheRealArmMovesTheTool) {

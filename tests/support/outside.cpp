@@ -37,8 +37,13 @@ double farthest(const JointVector& q, const JointRanges& ranges) {
 }
 
 /// m, Euclidean, that the whole bias misses each pose by, in domain or not.
-Eigen::VectorXd missed(const BiasModel& bias, const BiasProblem& problem) {
-  return (problem.residual_B - bias.mean_all_B(problem.q)).rowwise().norm();
+Eigen::VectorXd missed(const CompensatedModel& model, const MeasurementBatch& asked) {
+  const BiasProblem problem = leftover(model.parts().physics, asked);
+  std::vector<BiasFeatures> features;
+  for (const Measurement& m : asked.measurements) {
+    if (model.bias()->needs_features()) features.push_back(model.features(m.context));
+  }
+  return (problem.residual_B - model.bias()->mean_all_B(problem.q, features)).rowwise().norm();
 }
 
 }  // namespace
@@ -65,16 +70,15 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
     options.seed = static_cast<std::uint64_t>(seed);
     const CompensatedModel model =
         demand(train(robot.truth.cell, measured_within(robot, ranges, training_poses, draw), options));
-    const BiasModel bias = demand(BiasModel::restore(model.parts().bias.value()));
     for (std::size_t w = 0; w < kWidenings.size(); ++w) {
       const MeasurementBatch asked =
           measured_within(robot, widened(ranges, limits, kWidenings[w]), kAsked, draw + w + 1);
       const CompensatedModel::LevelErrors errors = model.errors_B(asked);
-      const Eigen::VectorXd distance = missed(bias, leftover(model.parts().physics, asked));
+      const Eigen::VectorXd distance = missed(model, asked);
       for (Eigen::Index i = 0; i < distance.size(); ++i) {
         const auto row = static_cast<std::size_t>(i);
         const double out = farthest(asked.measurements[row].context.q, ranges);
-        const bool beyond_known = distance(i) > kBeyondKnown * bias.report().leave_one_out_rms;
+        const bool beyond_known = distance(i) > kBeyondKnown * model.bias()->report().leave_one_out_rms;
         if (beyond_known) ++figures.outsiders;
         if (beyond_known && !errors.in_domain[row]) ++figures.caught;
         if (!beyond_known && out <= 0) ++figures.insiders;
