@@ -25,6 +25,7 @@ constexpr Index kFewest = 30;             // observations; of fewer no block cou
 constexpr double kBeyondChance = 2;       // standard errors
 constexpr double kOfNone = 3;             // hyperparameters: the residual's stddev, of each coordinate
 constexpr double kFit = 0.5;              // of the time that a candidate takes
+constexpr double kPhysics = 0.9;          // of what a bias without parameters leaves
 constexpr double kLeavesMore = 1.3;       // of metrology's noise, rms: worth the dear ones
 
 std::vector<Index> in_order(Index count) {
@@ -275,6 +276,11 @@ class Choosing {
           "space {:.4f} mm",
           taken.kernel, to_mm(taken.leave_one_out_rms), to_mm(none.leave_one_out_rms), to_mm(taken.time_block_rms),
           to_mm(taken.joint_block_rms));
+      if (learns_physics()) {
+        choice_.sentence +=
+            "; it gains by what physics would that the error sources may lack: diagnose the batch, a model that has "
+            "it holds farther out";
+      }
     } else {
       const auto other =
           std::min_element(choice_.candidates.begin() + 1, choice_.candidates.end(), [](const auto& a, const auto& b) {
@@ -290,6 +296,15 @@ class Choosing {
                                       unjudged, 2 * kBlocks);
     }
     return {std::move(choice_), std::move(best_.model)};
+  }
+
+  /// Whether the derivatives by parameters leave far less than the same kernel without them.
+  [[nodiscard]] bool learns_physics() const {
+    const BiasCandidate& taken = choice_.candidates[best_.candidate];
+    const auto plain = std::find_if(choice_.candidates.begin(), choice_.candidates.end(),
+                                    [](const BiasCandidate& one) { return one.kernel == "se"; });
+    return taken.kernel == "se + parameters" && plain != choice_.candidates.end() &&
+           taken.leave_one_out_rms < kPhysics * plain->leave_one_out_rms;
   }
 
   const BiasProblem& problem_;

@@ -138,6 +138,7 @@ TEST(Train, AutoTakesNoBiasWhereThePhysicsIsCompleteAndThePhysicsItselfWhereItIs
   const MeasurementBatch batch = test::measured(robot, 80, 64);
   const CompensatedModel lacking = test::demand(train(cell, batch, quick("M2", "auto")));
   EXPECT_EQ(lacking.parts().bias_choice->kernel, "se + parameters") << lacking.parts().bias_choice->sentence;
+  EXPECT_NE(lacking.parts().bias_choice->sentence.find("diagnose"), std::string::npos);
   EXPECT_LT(to_mm(lacking.evaluate(test::measured(robot, 300, 65)).compensated.rms), 0.026);
   const CompensatedModel stored = test::demand(deserialize(serialize(lacking), "memory"));
   EXPECT_EQ(stored.provenance().hash, lacking.provenance().hash);
