@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <new>
@@ -9,6 +10,7 @@
 
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
+#include "server/trainer/extend.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -474,11 +476,14 @@ TEST_F(TrainerTest, RefusesToImportWhatIsNotOfTheCell) {
 }
 
 /// Joint 3 of the small cell oscillates, which its error sources do not know.
-std::string csv_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
+MeasurementBatch batch_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
   VirtualRobot robot{make_physical_model(cell, {"base", "gear_transmission:3@2"}).value(), 20e-6, 60e-6, {}};
   robot.truth.values(0) = 1e-3;
   robot.truth.values.tail<2>() = Eigen::Vector2d(1e-4, 2e-4);
-  return to_csv(simulate(robot, plan_poses(*cell, {120, 1}).value(), {}).value());
+  return simulate(robot, plan_poses(*cell, {120, 1}).value(), {}).value();
+}
+std::string csv_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
+  return to_csv(batch_of_an_oscillating_joint(cell));
 }
 
 TEST_F(TrainerTest, DiagnosesAStoredBatchAndKeepsWhatItFound) {
@@ -508,6 +513,20 @@ TEST_F(TrainerTest, PutsTheExtendedModelInForceBecauseItIsBetterAndKeepsWhatWasA
   EXPECT_TRUE(level.starts_with("base,")) << level;
   const JobProgress again = retrain({"lt-07"});
   EXPECT_EQ(store_->models("cell-7")->at(2).level, level) << again.what;
+}
+
+TEST_F(TrainerTest, APoseHeldOutThatFitsNeitherModelDoesNotJudgeAnExtensionAndIsNamed) {
+  start();
+  MeasurementBatch batch = batch_of_an_oscillating_joint(cells_.at("cell-7"));
+  const MeasurementBatch drawn = with_held_out(batch, options_.validation_share, options_.seed);
+  const auto held_out = std::find_if(drawn.measurements.begin(), drawn.measurements.end(),
+                                     [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
+  Measurement& bad = batch.measurements.at(static_cast<std::size_t>(held_out - drawn.measurements.begin()));
+  bad.p_W.z() += 0.02;
+  watch_.wait_until_finished(trainer_->submit("cell-7", "lt-07", to_csv(batch), "client:1").value());
+  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", true).value());
+  EXPECT_TRUE(done.in_force) << "one pose 20 mm off decided: " << done.what;
+  EXPECT_NE(done.what.find("judged without " + bad.pose_id), std::string::npos) << done.what;
 }
 
 TEST_F(TrainerTest, WhatTheModelInForceHasAlreadyIsNotFoundAgain) {
