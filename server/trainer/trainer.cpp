@@ -147,7 +147,7 @@ Acceptance judge_against(const CompensatedModel& candidate, const ServedModel& p
   const PairedGain gain = paired_gain(present.model, candidate, held_out);
   if (bar == Trainer::Bar::kBetter) {
     const bool good = gain.beyond_chance();
-    return {good, fmt::format("{}: held-out rms {}; before is version {}{}", good ? "in force" : "not in force",
+    return {good, fmt::format("{}: {}; before is version {}{}", good ? "in force" : "not in force",
                               to_string(gain), present.version, good ? "" : ", which stays in force")};
   }
   const bool good = gain.rms_after <= accept_ratio * gain.rms_before;
