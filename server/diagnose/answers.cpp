@@ -11,6 +11,7 @@
 #include "server/diagnose/recovery.h"
 #include "server/diagnose/separability.h"
 #include "server/diagnose/validation.h"
+#include "server/diagnose/wording.h"
 
 namespace trammel {
 
@@ -60,7 +61,7 @@ Verdict verdict_of(const Diagnosis& diagnosis) {
   return doubt ? Verdict::kAmbiguous : Verdict::kNamed;
 }
 
-/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last the noise.
+/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last what none explains.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
                                         const LinearProblem& after, double noise) {
   std::vector<WaterfallStep> steps;
@@ -85,7 +86,7 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
     std::erase_if(chosen, [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
   }
   steps.insert(steps.end(), tail.rbegin(), tail.rend());
-  steps.push_back({"noise of one measurement", std::sqrt(3.0) * noise});
+  steps.push_back({noise_name(noise, after.instrument()), std::sqrt(3.0) * noise});
   return steps;
 }
 
@@ -142,6 +143,7 @@ void tell_findings(const Explained& explained, const PreparedBatch& prepared, co
   doubt_what_was_not_recorded(prepared.surrogates, recorded, diagnosis.findings);
   diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
   doubt_beside(diagnosis.unexplained, diagnosis.findings);
+  doubt_single_orders(diagnosis.findings);
   diagnosis.verdict = verdict_of(diagnosis);
   for (const Accepted& one : found.accepted) {
     if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
@@ -227,21 +229,27 @@ void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& fam
 
 void tell_limits(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
                  Diagnosis& diagnosis) {
-  const auto none = [&](const std::function<bool(const Measurement&)>& has) {
-    return std::none_of(recorded.measurements.begin(), recorded.measurements.end(), has);
-  };
   std::vector<std::string>& limits = diagnosis.limits;
-  if (none([](const Measurement& m) { return m.R_WT.has_value(); }))
-    limits.emplace_back("no orientations: several geometry parameters and all of the tool's rotation stay unseen");
-  if (none([](const Measurement& m) { return m.context.time.has_value(); }))
-    limits.emplace_back("no times: a drift, and what warms up, can only be told by the order of the poses");
-  if (none([](const Measurement& m) { return m.context.temperature.has_value(); }))
-    limits.emplace_back(
-        "no temperatures: thermal growth was looked for by the order of the poses, and cannot be told from a drift");
-  if (none([](const Measurement& m) { return !m.context.direction.empty(); }))
-    limits.emplace_back(
-        "no approach directions: backlash was looked for as if each joint came from where it was at the row before, "
-        "and cannot be named for certain");
+  const auto recorded_of = [&](bool (*has)(const Measurement&), std::string_view what, std::string_view of_none,
+                               std::string_view of_some) {
+    const auto count = std::count_if(recorded.measurements.begin(), recorded.measurements.end(), has);
+    const auto all = static_cast<std::ptrdiff_t>(recorded.measurements.size());
+    if (count == 0) limits.push_back(fmt::format("no {}: {}", what, of_none));
+    if (count > 0 && count < all)
+      limits.push_back(fmt::format("{} of {} of {} poses only: {}", what, count, all, of_some));
+  };
+  recorded_of([](const Measurement& m) { return m.R_WT.has_value(); }, "orientations",
+              "several geometry parameters and all of the tool's rotation stay unseen",
+              "the others count with their positions");
+  recorded_of([](const Measurement& m) { return m.context.time.has_value(); }, "times",
+              "a drift, and what warms up, can only be told by the order of the poses", "no drift was looked for");
+  recorded_of([](const Measurement& m) { return m.context.temperature.has_value(); }, "temperatures",
+              "thermal growth was looked for by the order of the poses, and cannot be told from a drift",
+              "thermal growth was not looked for");
+  recorded_of([](const Measurement& m) { return !m.context.direction.empty(); }, "approach directions",
+              "backlash was looked for as if each joint came from where it was at the row before, and cannot be named "
+              "for certain",
+              "backlash was not looked for");
   if (prepared.repeats.degrees_of_freedom == 0)
     limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
   if (prepared.sorted)

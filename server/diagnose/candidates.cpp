@@ -18,6 +18,10 @@ bool any(const MeasurementBatch& batch, const std::function<bool(const PoseConte
                      [&](const Measurement& m) { return has(m.context); });
 }
 
+bool every(const MeasurementBatch& batch, const std::function<bool(const PoseContext&)>& has) {
+  return !any(batch, [&](const PoseContext& context) { return !has(context); });
+}
+
 bool approached(const MeasurementBatch& batch, int joint, int from) {
   return any(batch, [&](const PoseContext& c) {
     return !c.direction.empty() && c.direction[static_cast<std::size_t>(joint)] == from;
@@ -54,6 +58,8 @@ class Possible {
     if (unseen_ != nullptr) unseen_->push_back({cause, 0, {}, {}, needs});
   }
   void backlash(int joint) {
+    if (!every(batch_, [](const PoseContext& c) { return !c.direction.empty(); }))
+      return leave({"backlash", joint, "", "", {}}, "the approach direction of every pose (dir columns)");
     const bool up = approached(batch_, joint, 1);
     const bool down = approached(batch_, joint, -1);
     if (up && down) return take(fmt::format("backlash:{}", joint + 1));
@@ -70,7 +76,7 @@ class Possible {
     for (int joint = 0; joint < cell_.robot.size(); ++joint) take(fmt::format("link_bending:{}", joint + 1));
   }
   void times() {
-    if (any(batch_, [](const PoseContext& c) { return c.time.has_value(); })) {
+    if (every(batch_, [](const PoseContext& c) { return c.time.has_value(); })) {
       take("tracker_drift");
     } else {
       leave({"tracker_drift", -1, "", "", {}}, "the time of every pose (time_s)");
@@ -80,10 +86,12 @@ class Possible {
     } else {
       leave({"time_lag", -1, "", "", {}}, "a continuous path with times (time_s)");
     }
-    if (warming(batch_) > kLeastWarming) {
+    if (every(batch_, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
+        warming(batch_) > kLeastWarming) {
       take("thermal_growth");
     } else {
-      leave({"thermal_growth", -1, "", "", {}}, "temperatures (temperature_c) that differ between poses");
+      leave({"thermal_growth", -1, "", "", {}},
+            "the temperature of every pose (temperature_c), differing between poses");
     }
   }
 

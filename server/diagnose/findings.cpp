@@ -18,7 +18,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInterval95 = 1.959963984540;
-constexpr double kDwarfed = 0.25;  // of the size of what is unknown
+constexpr double kDwarfed = 0.25;   // of the size of what is unknown
+constexpr double kOthersSpeak = 5;  // nat
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -104,6 +105,21 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   return estimates;
 }
 
+/// Whether other numbers of its source than the one that a cause is named by are there as well. That one is estimated
+/// with the others at zero, which then would be wrong.
+bool others_speak(const LinearProblem& problem, const Accepted& one, const Estimated& estimated) {
+  if (one.cause.parameter.empty()) return false;
+  const OwnEstimate own = own_estimate(problem, one.in_model, estimated.change, estimated.covariance);
+  const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
+  const auto& priors = problem.nuisance_parameters();
+  for (Index i = 0; i < own.size.size(); ++i) {
+    if (priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])].name != one.cause.parameter) continue;
+    const double alone = std::pow(own.precision.row(i).dot(own.size), 2) / own.precision(i, i);
+    return log_evidence(own.strength() - alone, static_cast<double>(own.size.size() - 1)) > kOthersSpeak;
+  }
+  return false;
+}
+
 std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   std::vector<Index> kept;
   for (Index k = 0; k < count; ++k) {
@@ -167,8 +183,9 @@ std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem&
     }
     Finding finding;
     finding.cause = one.cause;
+    if (others_speak(problem, one, estimated)) finding.cause.parameter.clear();
     finding.source = one.source;
-    finding.parameters = parameters_of(problem, one.in_model, one.cause, estimated);
+    finding.parameters = parameters_of(problem, one.in_model, finding.cause, estimated);
     if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
     const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
     const VectorXd effect = effect_of_source(problem, one.in_model);
@@ -195,6 +212,26 @@ void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings
     if (finding.source.empty() || finding.effect_rms > kDwarfed * unexplained.rms) continue;
     finding.could_also_be.push_back({"unknown", -1, "", "", {}});
     finding.action = "find first what is unknown here: it is several times larger";
+  }
+}
+
+void doubt_single_orders(std::vector<Finding>& findings) {
+  constexpr int kFewOrders = 2;
+  const auto at_joint = [&](const char* cause, int joint) {
+    return std::count_if(findings.begin(), findings.end(), [&](const Finding& other) {
+      return other.cause.cause == cause && other.cause.joint == joint;
+    });
+  };
+  for (Finding& finding : findings) {
+    const int joint = finding.cause.joint;
+    if (finding.cause.cause != "gear_transmission") continue;
+    if (at_joint("joint_map", joint) == 0 && at_joint("gear_transmission", joint) <= kFewOrders) continue;
+    const Cause map{"joint_map", joint, "", "", {}};
+    if (std::find(finding.could_also_be.begin(), finding.could_also_be.end(), map) != finding.could_also_be.end())
+      continue;
+    finding.could_also_be.push_back(map);
+    finding.action =
+        fmt::format("measure more poses over the range of joint {}: its error has no single order", joint + 1);
   }
 }
 

@@ -11,6 +11,10 @@ namespace trammel {
 /// Beside something unknown that is several times larger a small effect may well be part of it: its name is not sure.
 void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings);
 
+/// A gear beside a map of its joint, or one of three or more of a joint, may be more of that map: an error with no
+/// single order has as many sines as the poses show.
+void doubt_single_orders(std::vector<Finding>& findings);
+
 /// Errors of poses held out (blocks of a cross-validation), before and after.
 struct HeldOut {
   ErrorFigures before, after;

@@ -19,7 +19,8 @@ constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0
 constexpr double kRelated = 0.4;        // the same of 0.63
 constexpr double kTouches = 0.1;        // less is a coincidence
 constexpr double kAsGood = 6;           // of strength
-constexpr double kBeyondDoubt = 8;      // nat: even the same effect, from so many more numbers, is no accident
+constexpr double kBeyondDoubt = 8;      // nat: nearly the same effect, from so many more numbers, is no accident
+constexpr double kAllOfIt = 0.995;      // the same of 0.9975: no strength of the effect tells them apart
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kPathStep = 0.2;       // rad
 constexpr double kAtOnce = 0.05;        // of the poses
@@ -81,7 +82,7 @@ bool is_path(const MeasurementBatch& batch) {
 
 std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch) {
   const auto recorded = [&](auto has) {
-    return std::any_of(batch.measurements.begin(), batch.measurements.end(),
+    return std::all_of(batch.measurements.begin(), batch.measurements.end(),
                        [&](const Measurement& m) { return has(m.context); });
   };
   const bool in_time =
@@ -94,7 +95,8 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
     rivals.push_back({"thermal_growth", -1, "", "", {}});
   // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
   if (cause.cause != "outlier" && is_path(batch) &&
-      !recorded([](const PoseContext& c) { return c.velocity.has_value(); }))
+      std::none_of(batch.measurements.begin(), batch.measurements.end(),
+                   [](const Measurement& m) { return m.context.velocity.has_value(); }))
     rivals.push_back({"time_lag", -1, "", "", {}});
   return rivals;
 }
@@ -134,7 +136,9 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
     const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);
-    const bool as_good = same_effect && lacks < std::max(kAsGood, kShapeError * best.strength) && gap < kBeyondDoubt;
+    const bool can_do_it_all = of_effect.strength > kAllOfIt * whole;
+    const bool as_good =
+        same_effect && lacks < std::max(kAsGood, kShapeError * best.strength) && (can_do_it_all || gap < kBeyondDoubt);
     // Another cause may be there as well: only what makes much of this effect is a rival for it.
     const bool related = of_effect.strength > kRelated * whole;
     const bool wins =

@@ -159,6 +159,14 @@ class Search {
       result_.reformed_from.clear();
       refine(result_.after, result_.batch, result_.unnamed);
     }
+    // Of the pose itself nothing was learned, and by now all else is known.
+    for (Accepted& one : result_.accepted) {
+      const auto& poses = result_.all.measurements;
+      const auto pose =
+          std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
+      if (one.source.empty() && pose != poses.end())
+        one.pose.distance = (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
+    }
     result_.chance = std::move(chance_);
     return std::move(result_);
   }

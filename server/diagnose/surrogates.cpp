@@ -87,6 +87,8 @@ void doubt_what_was_not_recorded(const Surrogates& surrogates, const Measurement
           "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
       continue;
     }
+    // Hours and kelvins are made up here, and so are the numbers per hour and per kelvin.
+    finding.parameters.clear();
     if (finding.cause.cause == "thermal_growth") add(finding.could_also_be, {"tracker_drift", -1, "", "", {}});
     if (finding.could_also_be.empty()) add(finding.could_also_be, {"unknown", -1, "", "", {}});
     finding.action = fmt::format(

@@ -61,10 +61,13 @@ std::vector<std::string> lasting_sources(const std::vector<std::string>& sources
 
 std::vector<std::string> added_sources(const Cell& cell, const Diagnosis& diagnosis) {
   std::vector<std::string> added;
-  std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
-               [&](const std::string& source) {
-                 return !contains(diagnosis.sources_before, source) && !contains(cell.model.error_sources, source);
-               });
+  std::copy_if(
+      diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
+      [&](const std::string& source) {
+        // Another form of the compliance that the cell has already: training chooses it again.
+        const bool form = source.starts_with("compliance_") && contains(cell.model.error_sources, "compliance");
+        return !form && !contains(diagnosis.sources_before, source) && !contains(cell.model.error_sources, source);
+      });
   return added;
 }
 

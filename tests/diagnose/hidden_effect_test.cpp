@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -115,6 +116,19 @@ INSTANTIATE_TEST_SUITE_P(Undecidables, HiddenUndecidable,
                                          "joint1_or_tracker", "joint6_or_tool", "constant_warmth"),
                          test_name);
 
+class HiddenTwin : public testing::TestWithParam<const char*> {};
+
+TEST_P(HiddenTwin, IsNotNamedAloneHoweverStrongItIs) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Answer answer = answer_to({.kind = GetParam(), .seed = seed, .lambda = 600, .poses = 120});
+    EXPECT_TRUE(answer.judgement.set_holds_truth) << answer.shown;
+    EXPECT_FALSE(answer.judgement.over_confident) << answer.shown;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Twins, HiddenTwin, testing::Values("tool_or_link", "joint1_or_tracker", "joint6_or_tool"),
+                         test_name);
+
 TEST(HiddenEffectInterval, IsOf1_96StandardDeviations) {
   const hidden::HiddenCase hidden = hidden::hide({.kind = "replica_p28", .seed = 1});
   const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
@@ -208,6 +222,68 @@ TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
   doubt_beside({true, {"q2"}, 33e-6, 1e-6}, findings);
   EXPECT_EQ(findings[0].could_also_be, (std::vector<Cause>{{"unknown", -1, "", "", {}}}));
   EXPECT_TRUE(findings[1].could_also_be.empty());
+}
+
+Finding found(const char* cause, int joint) {
+  Finding finding;
+  finding.cause = {cause, joint, "", "", {}};
+  return finding;
+}
+
+TEST(Doubt, AGearBesideAMapOfItsJointOrAmongThreeMayBeMoreOfThatMap) {
+  std::vector<Finding> findings = {found("joint_map", 0), found("gear_transmission", 0), found("gear_transmission", 1),
+                                   found("gear_transmission", 1)};
+  doubt_single_orders(findings);
+  EXPECT_TRUE(findings[0].could_also_be.empty());
+  EXPECT_EQ(findings[1].could_also_be, (std::vector<Cause>{{"joint_map", 0, "", "", {}}}));
+  EXPECT_TRUE(findings[2].could_also_be.empty()) << "an order and its double are one gear's";
+  findings.push_back(found("gear_transmission", 1));
+  doubt_single_orders(findings);
+  EXPECT_EQ(findings[4].could_also_be, (std::vector<Cause>{{"joint_map", 1, "", "", {}}}));
+  EXPECT_EQ(findings[1].could_also_be.size(), 1U);
+}
+
+/// The shipped robot in a cell that knows only of its base, these numbers of its geometry wrong.
+MeasurementBatch with_wrong_geometry(const std::shared_ptr<const Cell>& cell,
+                                     const std::map<std::string, double>& wrong, int poses) {
+  VirtualRobot robot = test::chapter_5_robot(cell);
+  robot.truth = test::demand(make_physical_model(cell, {"base", "geometry"}));
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    const auto value = wrong.find(parameters[k].name);
+    if (value != wrong.end()) robot.truth.values(static_cast<Eigen::Index>(k)) = value->second;
+  }
+  return test::measured(robot, poses, 7);
+}
+
+TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) {
+  Cell lacking = *test::cell_7();
+  lacking.model.error_sources = {"base"};
+  const auto cell = std::make_shared<const Cell>(lacking);
+  const double q2 = -5e-4;
+  const Diagnosis several = test::demand(
+      diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}, {"d4", -3e-5}, {"a2", 4e-5}, {"q3", 4e-5}}, 120), quick()));
+  ASSERT_EQ(several.findings.size(), 1U) << several.sentence;
+  EXPECT_EQ(several.findings[0].cause.parameter, "") << "not it alone";
+  const auto& numbers = several.findings[0].parameters;
+  const auto of_q2 = std::find_if(numbers.begin(), numbers.end(), [](const Estimate& e) { return e.name == "q2"; });
+  ASSERT_NE(of_q2, numbers.end());
+  EXPECT_NEAR(of_q2->value, q2, 2 * of_q2->u95);
+  const Diagnosis alone = test::demand(diagnose(cell, with_wrong_geometry(cell, {{"q2", q2}}, 120), quick()));
+  ASSERT_EQ(alone.findings.size(), 1U) << alone.sentence;
+  EXPECT_EQ(alone.findings[0].cause.parameter, "q2");
+}
+
+TEST(Doubt, WhatOnlySomePosesRecordIsNotLookedForAndSaid) {
+  hidden::HiddenCase hidden = hidden::hide({.kind = "thermal_growth", .seed = 2, .lambda = 300, .poses = 120});
+  MeasurementBatch batch = test::demand(parse_batch_csv(hidden.batch_csv, "batch"));
+  for (std::size_t i = 0; i < batch.measurements.size(); i += 2) batch.measurements[i].context.temperature.reset();
+  hidden.batch_csv = to_csv(batch);
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  const auto says = [](const std::string& limit) { return limit.find("temperatures of 60 of 120 poses") == 0; };
+  EXPECT_TRUE(std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), says)) << test::told(diagnosis);
+  for (const Finding& finding : diagnosis.findings)
+    EXPECT_FALSE(finding.could_also_be.empty()) << test::told(diagnosis);
 }
 
 TEST(MapsOfJoints, AreOneFindingAJointAlsoWhereFineDetailShowsOnlyBesideAllElse) {

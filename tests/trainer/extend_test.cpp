@@ -63,6 +63,17 @@ TEST_F(Extend, LeavesOutWhatThePosesHeldOutDoNotSpeakForHoweverGoodTheRestIs) {
   EXPECT_EQ(extension.after.provenance().level, "base,gear_transmission:3@2");
 }
 
+TEST_F(Extend, DoesNotAddAnotherFormOfTheComplianceThatTheCellHasAlready) {
+  Cell carrying = *cell_;
+  carrying.model.error_sources = {"base", "compliance"};
+  diagnosis_.sources_before = {"base", "compliance_linear"};
+  diagnosis_.sources_after = {"base", "compliance_first_order", kGear};
+  EXPECT_EQ(added_sources(carrying, diagnosis_), (std::vector<std::string>{kGear}));
+  carrying.model.error_sources = {"base"};
+  diagnosis_.sources_before = {"base"};
+  EXPECT_EQ(added_sources(carrying, diagnosis_), (std::vector<std::string>{"compliance_first_order", kGear}));
+}
+
 TEST_F(Extend, KeepsEveryCauseThatLowersTheErrorByItself) {
   VirtualRobot robot{
       test::demand(make_physical_model(cell_, {"base", kGear, "encoder_eccentricity:2"})), 20e-6, 60e-6, {}};
