@@ -126,13 +126,16 @@ std::string suspects_text(const ordered_json& suspects) {
   return text;
 }
 
-/// Causes that needed something else to show: a line for all joints of which the same is to be said.
+/// Causes that needed something else to show, or to be named: a line for all joints of which the same is to be said.
 std::string unseen_lines(const ordered_json& unseen) {
   std::vector<std::pair<std::string, std::string>> lines;  // cause and what it needs, joints
   for (const ordered_json& one : unseen) {
     if (!one.at("smallest_mm").is_null() || one.at("needs").get<std::string>().empty()) continue;
+    const bool by_order = one.value("looked_for_by_order", false);
     const std::string what =
-        fmt::format("{}: needs {}", one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
+        fmt::format("would not have {}: {}: needs {}",
+                    by_order ? "been named for certain (looked for by the order of the poses)" : "shown",
+                    one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
     const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
     const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == what; });
     if (known == lines.end()) {
@@ -143,7 +146,7 @@ std::string unseen_lines(const ordered_json& unseen) {
   }
   std::string text;
   for (const auto& [what, joints] : lines) {
-    text += fmt::format("  would not have shown: {}{}\n", what, joints.empty() ? "" : " (joints" + joints + ")");
+    text += fmt::format("  {}{}\n", what, joints.empty() ? "" : " (joints" + joints + ")");
   }
   return text;
 }
@@ -209,9 +212,11 @@ std::string extended_line(const char* name, const CompensatedModel& model) {
 }  // namespace
 
 std::string diagnosis_text(const ordered_json& diagnosis) {
-  return fmt::format("{}: {}\n{} poses, one measurement {} per axis ({})\n", diagnosis.at("verdict").get<std::string>(),
+  const double noise = diagnosis.at("noise_mm");
+  return fmt::format("{}: {}\n{} poses, {} {} per axis ({})\n", diagnosis.at("verdict").get<std::string>(),
                      diagnosis.at("sentence").get<std::string>(), diagnosis.at("poses").get<int>(),
-                     micrometres(diagnosis.at("noise_mm")), diagnosis.at("noise_from").get<std::string>()) +
+                     noise_name(noise, diagnosis.value("instrument_mm", noise)), micrometres(noise),
+                     diagnosis.at("noise_from").get<std::string>()) +
          findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
          unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
          limits_text(diagnosis) + next_poses_text(diagnosis);

@@ -3,13 +3,14 @@
 #include <algorithm>
 
 #include "server/base/units.h"
+#include "server/diagnose/surrogates.h"
 #include "server/plan/separation.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kMuchMore = 1.5;
+constexpr double kMuchMore = 1.5;  // than what is stated for the measurement: what the model lacks is in it
 
 struct Words {
   const char* cause;
@@ -63,6 +64,14 @@ std::string listed(const std::vector<std::string>& words) {
   return all;
 }
 
+/// Clauses that have commas of their own.
+std::string listed_clauses(const std::vector<std::string>& clauses) {
+  std::string all;
+  for (std::size_t k = 0; k < clauses.size(); ++k)
+    all += (k == 0 ? "" : k + 1 == clauses.size() ? "; and " : "; ") + clauses[k];
+  return all;
+}
+
 std::string said(const Finding& finding) {
   if (finding.cause.cause == "outlier")
     return fmt::format("pose {} ({:.2f} mm)", finding.cause.pose_id, to_mm(finding.effect_rms));
@@ -94,6 +103,14 @@ std::string what_it_needs(const Cause& cause) {
   return words == nullptr ? "other poses" : words->needs;
 }
 
+bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
+  return !unseen.detectable && is_by_surrogate(put_in_surrogates(recorded), unseen.cause);
+}
+
+std::string noise_name(double noise, double instrument) {
+  return noise > kMuchMore * instrument ? "what stays unexplained of a pose" : "noise of one measurement";
+}
+
 std::string why_no_next_poses(const std::vector<Finding>& findings) {
   const auto doubt = std::find_if(findings.begin(), findings.end(),
                                   [](const Finding& finding) { return !finding.could_also_be.empty(); });
@@ -108,16 +125,16 @@ std::string sentence_for(const Diagnosis& d) {
     (finding.cause.cause == "outlier" ? bad : finding.could_also_be.empty() ? sure : doubtful).push_back(said(finding));
   }
   std::string text;
-  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : " ") + sentence; };
-  if (!sure.empty()) add("The simulation lacks " + listed(sure) + ".");
-  if (!doubtful.empty()) add("Something is lacking that I cannot tell: it may be " + listed(doubtful) + ".");
-  if (!bad.empty()) {
-    add(fmt::format("{} {} not fit the others; from single poses no cause can be told: repeat {} and {} neighbours.",
-                    listed(bad), bad.size() > 1 ? "do" : "does", bad.size() > 1 ? "them" : "it",
-                    bad.size() > 1 ? "their" : "its"));
-  }
+  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : " ") + as_sentence(sentence); };
+  if (!sure.empty()) add("The simulation lacks " + listed(sure));
+  if (doubtful.size() == 1) add("Something is lacking that I cannot tell: it may be " + doubtful.front());
+  if (doubtful.size() > 1) add("Some things are lacking that I cannot tell: they may be " + listed_clauses(doubtful));
+  if (bad.size() == 1)
+    add(bad.front() + " is an outlier: single pose, cause not separable; repeat it and its neighbours");
+  if (bad.size() > 1)
+    add(listed(bad) + " are outliers: single poses, cause not separable; repeat them and their neighbours");
   if (d.unexplained.present) {
-    add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it.",
+    add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it",
                     text.empty() ? "" : " else", listed(d.unexplained.depends_on), 1e6 * d.unexplained.rms));
   }
   std::vector<std::string> held_out;
@@ -125,19 +142,26 @@ std::string sentence_for(const Diagnosis& d) {
     if (pose.held_out) held_out.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
   }
   if (!held_out.empty()) {
-    add(fmt::format("Of the poses held out, {} {} neither model.", listed(held_out),
+    add(fmt::format("Of the poses held out, {} {} neither model", listed(held_out),
                     held_out.size() > 1 ? "fit" : "fits"));
   }
   if (sure.empty() && doubtful.empty() && !d.unexplained.present) {
-    add(fmt::format("Nothing {}found in {} poses: {:.0f} um rms are left.", bad.empty() ? "" : "else ", d.poses,
+    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", bad.empty() ? "was" : "else was", d.poses,
                     1e6 * d.after.rms));
   }
   if (d.noise > kMuchMore * d.instrument) {
-    add(
-        fmt::format("The noise, {:.0f} um an axis, is {:.1f} times what is stated for the measurement ({:.0f} um), and "
-                    "depends on nothing I know.",
-                    1e6 * d.noise, d.noise / d.instrument, 1e6 * d.instrument));
+    add(fmt::format(
+        "{}, {:.0f} um an axis, is {:.1f} times what is stated for the measurement ({:.0f} um), and depends "
+        "on nothing I know",
+        noise_name(d.noise, d.instrument), 1e6 * d.noise, d.noise / d.instrument, 1e6 * d.instrument));
   }
+  return text;
+}
+
+std::string as_sentence(std::string text) {
+  if (text.empty()) return text;
+  if (text.front() >= 'a' && text.front() <= 'z') text.front() = static_cast<char>(text.front() - 'a' + 'A');
+  if (text.back() != '.') text += '.';
   return text;
 }
 

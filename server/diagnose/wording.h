@@ -10,10 +10,17 @@ namespace trammel {
 [[nodiscard]] std::string action_for(const Cause& cause, const std::vector<Cause>& others);
 /// What a batch would need to show a cause that this one cannot show.
 [[nodiscard]] std::string what_it_needs(const Cause& cause);
+/// Whether a cause that could not have been seen was looked for all the same, by the order of the poses: it would have
+/// been found, but never named for certain. `recorded`: the batch without surrogates.
+[[nodiscard]] bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded);
+/// What `noise` is of, m per axis: one measurement, or more than what is stated for the `instrument`.
+[[nodiscard]] std::string noise_name(double noise, double instrument);
 /// Why no poses are suggested to measure next, after no others than `findings`.
 [[nodiscard]] std::string why_no_next_poses(const std::vector<Finding>& findings);
 /// The verdict for people.
 [[nodiscard]] std::string sentence_for(const Diagnosis& diagnosis);
+/// Begins with a capital and ends with a full stop.
+[[nodiscard]] std::string as_sentence(std::string text);
 /// What is confounded, of which a standard deviation is known in shares of the effect found: `6 % of the effect`.
 [[nodiscard]] std::string uncertain_by(double share_of_effect);
 

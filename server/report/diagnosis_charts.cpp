@@ -80,8 +80,21 @@ ordered_json waterfall(const Diagnosis& diagnosis) {
   return {{"names", names}, {"rms_um", rms}};
 }
 
+/// What was found of a joint that shows in its periodogram. A line that stands out may be another joint's.
+std::string found_in(const Periodogram& lines, const std::vector<Finding>& findings) {
+  std::vector<std::string> found;
+  for (const Finding& finding : findings) {
+    if (finding.cause.joint != lines.joint) continue;
+    if (finding.cause.cause == "gear_transmission" && finding.cause.order)
+      found.push_back(fmt::format("{:.2f} a turn", *finding.cause.order));
+    if (finding.cause.cause == "encoder_eccentricity") found.emplace_back("1 a turn");
+    if (finding.cause.cause == "joint_map") found.emplace_back("joint map");
+  }
+  return found.empty() ? "no oscillation found" : fmt::format("{}", fmt::join(found, ", "));
+}
+
 /// Thinned so that every peak stays: of each stretch its highest point.
-ordered_json periodogram(const Periodogram& all) {
+ordered_json periodogram(const Periodogram& all, const std::vector<Finding>& findings) {
   ordered_json order = ordered_json::array(), strength = ordered_json::array();
   const Eigen::Index n = all.order.size();
   const Eigen::Index stretch = std::max<Eigen::Index>(1, (n + kMostPoints - 1) / kMostPoints);
@@ -91,7 +104,11 @@ ordered_json periodogram(const Periodogram& all) {
     order.push_back(rounded(all.order(from + highest), 1e-3));
     strength.push_back(rounded(peak, 1e-2));
   }
-  return {{"joint", all.joint + 1}, {"order", order}, {"strength", strength}, {"limit", all.limit}};
+  return {{"joint", all.joint + 1},
+          {"title", fmt::format("joint {}: {}", all.joint + 1, found_in(all, findings))},
+          {"order", order},
+          {"strength", strength},
+          {"limit", all.limit}};
 }
 
 /// Residual along the joint's motion against the phase of the gear's error.
@@ -238,7 +255,8 @@ ordered_json diagnosis_charts(const Diagnosis& diagnosis, const Cell& cell) {
     if (!chart.is_null() && !chart.empty()) charts[name] = std::move(chart);
   };
   if (!diagnosis.waterfall.empty()) put("waterfall", waterfall(diagnosis));
-  put("periodograms", each(diagnosis.periodograms, periodogram));
+  put("periodograms",
+      each(diagnosis.periodograms, [&](const Periodogram& one) { return periodogram(one, diagnosis.findings); }));
   put("recovery", each(diagnosis.recovery, recovery));
   if (arm.poses() == 0) return charts;
   put("folds", folds(diagnosis, arm));

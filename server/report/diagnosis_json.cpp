@@ -1,6 +1,7 @@
 #include "server/report/diagnosis_json.h"
 
 #include "server/base/units.h"
+#include "server/diagnose/wording.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/figures_json.h"
 
@@ -87,14 +88,15 @@ ordered_json not_separable_json(const std::vector<Inseparable>& groups) {
   return list;
 }
 
-ordered_json unseen_json(const std::vector<Unseen>& unseen) {
+ordered_json unseen_json(const Diagnosis& diagnosis) {
   ordered_json list = ordered_json::array();
-  for (const Unseen& one : unseen) {
+  for (const Unseen& one : diagnosis.could_not_have_seen) {
     ordered_json json = cause_json(one.cause);
     json["needs"] = one.needs;
     json["smallest_mm"] = length_json(one.detectable);
     json["smallest_named_mm"] = length_json(one.identifiable);
     json["share_of_its_own"] = one.outside;
+    json["looked_for_by_order"] = is_looked_for_by_order(one, diagnosis.batch);
     list.push_back(json);
   }
   return list;
@@ -166,6 +168,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
           {"poses", diagnosis.poses},
           {"noise_mm", to_mm(diagnosis.noise)},
           {"noise_from", diagnosis.noise_from},
+          {"instrument_mm", to_mm(diagnosis.instrument)},
           {"before", figures_json(diagnosis.before)},
           {"after", figures_json(diagnosis.after)},
           {"held_out",
@@ -177,7 +180,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
           {"findings", findings_json(diagnosis)},
           {"unexplained", unexplained_json(diagnosis.unexplained)},
           {"not_separable", not_separable_json(diagnosis.not_separable)},
-          {"could_not_have_seen", unseen_json(diagnosis.could_not_have_seen)},
+          {"could_not_have_seen", unseen_json(diagnosis)},
           {"suspect_poses", suspects_json(diagnosis.suspects)},
           {"next_poses", next_poses_json(diagnosis)},
           {"next_poses_for", next_poses_worth_json(diagnosis)},

@@ -14,6 +14,7 @@ namespace trammel {
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
+constexpr double kDepends = 0.01;  // a p-value below it
 
 std::string micrometres(double m) { return fmt::format("{:.3g}\u00a0µm", m * 1e6); }
 std::string millimetres(double m) { return fmt::format("{:.4f}", to_mm(m)); }
@@ -48,14 +49,6 @@ std::string causes_in_words(const std::vector<Cause>& causes) {
             (cause.joint >= 0 ? fmt::format(" (joint {})", cause.joint + 1) : "");
   }
   return list;
-}
-
-/// As a sentence begins and ends.
-std::string sentence_of(std::string text) {
-  if (text.empty()) return text;
-  if (text.front() >= 'a' && text.front() <= 'z') text.front() = static_cast<char>(text.front() - 'a' + 'A');
-  if (text.back() != '.') text += '.';
-  return text;
 }
 
 std::string unit_shown(const std::string& unit) {
@@ -102,7 +95,7 @@ std::string finding_rows(const Finding& finding) {
          fmt::format(
              "<tr class=\"action\"><td></td><td></td><td colspan=\"6\">{} Named by {:.0f}\u00a0% of the "
              "repetitions.</td></tr>\n",
-             html_text(sentence_of(finding.action) + beginning_of(finding)), 100 * finding.naming_frequency);
+             html_text(as_sentence(finding.action) + beginning_of(finding)), 100 * finding.naming_frequency);
 }
 
 std::string findings_text(const Diagnosis& diagnosis) {
@@ -126,7 +119,8 @@ std::string tiles(const Diagnosis& diagnosis) {
   const char* before_name = held_out ? "rms of poses held out, before" : "rms of all poses, before";
   return tile("before", fmt::format("{:.4f} mm", to_mm(before.rms)), before_name) +
          tile("after", fmt::format("{:.4f} mm", to_mm(after.rms)), "with what was found") +
-         tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)), "noise of one measurement");
+         tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)),
+              noise_name(diagnosis.noise, diagnosis.instrument).c_str());
 }
 
 std::string figures_row(const char* name, const ErrorFigures& figures) {
@@ -159,10 +153,12 @@ std::string leftover_text(const Diagnosis& diagnosis) {
   if (diagnosis.leftover.empty()) return "<p>What is left was not tested against anything.</p>\n";
   std::string rows;
   for (const Dependence& one : diagnosis.leftover) {
-    rows += html_row({html_text(one.on), one.of_size ? "its size" : "the residual", p_value_shown(one.p_value),
-                      one.p_value < 0.01 ? "depends" : ""});
+    const bool depends = one.p_value < kDepends;
+    const std::string row = html_row({depends ? "yes" : "no", one.of_size ? "its size" : "the residual",
+                                      html_text(one.on), p_value_shown(one.p_value)});
+    rows += fmt::format("<tr class=\"{}\">", depends ? "yes" : "no") + row.substr(4);
   }
-  return table("leftover", {"on", "of", "p (Holm)", ""}, rows);
+  return table("leftover", {"depends", "what of it", "on", "p (Holm)"}, rows);
 }
 
 std::string not_separable_text(const Diagnosis& diagnosis) {
@@ -195,7 +191,7 @@ std::string next_poses_table(const std::vector<JointVector>& poses, const Cell& 
 
 std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   const NextPoses& next = diagnosis.next_poses;
-  if (next.q.empty()) return paragraph(sentence_of("None suggested: " + next.none_because));
+  if (next.q.empty()) return paragraph(as_sentence("None suggested: " + next.none_because));
   return fmt::format(
              "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with these "
              "poses</b>, by {} with as many random ones.</p>\n",
@@ -207,15 +203,14 @@ std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
 std::string limits_list(const std::vector<std::string>& limits) {
   if (limits.empty()) return "";
   std::string html = "<ul>\n";
-  for (const std::string& limit : limits) html += "<li>" + html_text(sentence_of(limit)) + "</li>\n";
+  for (const std::string& limit : limits) html += "<li>" + html_text(as_sentence(limit)) + "</li>\n";
   return html + "</ul>\n";
 }
 
-/// Causes that would not have shown at all: a row for all the joints of which the same is to be said.
-std::string never_seen_table(const std::vector<Unseen>& unseen) {
+/// Causes and what they need: a row for all the joints of which the same is to be said.
+std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) {
   std::vector<std::pair<const Unseen*, std::string>> lines;
   for (const Unseen& one : unseen) {
-    if (one.detectable) continue;
     const auto same = std::find_if(lines.begin(), lines.end(), [&](const auto& line) {
       return line.first->cause.cause == one.cause.cause && line.first->needs == one.needs;
     });
@@ -229,7 +224,18 @@ std::string never_seen_table(const std::vector<Unseen>& unseen) {
   for (const auto& [one, joints] : lines) {
     rows += html_row({html_text(cause_in_words(one->cause)), html_text(joints), html_text(one->needs)});
   }
-  return rows.empty() ? "" : "<h3>Would not have shown</h3>\n" + table("never", {"cause", "joint", "it needs"}, rows);
+  if (rows.empty()) return "";
+  return fmt::format("<h3>{}</h3>\n", heading) + table("never", {"cause", "joint", "it needs"}, rows);
+}
+
+std::string never_tables(const Diagnosis& diagnosis) {
+  std::vector<Unseen> never, never_for_certain;
+  for (const Unseen& one : diagnosis.could_not_have_seen) {
+    if (one.detectable) continue;
+    (is_looked_for_by_order(one, diagnosis.batch) ? never_for_certain : never).push_back(one);
+  }
+  return needs_table("Would not have shown", never) +
+         needs_table("Would not have been named for certain: looked for by the order of the poses", never_for_certain);
 }
 
 std::string smallest_table(std::vector<Unseen> unseen) {
@@ -250,8 +256,8 @@ std::string smallest_table(std::vector<Unseen> unseen) {
 }
 
 std::string unseen_text(const Diagnosis& diagnosis) {
-  const std::string html = limits_list(diagnosis.limits) + never_seen_table(diagnosis.could_not_have_seen) +
-                           smallest_table(diagnosis.could_not_have_seen);
+  const std::string html =
+      limits_list(diagnosis.limits) + never_tables(diagnosis) + smallest_table(diagnosis.could_not_have_seen);
   return html.empty() ? "<p>Every cause that was looked for would have shown.</p>\n" : html;
 }
 
@@ -272,7 +278,7 @@ std::string provenance_table(const Diagnosis& diagnosis, const Cell& cell) {
   return line("cell", cell.name) + line("robot", cell.robot.name()) + line("cell hash (SHA-256)", diagnosis.cell_hash) +
          line("batch", diagnosis.batch.id) + line("batch hash (SHA-256)", diagnosis.batch_hash) +
          line("poses", fmt::format("{} used, {} listed above", diagnosis.poses, diagnosis.suspects.size())) +
-         line("noise of one measurement, per axis",
+         line(noise_name(diagnosis.noise, diagnosis.instrument) + ", per axis",
               fmt::format("{} ({})", micrometres(diagnosis.noise), diagnosis.noise_from)) +
          line("error sources before", fmt::format("{}", fmt::join(diagnosis.sources_before, ", "))) +
          line("error sources after", fmt::format("{}", fmt::join(diagnosis.sources_after, ", "))) +

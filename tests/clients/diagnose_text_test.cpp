@@ -34,6 +34,20 @@ TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
   }
 }
 
+TEST(DiagnoseText, SaysWhatWouldNotHaveBeenNamedForCertainAndWhatIsNoNoise) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  EXPECT_NE(diagnosis_text(diagnosis_json(diagnosis)).find("150 poses, noise of one measurement 13 um per axis"),
+            std::string::npos);
+  diagnosis.instrument = 2e-6;
+  for (Measurement& m : diagnosis.batch.measurements) m.context.direction.clear();
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  for (const char* part : {"150 poses, what stays unexplained of a pose 13 um per axis",
+                           "would not have been named for certain (looked for by the order of the poses): backlash: "
+                           "needs both approach directions (joints 2)"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  }
+}
+
 TEST(DiagnoseText, NextPosesAreAPlanThatTheOtherCommandsRead) {
   const Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   const JointList plan = test::demand(parse_joint_csv(next_poses_csv(diagnosis_json(diagnosis)), "next.csv"));

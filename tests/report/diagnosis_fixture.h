@@ -104,6 +104,7 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
   diagnosis.batch = made_up_batch(*cell);
   diagnosis.poses = static_cast<int>(diagnosis.batch.measurements.size());
   diagnosis.noise = 13e-6;
+  diagnosis.instrument = 10e-6;
   diagnosis.noise_from = "the tracker";
   add_residuals(diagnosis, *cell);
   diagnosis.findings = made_up_findings(diagnosis);

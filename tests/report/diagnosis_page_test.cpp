@@ -114,6 +114,38 @@ TEST_F(DiagnosisPage, ThinsAPeriodogramWithoutLosingItsPeak) {
               0.01);
 }
 
+TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
+  // Joint 3's oscillation leaks into what is seen of joint 2.
+  diagnosis_.periodograms[1].strength = diagnosis_.periodograms[2].strength;
+  diagnosis_.findings.emplace_back().cause = {"encoder_eccentricity", 4, "", "", {}};
+  const auto charts = diagnosis_charts(diagnosis_, *cell_);
+  const auto title = [&](std::size_t k) { return charts.at("periodograms").at(k).at("title").get<std::string>(); };
+  EXPECT_EQ(title(1), "joint 2: no oscillation found");
+  EXPECT_EQ(title(2), "joint 3: 48.50 a turn");
+  EXPECT_EQ(title(4), "joint 5: 1 a turn");
+}
+
+TEST_F(DiagnosisPage, AnswersOnWhatTheLeftoverDepends) {
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_TRUE(has(page, "Does what is left depend on"));
+  EXPECT_TRUE(has(page, "<tr class=\"yes\"><td>yes</td><td>the residual</td><td>q4</td>"));
+  EXPECT_TRUE(has(page, "<tr class=\"no\"><td>no</td><td>its size</td><td>torque</td>"));
+}
+
+TEST_F(DiagnosisPage, DoesNotCallUnseenWhatWasLookedForByTheOrderOfThePoses) {
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "Would not have shown"));
+  for (Measurement& m : diagnosis_.batch.measurements) m.context.direction.clear();
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_FALSE(has(page, "Would not have shown"));
+  EXPECT_TRUE(has(page, "Would not have been named for certain"));
+}
+
+TEST_F(DiagnosisPage, CallsNoNoiseWhatIsBeyondTheInstrument) {
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>noise of one measurement</span>"));
+  diagnosis_.instrument = 2e-6;
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>what stays unexplained of a pose</span>"));
+}
+
 TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {
   for (Measurement& m : diagnosis_.batch.measurements) {
     m.context.time.reset();

@@ -1,0 +1,79 @@
+#include "server/diagnose/wording.h"
+
+#include <gtest/gtest.h>
+
+namespace trammel {
+namespace {
+
+Finding found(const Cause& cause, std::vector<Cause> could_also_be = {}) {
+  Finding finding;
+  finding.cause = cause;
+  finding.effect_rms = 20e-6;
+  finding.could_also_be = std::move(could_also_be);
+  return finding;
+}
+
+const Cause kDrift = {"tracker_drift", -1, "", "", {}};
+const Cause kWarm = {"thermal_growth", -1, "", "", {}};
+const Cause kBacklash = {"backlash", 1, "", "", {}};
+const Cause kPose6 = {"outlier", -1, "", "6", {}};
+const Cause kPose9 = {"outlier", -1, "", "9", {}};
+
+Diagnosis with(std::vector<Finding> findings) {
+  Diagnosis diagnosis;
+  diagnosis.poses = 80;
+  diagnosis.after.rms = 12e-6;
+  diagnosis.findings = std::move(findings);
+  return diagnosis;
+}
+
+MeasurementBatch with_temperatures(bool have) {
+  MeasurementBatch batch;
+  for (int i = 0; i < 20; ++i) {
+    Measurement m;
+    m.context.q = JointVector::Constant(6, 0.1 * i);
+    m.context.time = 30.0 * i;
+    if (have) m.context.temperature = 21;
+    batch.measurements.push_back(m);
+  }
+  return batch;
+}
+
+TEST(Wording, KeepsDoubtfulFindingsApart) {
+  EXPECT_EQ(sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
+            "Some things are lacking that I cannot tell: they may be tracker_drift (20 um rms), which these poses "
+            "cannot tell from thermal_growth; and thermal_growth (20 um rms), which these poses cannot tell from "
+            "tracker_drift.");
+}
+
+TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
+  EXPECT_EQ(sentence_for(with({found(kPose6)})),
+            "Pose 6 (0.02 mm) is an outlier: single pose, cause not separable; repeat it and its neighbours. Nothing "
+            "else was found in 80 poses: 12 um rms are left.");
+  EXPECT_EQ(sentence_for(with({found(kPose6), found(kPose9), found(kBacklash)})),
+            "The simulation lacks backlash:2 (20 um rms). Pose 6 (0.02 mm) and pose 9 (0.02 mm) are outliers: single "
+            "poses, cause not separable; repeat them and their neighbours.");
+}
+
+TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
+  EXPECT_EQ(noise_name(13e-6, 9e-6), "noise of one measurement");
+  EXPECT_EQ(noise_name(70e-6, 9e-6), "what stays unexplained of a pose");
+  Diagnosis real = with({});
+  real.noise = 70e-6;
+  real.instrument = 9e-6;
+  EXPECT_EQ(
+      sentence_for(real),
+      "Nothing was found in 80 poses: 12 um rms are left. What stays unexplained of a pose, 70 um an axis, is 7.8 "
+      "times what is stated for the measurement (9 um), and depends on nothing I know.");
+}
+
+TEST(Wording, KnowsWhatWasLookedForByTheOrderOfThePoses) {
+  const Unseen growth = {kWarm, 0, {}, {}, "temperatures"};
+  EXPECT_TRUE(is_looked_for_by_order(growth, with_temperatures(false)));
+  EXPECT_FALSE(is_looked_for_by_order(growth, with_temperatures(true))) << "recorded, but constant: not looked for";
+  EXPECT_FALSE(is_looked_for_by_order({{"payload", -1, "", "", {}}, 0, {}, {}, "a payload"}, with_temperatures(false)));
+  EXPECT_FALSE(is_looked_for_by_order({kWarm, 0.5, 1e-5, {}, ""}, with_temperatures(false))) << "it could be seen";
+}
+
+}  // namespace
+}  // namespace trammel
