@@ -80,17 +80,19 @@ ordered_json waterfall(const Diagnosis& diagnosis) {
   return {{"names", names}, {"rms_um", rms}};
 }
 
-/// What was found of a joint that shows in its periodogram. A line that stands out may be another joint's.
+/// What was found of a joint and shows in its periodogram. A line that stands out may be another joint's.
 std::string found_in(const Periodogram& lines, const std::vector<Finding>& findings) {
-  std::vector<std::string> found;
+  std::vector<std::string> orders;
+  bool map = false;
   for (const Finding& finding : findings) {
-    if (finding.cause.joint != lines.joint) continue;
-    if (finding.cause.cause == "gear_transmission" && finding.cause.order)
-      found.push_back(fmt::format("{:.2f} a turn", *finding.cause.order));
-    if (finding.cause.cause == "encoder_eccentricity") found.emplace_back("1 a turn");
-    if (finding.cause.cause == "joint_map") found.emplace_back("joint map");
+    const Cause& cause = finding.cause;
+    if (cause.joint != lines.joint) continue;
+    if (cause.cause == "gear_transmission" && cause.order) orders.push_back(fmt::format("{:.2f}", *cause.order));
+    if (cause.cause == "encoder_eccentricity") orders.emplace_back("1");
+    map = map || cause.cause == "joint_map";
   }
-  return found.empty() ? "no oscillation found" : fmt::format("{}", fmt::join(found, ", "));
+  if (orders.empty()) return map ? "joint map" : "no oscillation found";
+  return fmt::format("{} a turn{}", fmt::join(orders, ", "), map ? ", joint map" : "");
 }
 
 /// Thinned so that every peak stays: of each stretch its highest point.
