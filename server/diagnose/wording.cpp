@@ -10,7 +10,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kMuchMore = 1.5;  // than what is stated for the measurement: what the model lacks is in it
+constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
+constexpr double kMuchMore = 1.5;         // than what is stated for the measurement: what the model lacks is in it
 
 struct Words {
   const char* cause;
@@ -123,6 +124,10 @@ std::string sentence_for(const Diagnosis& d) {
   std::vector<std::string> sure, doubtful, bad;
   for (const Finding& finding : d.findings) {
     (finding.cause.cause == "outlier" ? bad : finding.could_also_be.empty() ? sure : doubtful).push_back(said(finding));
+  }
+  if (const std::size_t all = doubtful.size(); all > kMostDoubtful) {
+    doubtful.resize(kMostDoubtful - 1);
+    doubtful.push_back(fmt::format("{} more, which the findings list", all - doubtful.size()));
   }
   std::string text;
   const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : " ") + as_sentence(sentence); };

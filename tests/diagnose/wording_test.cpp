@@ -46,6 +46,11 @@ TEST(Wording, KeepsDoubtfulFindingsApart) {
             "tracker_drift.");
 }
 
+TEST(Wording, LeavesManyDoubtfulFindingsToTheTable) {
+  const std::string sentence = sentence_for(with(std::vector<Finding>(6, found(kDrift, {kWarm}))));
+  EXPECT_NE(sentence.find("; and 3 more, which the findings list."), std::string::npos) << sentence;
+}
+
 TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
   EXPECT_EQ(sentence_for(with({found(kPose6)})),
             "Pose 6 (0.02 mm) is an outlier: single pose, cause not separable; repeat it and its neighbours. Nothing "
