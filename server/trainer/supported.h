@@ -13,7 +13,9 @@ namespace trammel {
 /// A source that poses held out do not speak for.
 struct Unsupported {
   std::string source;
-  double z = 0;  ///< of its paired gain, PairedGain: not above 0
+  /// sum(d) / sqrt(sum(d²)), d the difference of a pose's squared errors without and with it (Efron, Student's t-test
+  /// under symmetry conditions, JASA 64, 1969): not above 0.
+  double z = 0;
 };
 
 struct Supported {
