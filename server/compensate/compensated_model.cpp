@@ -164,7 +164,7 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
       for (const BiasFeatures& features : state.features) rotation.features.push_back(turned(features));
       Result<BiasModel> turning = BiasModel::restore(rotation);
       if (!turning) return tl::make_unexpected(turning.error());
-      if (!turning->needs_features()) inside->rotation_bias_size_B = column_rms(rotation.residual_B);
+      if (!inside->bias_has_parameters) inside->rotation_bias_size_B = column_rms(rotation.residual_B);
       inside->rotation_bias = std::move(*turning);
     }
   }

@@ -180,7 +180,7 @@ class CompensatedModel {
     std::optional<BiasModel> rotation_bias;
     bool bias_has_parameters = false;
     Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses; 0 with blocks
-    Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise
+    Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise; 0 with the block `parameters`
   };
   /// What the biases say at a pose.
   struct Learned {

@@ -114,7 +114,7 @@ struct Uncertainty {
   double metrology;    ///< variances of one axis: of the instrument,
   double unlearned;    ///< of what the physics leaves over where no bias is taken,
   double growth;       ///< and of what is missed the farther out
-  Vector3 bias_size;   ///< of a bias without blocks, rms over the training poses
+  Vector3 bias_size;   ///< rms over the training poses where no slope tells what is missed beyond
 };
 
 /// Covariance of one measurement. Noise is never less than the tracker's: a fit to few poses takes some of it for
@@ -175,6 +175,7 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
       covariance.diagonal().array() += (1 - weight) * left_B.squaredNorm();
     }
     if (learned->rotation) {
+      // No slope is learned of rotations: far out a map may miss as much as there was to learn.
       const BiasPrediction& turn = *learned->rotation;
       const Eigen::MatrixXd turned_B = X_BW.linear() * J_W.bottomRows<3>();
       const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;

@@ -19,6 +19,16 @@ PoseContext posed(const JointVector& q) {
   return context;
 }
 
+BiasModel turning_of(const CompensatedModel& model) {
+  BiasState state = *model.parts().rotation_bias;
+  for (Eigen::Index i = 0; i < state.q.rows(); ++i) {
+    PoseContext context = model.parts().bias_contexts[static_cast<std::size_t>(i)];
+    context.q = state.q.row(i).transpose();
+    state.features.push_back(turned(model.features(context)));
+  }
+  return test::demand(BiasModel::restore(state));
+}
+
 /// A robot whose wrist turns the tool wrongly by what no identified source knows.
 class RotationBias : public testing::Test {
  protected:
@@ -93,15 +103,62 @@ TEST_F(RotationBias, FadesAwayWithThatOfThePositionButForItsBlocks) {
     return rotation_log(prediction.X_BT_predicted.linear() * calibrated.transpose());
   };
   EXPECT_LT(turn_beyond_calibrated(trained(*batch_, "se")).norm(), 1e-14);
-  BiasState state = *model_->parts().rotation_bias;
-  for (Eigen::Index i = 0; i < state.q.rows(); ++i) {
-    PoseContext context = model_->parts().bias_contexts[static_cast<std::size_t>(i)];
-    context.q = state.q.row(i).transpose();
-    state.features.push_back(turned(model_->features(context)));
-  }
-  const BiasPrediction turn = test::demand(BiasModel::restore(state)).predict(far.q, turned(model_->features(far)));
+  const BiasPrediction turn = turning_of(*model_).predict(far.q, turned(model_->features(far)));
   EXPECT_LT((turn_beyond_calibrated(*model_) - (turn.mean_B - turn.nearby_B)).norm(), 1e-12);
   EXPECT_GT((turn.mean_B - turn.nearby_B).norm(), 1e-5);
+}
+
+TEST_F(RotationBias, PredictionsAndCorrectionsTakeTheSamePartOfBothBiases) {
+  const BiasModel turning = turning_of(*model_);
+  const PhysicalModel& physics = model_->parts().physics;
+  const auto with_part = [&](const JointVector& q, double weight) {
+    const BiasFeatures features = model_->features(posed(q));
+    const BiasPrediction move = model_->bias()->predict(q, features);
+    const BiasPrediction turn = turning.predict(q, turned(features));
+    Pose X_BT = physics.X_WB.inverse() * physics.pose_W(posed(q));
+    X_BT.translation() += move.mean_B - (1 - weight) * move.nearby_B;
+    X_BT.linear() = (rotation_exp(turn.mean_B - (1 - weight) * turn.nearby_B) * X_BT.linear()).eval();
+    EXPECT_GT(turn.nearby_B.norm(), 1e-7);
+    return X_BT;
+  };
+  JointVector q(6);
+  q << 0.1, -0.1, 0.2, 0.2, 0.8, -0.1;
+  for (const auto& [beyond, weight] : {std::pair{0.0, 1.0}, {0.15, 0.5}, {0.5, 0.0}}) {
+    CompensatedModel::Parts parts = model_->parts();
+    parts.q_max(0) = parts.q_min(0) + (q(0) - parts.q_min(0)) / (1 + beyond);  // as if joint 1 had not come so far
+    const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
+    const ErrorPrediction at = model.predict(q, "spindle", "spindle");
+    EXPECT_NEAR(at.bias_weight, weight, 0.05);
+    const Vector6 differs = pose_difference(at.X_BT_predicted, with_part(q, at.bias_weight));
+    EXPECT_LT(differs.cwiseAbs().maxCoeff(), 1e-12) << weight;
+    Target target;
+    target.joint_target = true;
+    target.seed = q;
+    const Correction correction = model.correct(target, "spindle", "spindle");
+    const Vector6 left = pose_difference(correction.X_BT_wanted, with_part(correction.q, at.bias_weight));
+    EXPECT_LT(left.head<3>().norm(), 1e-7) << weight;
+    EXPECT_LT(left.tail<3>().norm(), 1e-7) << weight;
+  }
+}
+
+TEST_F(RotationBias, FarOutATurnMayBeMissedByAsMuchAsThereWasToLearn) {
+  const PoseContext far = posed(model_->parts().q_max + 0.5 * (model_->parts().q_max - model_->parts().q_min));
+  const BiasModel turning = turning_of(*model_);
+  const BiasPrediction turn = turning.predict(far.q, turned(model_->features(far)));
+  const PhysicalModel& physics = model_->parts().physics;
+  Eigen::MatrixXd J_W;
+  physics.pose_W(far, physics.values, &J_W);
+  const Eigen::MatrixXd J_B = physics.X_WB.linear().transpose() * J_W.bottomRows<3>();
+  const Vector3 identified = (J_B * model_->parts().covariance * J_B.transpose()).diagonal();
+  const double instrument = model_->cell().tracker.sigma_rotation;
+  const Vector3 noise =
+      (turn.measured_stddev_B.cwiseAbs2() - turn.stddev_B.cwiseAbs2()).cwiseMax(instrument * instrument);
+  const Vector3 learned = turning.state().residual_B.colwise().squaredNorm() / turning.state().q.rows();
+  const ErrorPrediction prediction = model_->predict(far.q, "spindle", "spindle");
+  ASSERT_EQ(prediction.bias_weight, 0.0);
+  const Vector3 expected = turn.stddev_B.cwiseAbs2() + identified + noise + learned.cwiseMax(turn.nearby_B.cwiseAbs2());
+  EXPECT_LT((prediction.rotation_stddev_B->cwiseAbs2() - expected).norm(), 1e-9 * expected.norm());
+  EXPECT_GT(std::sqrt(learned.sum()), 3e-4);
 }
 
 TEST_F(RotationBias, IsTheSameAfterItWasStoredBitForBitAndTheHashCoversIt) {
