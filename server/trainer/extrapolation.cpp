@@ -21,12 +21,13 @@ constexpr double kLeastRange = 0.02;    // rad or m; over less a slope is noise
 constexpr Index kLeastAsked = 5;
 constexpr Index kLeastRest = 10;
 
-/// What poses left out miss by beyond what is claimed of them, sum of squares of one coordinate, m².
-using Surplus = std::function<double(const LeftOut::Without& anew, const std::vector<Index>& asked,
-                                     const std::vector<Index>& rest)>;
+/// What poses left out miss by beyond what is claimed of them, sum of squares of one coordinate, m²; empty where the
+/// rest does not tell.
+using Surplus = std::function<std::optional<double>(const LeftOut::Without& anew, const std::vector<Index>& asked,
+                                                    const std::vector<Index>& rest)>;
 
-double surplus_of_physics(const LeftOut::Without& anew, const std::vector<Index>& asked,
-                          const std::vector<Index>& rest) {
+std::optional<double> surplus_of_physics(const LeftOut::Without& anew, const std::vector<Index>& asked,
+                                         const std::vector<Index>& rest) {
   // About the rest's mean: a constant is known, and what of it is not taken outside is counted there.
   const MatrixXd known = anew.residual_B(rest, Eigen::all);
   const Eigen::RowVector3d mean = known.colwise().mean();
@@ -36,8 +37,8 @@ double surplus_of_physics(const LeftOut::Without& anew, const std::vector<Index>
 }
 
 /// What its blocks do not tell of poses out of its range, with the hyperparameters as they are.
-double surplus_of_blocks(const BiasState& state, const LeftOut::Without& anew, const std::vector<Index>& asked,
-                         const std::vector<Index>& rest) {
+std::optional<double> surplus_of_blocks(const BiasState& state, const LeftOut::Without& anew,
+                                        const std::vector<Index>& asked, const std::vector<Index>& rest) {
   const auto at = [&](const std::vector<Index>& rows) {
     std::vector<BiasFeatures> some;
     for (const Index i : rows) some.push_back(state.features[static_cast<std::size_t>(i)]);
@@ -46,7 +47,7 @@ double surplus_of_blocks(const BiasState& state, const LeftOut::Without& anew, c
   const Result<BiasModel> known =
       BiasModel::restore({state.kernel, state.q(rest, Eigen::all), anew.residual_B(rest, Eigen::all), state.sigma(rest),
                           state.offset, state.hyperparameters, state.block_hyperparameters, at(rest)});
-  if (!known) return 0;
+  if (!known) return std::nullopt;
   const std::vector<BiasPrediction> said = known->predict_all(state.q(asked, Eigen::all), at(asked));
   double surplus = spelled_bias(state.kernel)->has("parameters") ? 0 : -anew.variance.sum();
   for (std::size_t k = 0; k < asked.size(); ++k) {
@@ -75,21 +76,23 @@ std::optional<double> squared_slope(const LeftOut& poses, Index j, const Joint& 
     if (static_cast<Index>(asked.size()) < kLeastAsked || static_cast<Index>(rest.size()) < kLeastRest) continue;
     const Eigen::Map<const VectorXd> away(distance.data(), static_cast<Index>(distance.size()));
     const auto anew = poses.without(asked);
-    const double missed = anew ? surplus(*anew, asked, rest) : 0;
-    worst = std::max(worst.value_or(0), std::max(missed, 0.0) / away.squaredNorm());
+    const std::optional<double> missed = anew ? surplus(*anew, asked, rest) : std::nullopt;
+    if (missed) worst = std::max(worst.value_or(0), std::max(*missed, 0.0) / away.squaredNorm());
   }
   return worst;
 }
 
-JointVector slope_of(const LeftOut& poses, const Chain& robot, const Surplus& surplus) {
+/// Empty where no joint can be asked.
+std::optional<JointVector> slope_of(const LeftOut& poses, const Chain& robot, const Surplus& surplus) {
+  if (poses.size() == 0) return std::nullopt;
   JointVector slope = JointVector::Zero(robot.size());
-  if (poses.size() == 0) return slope;
   std::vector<Index> unknown;
   for (Index j = 0; j < slope.size(); ++j) {
     const std::optional<double> squared = squared_slope(poses, j, robot.joint(static_cast<int>(j)), surplus);
     if (!squared) unknown.push_back(j);
     slope(j) = std::sqrt(squared.value_or(0));
   }
+  if (static_cast<Index>(unknown.size()) == slope.size()) return std::nullopt;
   const double largest = slope.maxCoeff();
   for (const Index j : unknown) slope(j) = largest;
   return slope;
@@ -98,14 +101,16 @@ JointVector slope_of(const LeftOut& poses, const Chain& robot, const Surplus& su
 }  // namespace
 
 JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot) {
-  return slope_of(poses, robot, surplus_of_physics);
+  return slope_of(poses, robot, surplus_of_physics).value_or(JointVector::Zero(robot.size()));
 }
 
 JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot, const BiasModel& bias) {
   TRAMMEL_CHECK(bias.needs_features() && bias.state().q.rows() == poses.size());
-  return slope_of(poses, robot, [&](const LeftOut::Without& anew, const auto& asked, const auto& rest) {
-    return surplus_of_blocks(bias.state(), anew, asked, rest);
-  });
+  const auto beyond_blocks =
+      slope_of(poses, robot, [&](const LeftOut::Without& anew, const auto& asked, const auto& rest) {
+        return surplus_of_blocks(bias.state(), anew, asked, rest);
+      });
+  return beyond_blocks ? *beyond_blocks : extrapolation_slope(poses, robot);
 }
 
 }  // namespace trammel

@@ -92,6 +92,10 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
           band.rms += e.square().mean();
           band.stddev += s.square().mean();
           band.coverage_95 += (e.abs() <= kInterval95 * s).cast<double>().mean();
+          const CompensatedModel::LevelErrors::Rotations& turns = errors.rotation;
+          if (turns.stddev.cols() != distance.size()) continue;
+          const auto r = turns.compensated.col(i).array();
+          band.rotation_coverage_95 += (r.abs() <= kInterval95 * turns.stddev.col(i).array()).cast<double>().mean();
         }
       }
     }
@@ -100,6 +104,7 @@ OutsideFigures asked_outside(const VirtualRobot& robot, const JointRanges& range
     band.rms = std::sqrt(band.rms / band.poses);
     band.stddev = std::sqrt(band.stddev / band.poses);
     band.coverage_95 /= band.poses;
+    band.rotation_coverage_95 /= band.poses;
   }
   return figures;
 }

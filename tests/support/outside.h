@@ -14,9 +14,10 @@ namespace trammel::test {
 struct OutsideBand {
   double from = 0, to = 0;
   int poses = 0;
-  double rms = 0;          ///< m, of one coordinate's error, as served
-  double stddev = 0;       ///< m, as claimed, rms
-  double coverage_95 = 0;  ///< share of coordinates inside their interval
+  double rms = 0;                   ///< m, of one coordinate's error, as served
+  double stddev = 0;                ///< m, as claimed, rms
+  double coverage_95 = 0;           ///< share of coordinates inside their interval
+  double rotation_coverage_95 = 0;  ///< of rotation vectors likewise; 0 where none was learned
 };
 
 struct OutsideFigures {

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "server/base/units.h"
+#include "server/compensate/bias_physics.h"
 #include "server/compensate/domain.h"
 #include "tests/support/demand.h"
 #include "tests/support/outside.h"
@@ -27,6 +30,16 @@ CalibrationResult identified(const std::shared_ptr<const Cell>& cell, const std:
 
 JointVector slope_of(const CalibrationResult& found, const MeasurementBatch& batch) {
   return extrapolation_slope(LeftOut(found, batch), found.model.cell->robot);
+}
+
+BiasModel learned(const CalibrationResult& found, const MeasurementBatch& batch, const std::string& kernel) {
+  BiasProblem problem = leftover(found.model, batch);
+  const BiasPhysics physics(found.model);
+  for (const Measurement& m : batch.measurements) problem.features.push_back(physics.at(m.context));
+  BiasOptions options;
+  options.kernel = kernel;
+  options.starts = 2;
+  return test::demand(BiasModel::fit(problem, options));
 }
 
 /// Nothing is identified anew.
@@ -69,6 +82,54 @@ TEST(Extrapolation, ABiasWithParametersErrsFarOutAsPhysicsDoesAndSaysSo) {
   EXPECT_GT(figures.bands.back().stddev, 3 * figures.bands.front().stddev);
   EXPECT_GT(figures.caught, 0.987 * figures.outsiders);
   EXPECT_LT(figures.refused, 0.024 * figures.insiders);
+}
+
+TEST(Extrapolation, ABiasWithMapsSaysHowMuchItErrsFarOutInPlaceAndInDirection) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const test::OutsideFigures figures = test::asked_outside(robot, small_box(), "M2", "se + joint_map", 300, 1);
+  for (const test::OutsideBand& band : figures.bands) {
+    // More than a range out too little is claimed: half of the true error, and no slope is learned of rotations.
+    if (band.from >= 1) continue;
+    EXPECT_GT(band.coverage_95, 0.88) << band.from << " to " << band.to;
+    EXPECT_LT(band.stddev, 1.5 * band.rms) << band.from << " to " << band.to;
+    EXPECT_GT(band.rotation_coverage_95, band.from < 0.3 ? 0.83 : 0.65) << band.from << " to " << band.to;
+  }
+}
+
+TEST(Extrapolation, WhatTheParametersLeaveUncertainIsNoGrowthOfWhatMapsMiss) {
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured_within(test::chapter_5_robot(cell), small_box(), 80, 11);
+  const CalibrationResult found = identified(cell, "M3", batch);
+  const BiasModel bias = learned(found, batch, "se + joint_map");
+  const JointVector slope = extrapolation_slope(LeftOut(found, batch), cell->robot, bias);
+  EXPECT_LT(slope.norm(), 0.1e-3);  // twice as much is what the parameters leave uncertain of the ends
+}
+
+TEST(Extrapolation, AJointWhoseEndsLeaveNothingToIdentifyFromIsTrustedNoMoreThanTheWorstOfTheOthers) {
+  const auto cell = test::cell_7();
+  // Joint 1 stood at either end of its range: without one of them half of the poses are left, otherwise two thirds.
+  MeasurementBatch batch;
+  for (const bool upper : {false, true}) {
+    JointRanges box = small_box();
+    (upper ? box[0].first : box[0].second) = from_deg(upper ? 14 : -14);
+    for (const Measurement& m :
+         test::measured_within(test::chapter_5_robot(cell), box, 45, upper ? 12 : 13).measurements)
+      batch.measurements.push_back(m);
+  }
+  CalibrationResult found = as_it_is(identified(cell, "M1", batch));
+  const BiasModel bias = learned(found, batch, "se + joint_map");
+  // Where the base is: as if two fifths of these poses had told it.
+  found.covariance(0, 0) = std::pow(std::hypot(cell->tracker.sigma, found.discrepancy), 2) / (0.4 * 90);
+  const LeftOut poses(found, batch);
+  std::vector<Eigen::Index> half(45), third(30);
+  std::iota(half.begin(), half.end(), 0);
+  std::iota(third.begin(), third.end(), 0);
+  ASSERT_FALSE(poses.without(half));
+  ASSERT_TRUE(poses.without(third));
+  for (const JointVector& slope : {slope_of(found, batch), extrapolation_slope(poses, cell->robot, bias)}) {
+    EXPECT_GT(slope.tail(5).maxCoeff(), 0.1e-3);
+    EXPECT_EQ(slope(0), slope.tail(5).maxCoeff());
+  }
 }
 
 TEST(Extrapolation, IsOfTheJointThatThePhysicsLacks) {
