@@ -96,6 +96,20 @@ TEST(CoupledModel, ManyTargetsSayWhatOneSays) {
   }
 }
 
+TEST(CoupledModel, WhatRestsOnPosesNearbyIsTheSameWhoeverAsksAndEndsFarFromThem) {
+  const BiasProblem targets = gear_problem(20, 5);
+  const MatrixXd alone_B = fitted().nearby_mean_all_B(targets.q);
+  for (Index i = 0; i < 20; ++i) {
+    const BiasPrediction at = fitted().predict(targets.q.row(i), targets.features[static_cast<std::size_t>(i)]);
+    EXPECT_LT((at.nearby_B - alone_B.row(i).transpose()).norm(), 1e-14);
+    EXPECT_GT(at.nearby_B.norm(), 1e-6);
+  }
+  const JointVector far = JointVector::Constant(3, 100);
+  const BiasPrediction at = fitted().predict(far, arm_features(far));
+  EXPECT_LT(at.nearby_B.norm(), 1e-14);
+  EXPECT_GT(at.mean_B.norm(), 1e-5);
+}
+
 TEST(CoupledModel, RestoresBitForBit) {
   const auto restored = BiasModel::restore(fitted().state());
   ASSERT_TRUE(restored.has_value()) << restored.error().message;
