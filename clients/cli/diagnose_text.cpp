@@ -250,7 +250,7 @@ ordered_json extension_json(const Extension& extension) {
   ordered_json left_out = ordered_json::array();
   for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
   return {{"better", extension.gain.beyond_chance()},
-          {"z", extension.gain.z},
+          {"z", extension.gain.z()},
           {"z_limit", PairedGain::kBeyondChance},
           {"judged_without", extension.gain.left_out},
           {"error_sources", extension.sources},

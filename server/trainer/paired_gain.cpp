@@ -27,9 +27,14 @@ double signed_rank_z(const Eigen::VectorXd& differences) {
   return d.empty() ? 0 : sum / std::sqrt(n * (n + 1) * (2 * n + 1) / 6);
 }
 
+double sum_z(const Eigen::VectorXd& differences) {
+  const double size = differences.norm();
+  return differences.allFinite() && size > 0 ? differences.sum() / size : 0;
+}
+
 std::string verdict(const PairedGain& gain) {
   if (gain.beyond_chance()) return "better beyond chance";
-  if (gain.z > PairedGain::kBeyondChance) return "better at most poses, but much worse at others";
+  if (gain.z() > PairedGain::kBeyondChance) return "better at most poses, but much worse at others";
   return "not better beyond chance";
 }
 
@@ -42,7 +47,8 @@ PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& a
   gain.poses = static_cast<int>(before.cols());
   gain.rms_before = std::sqrt(square_before.mean());
   gain.rms_after = std::sqrt(square_after.mean());
-  gain.z = signed_rank_z(square_before - square_after);
+  gain.z_ranks = signed_rank_z(square_before - square_after);
+  gain.z_sum = sum_z(square_before - square_after);
   return gain;
 }
 
@@ -51,10 +57,9 @@ PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& a
 }
 
 std::string to_string(const PairedGain& gain) {
-  return fmt::format(
-      "{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (signed ranks: z {:.2f}, limit {:.2f}){}",
-      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses, verdict(gain), gain.z, PairedGain::kBeyondChance,
-      judged_without(gain.left_out));
+  return fmt::format("{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit {:.2f}){}",
+                     to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses, verdict(gain), gain.z(),
+                     PairedGain::kBeyondChance, judged_without(gain.left_out));
 }
 
 std::string judged_without(const std::vector<std::string>& poses) {

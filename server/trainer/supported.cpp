@@ -1,11 +1,11 @@
 #include "server/trainer/supported.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames.h"
 #include "server/measurement/repeats.h"
+#include "server/trainer/paired_gain.h"
 
 namespace trammel {
 
@@ -22,14 +22,6 @@ Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const 
     left.col(i) = m.p_W - identified->model.pose_W(m.context).translation();
   }
   return left;
-}
-
-/// Of the sum, not of the ranks: a cause that acts at a tenth of the poses only is outvoted there by the others, at
-/// which it does nothing.
-double z_of_sum(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after) {
-  const Eigen::VectorXd less = before.colwise().squaredNorm() - after.colwise().squaredNorm();
-  const double size = less.norm();
-  return size > 0 ? less.sum() / size : 0;
 }
 
 std::vector<std::string> joined(std::vector<std::string> own, const std::vector<std::string>& found) {
@@ -59,7 +51,9 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
       const auto without = left_by(cell, joined(own, others), merged, judges);
       if (!without) continue;  // the rest cannot do without it
-      const double z = z_of_sum(*without, *with);
+      // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at which it does
+      // nothing.
+      const double z = paired_gain(*without, *with).z_sum;
       if (z > least.z || (z == least.z && !least.source.empty())) continue;
       least = {supported.sources[k], z};
       place = k;

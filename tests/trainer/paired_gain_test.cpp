@@ -46,14 +46,26 @@ PairedGain gain_of(const std::vector<double>& less) {
 
 TEST(PairedGain, OfAModelOverItselfIsNone) {
   const Eigen::Matrix3Xd errors = noise(40, 1e-5, 1);
-  EXPECT_EQ(paired_gain(errors, errors).z, 0);
+  EXPECT_EQ(paired_gain(errors, errors).z(), 0);
   EXPECT_FALSE(paired_gain(errors, errors).beyond_chance());
 }
 
-TEST(PairedGain, IsWilcoxonsSignedRankStatistic) {
+TEST(PairedGain, IsWilcoxonsSignedRankStatisticOrThatOfTheSum) {
   // Ranks 1, 2.5, 2.5, 4, 5 of which 2.5 is against; the pose without a difference has none.
-  EXPECT_NEAR(gain_of({1, 4, -4, 0, 9, 16}).z, (1 + 2.5 - 2.5 + 4 + 5) / std::sqrt(55.0), 1e-12);
-  EXPECT_NEAR(gain_of({-1, -4, -9}).z, -6 / std::sqrt(14.0), 1e-12);
+  EXPECT_NEAR(gain_of({1, 4, -4, 0, 9, 16}).z_ranks, (1 + 2.5 - 2.5 + 4 + 5) / std::sqrt(55.0), 1e-12);
+  EXPECT_NEAR(gain_of({-1, -4, -9}).z_ranks, -6 / std::sqrt(14.0), 1e-12);
+  EXPECT_NEAR(gain_of({1, 4, -4, 0, 9, 16}).z_sum, 26 / std::sqrt(1.0 + 16 + 16 + 81 + 256), 1e-12);
+}
+
+TEST(PairedGain, CountsWhereACauseActsAtAFewPosesOnly) {
+  int accepted = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    const Eigen::Matrix3Xd left = noise(60, 14e-6, 2 * seed);
+    Eigen::Matrix3Xd before = left;
+    before.leftCols(12) += 3 * noise(12, 14e-6, 2 * seed + 1);
+    accepted += paired_gain(before, left).beyond_chance() ? 1 : 0;
+  }
+  EXPECT_GT(accepted, 90);
 }
 
 TEST(PairedGain, OfEquallyGoodModelsIsBeyondChanceInLessThanTwoOfAHundredCases) {
@@ -88,7 +100,7 @@ TEST(PairedGain, DoesNotCountWhereMostPosesAreBetterAndTheOthersMuchWorse) {
   Eigen::Matrix3Xd after = 0.5 * before;
   after.leftCols(2) = 20 * before.leftCols(2);
   const PairedGain gain = paired_gain(before, after);
-  EXPECT_GT(gain.z, PairedGain::kBeyondChance);
+  EXPECT_GT(gain.z(), PairedGain::kBeyondChance);
   EXPECT_FALSE(gain.beyond_chance());
   EXPECT_NE(to_string(gain).find("better at most poses, but much worse at others"), std::string::npos);
 }
@@ -98,7 +110,7 @@ TEST(PairedGain, IsNoneWhereAnErrorIsNotFinite) {
   const Eigen::Matrix3Xd after = 0.5 * before;
   before(1, 7) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(paired_gain(before, after).beyond_chance());
-  EXPECT_EQ(paired_gain(before, after).z, 0);
+  EXPECT_EQ(paired_gain(before, after).z(), 0);
 }
 
 }  // namespace
