@@ -220,16 +220,20 @@ std::optional<Activation> present_activation(SQLite::Database& database, const s
       database, "SELECT number, version, back FROM activations WHERE cell = ? ORDER BY number DESC LIMIT 1", cell));
 }
 
-/// Where a rollback leads.
-Result<Activation> activation_before(SQLite::Database& database, const std::string& cell) {
+/// Where rolling back again and again leads, the next one first.
+Result<std::vector<Activation>> activations_before(SQLite::Database& database, const std::string& cell) {
   const auto present = present_activation(database, cell);
   if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
   if (!present->back) {
     return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version);
   }
-  return activation_of(
-             prepare(database, "SELECT number, version, back FROM activations WHERE number = ?", *present->back))
-      .value();
+  std::vector<Activation> before;
+  for (auto back = present->back; back; back = before.back().back) {
+    before.push_back(
+        activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?", *back))
+            .value());
+  }
+  return before;
 }
 
 void insert_activation(SQLite::Database& database, const std::string& cell, int version,
@@ -539,17 +543,26 @@ Status Store::activate(const std::string& cell, int version) {
   });
 }
 
-Result<int> Store::previous_in_force(const std::string& cell) const {
-  return connection_->exclusively(
-      [&](SQLite::Database& database) { return activation_before(database, cell).map(&Activation::version); });
+Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const {
+  return connection_->exclusively([&](SQLite::Database& database) {
+    return activations_before(database, cell).map([](const std::vector<Activation>& before) {
+      std::vector<int> versions;
+      for (const Activation& activation : before) versions.push_back(activation.version);
+      return versions;
+    });
+  });
 }
 
-Result<int> Store::rollback(const std::string& cell) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
-    return activation_before(database, cell).map([&](const Activation& before) {
-      insert_activation(database, cell, before.version, before.back);
-      return before.version;
-    });
+Result<int> Store::rollback(const std::string& cell, int steps) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+    const auto before = activations_before(database, cell);
+    if (!before) return tl::make_unexpected(before.error());
+    if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
+      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps);
+    }
+    const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
+    insert_activation(database, cell, wanted.version, wanted.back);
+    return wanted.version;
   });
 }
 

@@ -110,10 +110,10 @@ class Store {
   /// with what it remembers, so rolling back again goes further back and never forth: after 1, 2, 3 it gives 2, then 1,
   /// then kNotFound. Activating anew remembers what was in force at that moment, however that came to be.
   [[nodiscard]] Status activate(const std::string& cell, int version);
-  /// The version that rollback() would restore; kNotFound when there is none.
-  [[nodiscard]] Result<int> previous_in_force(const std::string& cell) const;
-  /// Puts the version of previous_in_force() in force; returns it.
-  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// The versions that rolling back again and again restores, the next one first; kNotFound when there is none.
+  [[nodiscard]] Result<std::vector<int>> previous_in_force(const std::string& cell) const;
+  /// Puts one of previous_in_force() in force, as `steps` rollbacks do; returns it.
+  [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1);
   /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;

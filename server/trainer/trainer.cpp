@@ -147,8 +147,8 @@ Acceptance judge_against(const CompensatedModel& candidate, const ServedModel& p
   const PairedGain gain = paired_gain(present.model, candidate, held_out);
   if (bar == Trainer::Bar::kBetter) {
     const bool good = gain.beyond_chance();
-    return {good, fmt::format("{}: {}; before is version {}{}", good ? "in force" : "not in force",
-                              to_string(gain), present.version, good ? "" : ", which stays in force")};
+    return {good, fmt::format("{}: {}; before is version {}{}", good ? "in force" : "not in force", to_string(gain),
+                              present.version, good ? "" : ", which stays in force")};
   }
   const bool good = gain.rms_after <= accept_ratio * gain.rms_before;
   return {good, fmt::format("{}: held-out rms {:.4f} mm, limit {} x {:.4f} mm of version {}, {} poses",
@@ -166,6 +166,16 @@ Acceptance judge(const CompensatedModel& candidate, const ServedModel* present, 
   }
   if (present == nullptr || !fits(present->model, held_out)) return judge_alone(candidate, held_out, bar);
   return judge_against(candidate, *present, held_out, bar, accept_ratio);
+}
+
+/// Where the version marked in force cannot be asked: against what its own held-out poses said when it was made.
+Acceptance judge_by_record(const CompensatedModel& candidate, const StoredModel& record,
+                           const MeasurementBatch& held_out, double accept_ratio, Acceptance otherwise) {
+  const double rms = candidate.evaluate(held_out).compensated.rms;
+  if (record.validation_rms == 0 || rms <= accept_ratio * record.validation_rms) return otherwise;
+  return {false, fmt::format("not in force: held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its "
+                             "own, which is marked in force but cannot be loaded; activate it if it is wanted",
+                             to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version)};
 }
 
 JobStage stage_of(JobState state) {
@@ -377,13 +387,21 @@ Status Trainer::activate(const std::string& cell_name, int version) {
 Result<int> Trainer::rollback(const std::string& cell_name) {
   if (auto found = cell(cell_name); !found) return tl::make_unexpected(found.error());
   const std::lock_guard lock(activation_mutex_);
-  const auto version = store_.previous_in_force(cell_name);
-  if (!version) return version;
-  auto model = load_for_service(cell_name, *version);
-  if (!model) return tl::make_unexpected(model.error());
-  if (auto restored = store_.rollback(cell_name); !restored) return restored;
-  put_in_force(std::make_shared<const ServedModel>(ServedModel{cell_name, *version, std::move(*model)}));
-  return version;
+  const auto versions = store_.previous_in_force(cell_name);
+  if (!versions) return tl::make_unexpected(versions.error());
+  std::optional<Error> why_not;
+  for (std::size_t i = 0; i < versions->size(); ++i) {
+    const int version = (*versions)[i];
+    auto model = load_for_service(cell_name, version);
+    if (!model) {
+      if (!why_not) why_not = model.error();
+      continue;
+    }
+    if (auto restored = store_.rollback(cell_name, static_cast<int>(i) + 1); !restored) return restored;
+    put_in_force(std::make_shared<const ServedModel>(ServedModel{cell_name, version, std::move(*model)}));
+    return version;
+  }
+  return tl::make_unexpected(*why_not);
 }
 
 Result<int> Trainer::import_model(const std::string& cell_name, const std::string& text) {
@@ -457,6 +475,16 @@ Result<CompensatedModel> Trainer::load_for_service(const std::string& cell_name,
       check_fits_cell(*model, *cells_.at(cell_name), fmt::format("version {} of cell {}", version, cell_name));
   if (!fits) return tl::make_unexpected(fits.error());
   return model;
+}
+
+Result<std::optional<StoredModel>> Trainer::record_not_loaded(const std::string& cell_name) const {
+  if (registry_.in_force(cell_name)) return std::nullopt;
+  const auto models = store_.models(cell_name);
+  if (!models) return tl::make_unexpected(models.error());
+  const auto marked = std::find_if(models->begin(), models->end(), [](const StoredModel& m) { return m.in_force; });
+  // One that can be loaded was set aside for its robot or tools: its figures say nothing about others.
+  if (marked == models->end() || store_.model(cell_name, marked->version)) return std::nullopt;
+  return *marked;
 }
 
 /// Of a model that the store has put in force; activation_mutex_ is held.
@@ -577,6 +605,11 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
     if (diagnosis != nullptr) judges = judges_of(*diagnosis, std::move(judges.batch));
     Acceptance verdict =
         judge(model, registry_.in_force(progress.cell).get(), judges.batch, bar, options_.accept_ratio);
+    if (verdict.put_in_force) {
+      const auto record = record_not_loaded(progress.cell);
+      if (!record) return tl::make_unexpected(record.error());
+      if (*record) verdict = judge_by_record(model, **record, judges.batch, options_.accept_ratio, std::move(verdict));
+    }
     verdict.message += judged_without(judges.left_out);
     if (!note.empty()) verdict.message += "; " + note;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);

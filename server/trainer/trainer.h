@@ -100,7 +100,7 @@ class Trainer {
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// Puts a stored version in force and publishes it.
   [[nodiscard]] Status activate(const std::string& cell, int version);
-  /// Back to the version in force before; returns it.
+  /// Back to the version in force before, or the last one before it that can be served; returns it.
   [[nodiscard]] Result<int> rollback(const std::string& cell);
   /// A stored version of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
@@ -122,6 +122,8 @@ class Trainer {
 
   [[nodiscard]] Status publish_from_store(const std::string& cell);
   void put_in_force(std::shared_ptr<const ServedModel> model);
+  /// The version marked in force, where it could not be loaded.
+  [[nodiscard]] Result<std::optional<StoredModel>> record_not_loaded(const std::string& cell) const;
 
   void work(const std::stop_token& stop);
   void run(std::int64_t job, const std::stop_token& stop);

@@ -254,7 +254,7 @@ TEST_F(StoreTest, AModelOfAFinishedJobIsNotStored) {
 
 TEST_F(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
-  EXPECT_EQ(store_->previous_in_force("cell-7").value(), 2);
+  EXPECT_EQ(store_->previous_in_force("cell-7").value(), (std::vector{2, 1}));
   EXPECT_EQ(store_->rollback("cell-7").value(), 2);
   reopen();
   EXPECT_EQ(in_force(), 2);
@@ -264,6 +264,15 @@ TEST_F(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   ASSERT_FALSE(no_further);
   EXPECT_EQ(no_further.error().code, ErrorCode::kNotFound);
   EXPECT_EQ(in_force(), 1);
+}
+
+TEST_F(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
+  for (int version = 1; version <= 3; ++version) add_model(version, true);
+  EXPECT_EQ(store_->rollback("cell-7", 3).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(in_force(), 3);
+  EXPECT_EQ(store_->rollback("cell-7", 2).value(), 1);
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(store_->rollback("cell-7").error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(StoreTest, AnActivationAfterARollbackRemembersWhatItReplaced) {

@@ -1,5 +1,6 @@
 #include "server/trainer/trainer.h"
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -454,6 +455,28 @@ TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   EXPECT_EQ(models_heard().back(), std::pair(2, true));
   EXPECT_EQ(trainer_->activate("cell-7", 3).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(in_force(), 2);
+}
+
+TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbackStepsPastIt) {
+  start();
+  train("first");
+  for (const int version : {2, 3}) {
+    train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
+    ASSERT_TRUE(trainer_->activate("cell-7", version));
+  }
+  SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version > 1");
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  ASSERT_EQ(in_force(), 0);
+  const JobProgress worse = train("fourth", {.noise = 3e-4, .seed = 4});
+  EXPECT_FALSE(worse.in_force) << worse.what;
+  EXPECT_NE(worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
+            std::string::npos)
+      << worse.what;
+  EXPECT_EQ(trainer_->rollback("cell-7").value(), 1);
+  EXPECT_EQ(in_force(), 1);
+  EXPECT_EQ(*store_->version_in_force("cell-7"), 1);
 }
 
 TEST_F(TrainerTest, ImportsAModelIntoTheHistoryButNotIntoForce) {
