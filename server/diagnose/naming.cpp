@@ -24,7 +24,6 @@ constexpr double kAllOfIt = 0.995;      // the same of 0.9975: no strength of th
 constexpr double kContender = 0.15;     // of the best score
 constexpr double kPathStep = 0.2;       // rad
 constexpr double kAtOnce = 0.05;        // of the poses
-constexpr double kSlowOrder = 3;        // cycles a turn: within its range a joint may show less than one of them
 constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
 
 bool no_rival(const Cause& named, const Cause& other) {
@@ -61,8 +60,6 @@ bool is_description_of(const Cause& general, const Cause& special) {
     return special.parameter == fmt::format("q{}", general.joint + 1);
   // Joints give way before links do; only beside the joints' compliance is bending a cause of its own.
   if (special.cause == "compliance" && general.cause == "link_bending") return true;
-  if (special.cause == "encoder_eccentricity" && general.cause == "gear_transmission")
-    return special.joint == general.joint && general.order && *general.order < kSlowOrder;
   const bool angle = special.cause == "gear_transmission" || special.cause == "encoder_eccentricity";
   return angle && general.cause == "joint_map" && special.joint == general.joint;
 }
@@ -129,9 +126,9 @@ Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>&
     const double margin = naming.frequency < kSureFrequency ? kSafeMargin : kMargin;
     const double gap = seen.score[place] - seen.score[f];
     const bool decided = gap > std::max(margin, kShapeError * best.strength);
-    // A sine of any order, or a map, that is as likely says that the special one is not sure.
-    const bool of_any_order = other.cause == "gear_transmission" || cause.cause == "gear_transmission";
-    const bool only_describes = no_rival(cause, other) && (decided || !of_any_order);
+    // A more general description that is as likely says that the special one is not sure.
+    const bool only_describes =
+        no_rival(cause, other) && (decided || other.cause != "joint_map" || cause.cause != "gear_transmission");
     if (f == place || only_describes || begins_at_once(other, seen.best[f], problem.poses())) continue;
     const Best of_effect = families[f]->scan({background}, projected).front();
     const bool same_effect = of_effect.strength > kSameEffect * whole;
