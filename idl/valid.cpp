@@ -27,7 +27,7 @@ bool valid(const CorrectTargetRequest& request) {
 bool valid(const SubmitMeasurementsRequest& request) { return valid(request.header()); }
 bool valid(const TrainRequest& request) { return valid(request.header()); }
 bool valid(const DiagnoseRequest& request) { return valid(request.header()); }
-bool valid(const ManageModelsRequest& request) { return valid(request.header()) && request.action() <= MANAGE_RELEASE; }
+bool valid(const ManageModelsRequest& request) { return valid(request.header()) && request.action() <= MANAGE_JOBS; }
 
 bool valid(const PredictErrorReply& reply) {
   return valid(reply.header()) && reply.predictions().size() <= MAX_TARGETS;

@@ -1,6 +1,10 @@
 #include "clients/cli/answers.h"
 
+#include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <map>
+#include <set>
 
 #include "server/base/units.h"
 #include "server/measurement/csv_table.h"
@@ -163,16 +167,59 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
   return {{"model", predictions.model_id}, {"predictions", items}};
 }
 
-std::string corrections_csv(const TargetFile& file, const Corrections& corrections) {
+namespace {
+
+/// Of corrections_csv() without the columns of the target file.
+std::vector<std::string> correction_columns(const Corrections& corrections) {
+  std::vector<std::string> columns = {"row", "status", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"};
   const std::size_t joints = joint_count(corrections);
-  std::string text = fmt::format("row,status,{}", kPoseColumns);
   for (std::size_t j = 0; j < joints; ++j) {
-    text += ',' + joint_column(static_cast<int>(j), type_of(corrections.joint_types, j));
+    columns.push_back(joint_column(static_cast<int>(j), type_of(corrections.joint_types, j)));
   }
-  text += ",error_before_mm,error_after_mm,sigma_mm,iterations,model_id,message\n";
+  for (const char* name : {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message"}) {
+    columns.emplace_back(name);
+  }
+  return columns;
+}
+
+std::string in_lower_case(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name;
+}
+
+/// The names of the file's columns where `ours` stand behind them: none is named twice, whatever the case.
+std::vector<std::string> kept_columns(const std::vector<std::string>& columns, const std::vector<std::string>& ours) {
+  std::set<std::string> taken;
+  for (const std::string& name : ours) taken.insert(in_lower_case(name));
+  std::vector<std::string> kept = columns;
+  std::vector<std::size_t> clashing;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (taken.contains(in_lower_case(kept[k]))) clashing.push_back(k);
+  }
+  for (const std::string& name : kept) taken.insert(in_lower_case(name));
+  for (const std::size_t k : clashing) {
+    while (taken.contains(in_lower_case(kept[k]))) kept[k] = "input_" + kept[k];
+    taken.insert(in_lower_case(kept[k]));
+  }
+  return kept;
+}
+
+/// Empty where there is nothing to say.
+std::string field_of(double value) { return std::isfinite(value) ? csv_number(value) : ""; }
+ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+
+}  // namespace
+
+std::string corrections_csv(const TargetFile& file, const Corrections& corrections) {
+  const std::vector<std::string> ours = correction_columns(corrections);
+  std::string text;
+  for (const std::string& name : kept_columns(file.columns, ours)) text += csv_field(name) + ",";
+  text += fmt::format("{}\n", fmt::join(ours, ","));
+  const std::size_t joints = joint_count(corrections);
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
     const client::CorrectedTarget& item = corrections.items[i];
     const bool command = has_command(item);
+    for (const std::string& field : file.rows[i].fields) text += csv_field(field) + ",";
     text += fmt::format("{},{},{}", file.rows[i].row, item.status, command ? pose_fields(item.commanded) : ",,,,,,");
     for (std::size_t j = 0; j < joints; ++j) {
       text += ',';
@@ -180,10 +227,8 @@ std::string corrections_csv(const TargetFile& file, const Corrections& correctio
         text += csv_number(wire_to_column(item.q_rad[j], type_of(corrections.joint_types, j)));
       }
     }
-    text += command ? fmt::format(",{},{},{}", csv_number(item.error_before_mm), csv_number(item.error_after_mm),
-                                  csv_number(item.sigma_mm))
-                    : ",,,";
-    text += fmt::format(",{},{},{}\n", item.iterations, corrections.model_id, csv_field(item.message));
+    text += fmt::format(",{},{},{},{},{},{}\n", field_of(item.error_before_mm), field_of(item.error_after_mm),
+                        field_of(item.sigma_mm), item.iterations, corrections.model_id, csv_field(item.message));
   }
   return text;
 }
@@ -193,6 +238,10 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
   for (std::size_t i = 0; i < corrections.items.size(); ++i) {
     const client::CorrectedTarget& item = corrections.items[i];
     ordered_json json = {{"row", file.rows[i].row}, {"status", item.status}, {"message", item.message}};
+    json["input"] = ordered_json::object();
+    for (std::size_t k = 0; k < file.rows[i].fields.size(); ++k) {
+      json["input"][file.columns[k]] = file.rows[i].fields[k];
+    }
     if (has_command(item)) {
       ordered_json joints = ordered_json::object();
       for (std::size_t j = 0; j < item.q_rad.size(); ++j) {
@@ -201,10 +250,10 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
       }
       json["commanded"] = pose_json(item.commanded);
       json["joints"] = joints;
-      json["error_before_mm"] = item.error_before_mm;
-      json["error_after_mm"] = item.error_after_mm;
-      json["sigma_mm"] = item.sigma_mm;
     }
+    json["error_before_mm"] = json_of(item.error_before_mm);
+    json["error_after_mm"] = json_of(item.error_after_mm);
+    json["sigma_mm"] = json_of(item.sigma_mm);
     json["iterations"] = item.iterations;
     items.push_back(json);
   }
@@ -221,6 +270,20 @@ std::string corrections_summary(const Corrections& corrections) {
     separator = ", ";
   }
   return text + "\n";
+}
+
+std::string left_alone_text(const TargetFile& file, const Corrections& corrections) {
+  constexpr std::size_t kLines = 10;
+  std::string lines;
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    if (has_command(item) || ++left > kLines) continue;
+    lines += fmt::format("  {} row {}: {}: {}\n", file.where, file.rows[i].row, item.status, item.message);
+  }
+  if (left == 0) return "";
+  if (left > kLines) lines += fmt::format("  and {} more\n", left - kLines);
+  return fmt::format("{} of {} targets are left as they were:\n{}", left, corrections.items.size(), lines);
 }
 
 }  // namespace trammel::cli

@@ -51,11 +51,16 @@ struct Corrections {
 [[nodiscard]] std::string predictions_csv(const JointList& list, const Predictions& predictions);
 [[nodiscard]] nlohmann::ordered_json predictions_json(const JointList& list, const Predictions& predictions);
 
-/// `row` (line in the target file), `status`, the pose and joints to command, expected errors, `iterations`,
-/// `model_id`, `message`. A target that has no correction has no numbers either.
+/// The columns of the target file, then `row` (line in that file), `status`, the pose and joints to command, errors to
+/// expect, `iterations`, `model_id`, `message`. A column of the file that is named as one of these comes as
+/// `input_NAME`. A target that is left alone has no pose and no joints to command, and an error only where something
+/// can be said of it.
 [[nodiscard]] std::string corrections_csv(const TargetFile& file, const Corrections& corrections);
 [[nodiscard]] nlohmann::ordered_json corrections_json(const TargetFile& file, const Corrections& corrections);
 /// `12 targets: 10 ok, 2 unreachable`
 [[nodiscard]] std::string corrections_summary(const Corrections& corrections);
+/// `2 of 12 targets are left as they were:` and a line `t.csv row 4: joint_limit: joint 5 would be ...` for each, at
+/// most ten; empty where none is.
+[[nodiscard]] std::string left_alone_text(const TargetFile& file, const Corrections& corrections);
 
 }  // namespace trammel::cli

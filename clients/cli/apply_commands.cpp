@@ -180,7 +180,12 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   });
 }
 
-Status correct(const ApplyArguments& arguments) {
+/// Whether what could not be corrected counts.
+struct CorrectArguments : ApplyArguments {
+  bool allow_failed = false, strict = false;
+};
+
+Result<Extent> correct(const CorrectArguments& arguments) {
   if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
     return failure(ErrorCode::kUsage, "{}: unknown kind of targets '{}'; known: .csv", arguments.input, ending);
   }
@@ -189,11 +194,17 @@ Status correct(const ApplyArguments& arguments) {
   const Result<Corrections> corrections =
       arguments.service.service ? correct_by_service(*file, arguments) : correct_here(*file, arguments);
   if (!corrections) return tl::make_unexpected(corrections.error());
-  if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
-    return written;
+  const std::string left_alone = left_alone_text(*file, *corrections);
+  if (arguments.strict && !left_alone.empty()) {
+    return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
   }
-  fmt::print(stderr, "{}", corrections_summary(*corrections));
-  return write_json(arguments.json, corrections_json(*file, *corrections));
+  if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
+    return tl::make_unexpected(written.error());
+  }
+  fmt::print(stderr, "{}{}", corrections_summary(*corrections), left_alone);
+  const Status written = write_json(arguments.json, corrections_json(*file, *corrections));
+  if (!written) return tl::make_unexpected(written.error());
+  return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
 void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
@@ -225,10 +236,20 @@ void add_predict(CLI::App& app, Action& chosen) {
 }
 
 void add_correct(CLI::App& app, Action& chosen) {
-  const auto arguments = std::make_shared<ApplyArguments>();
+  const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
   command->add_option("input", arguments->input, "Targets in the robot's base (CSV: mm, joints in deg)")->required();
-  command->add_option("-o,--output", arguments->output, "Corrected targets (CSV: mm, deg)")->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Corrected targets (CSV: mm, deg), each behind the columns of its input; a column named as one of "
+                   "ours comes as input_NAME")
+      ->required();
+  CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
+                                                "Exit with 0, not 1, where targets are left as they were");
+  command
+      ->add_flag("--strict", arguments->strict,
+                 "Write nothing and exit with 3 where any target would be left as it was")
+      ->excludes(allow_failed);
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return correct(*arguments); }; });
 }

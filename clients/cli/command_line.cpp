@@ -8,6 +8,7 @@ namespace trammel::cli {
 
 namespace {
 
+constexpr int kNotAll = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kRefusedData = 3;
 constexpr int kNoService = 4;
@@ -36,7 +37,8 @@ int run_command_line(int argc, const char* const* argv) {
   app.set_version_flag("--version", TRAMMEL_VERSION);
   app.require_subcommand(0, 1);
   app.footer(
-      "Exit codes: 0 done, 2 wrong usage, 3 refused data, 4 unreachable or busy service.\n"
+      "Exit codes: 0 done, 1 done but not all (targets left as they were, a model not in force), 2 wrong usage,\n"
+      "3 refused data, 4 unreachable or busy service.\n"
       "A file named '-' is standard output.");
   Action chosen;
   add_plan_command(app, chosen);
@@ -58,8 +60,8 @@ int run_command_line(int argc, const char* const* argv) {
     return kWrongUsage;
   }
   const std::string command = app.get_subcommands().front()->get_name();
-  const Status done = chosen();
-  if (done) return 0;
+  const Result<Extent> done = chosen();
+  if (done) return *done == Extent::kAll ? 0 : kNotAll;
   fmt::print(stderr, "trammel {}: {}\n", command, done.error().message);
   return exit_code(done.error().code);
 }

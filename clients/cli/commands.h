@@ -1,6 +1,9 @@
 #pragma once
 
+#include <concepts>
 #include <functional>
+#include <type_traits>
+#include <utility>
 
 #include "server/base/result.h"
 
@@ -12,7 +15,29 @@ class App;
 /// line names is put into `chosen`.
 namespace trammel::cli {
 
-using Action = std::function<Status()>;
+/// How much of what was asked a command did; of kPart it has said on standard error what is missing.
+enum class Extent { kAll, kPart };
+
+/// What the command line names to do. Commands that do all or nothing answer a Status.
+class Action {
+ public:
+  Action() = default;
+  template <typename Work>
+  requires(!std::same_as<Work, Action>) Action(Work work)  // NOLINT(google-explicit-constructor): a lambda is one
+      : work_([work = std::move(work)]() -> Result<Extent> {
+          if constexpr (std::same_as<std::invoke_result_t<const Work&>, Status>) {
+            return work().map([] { return Extent::kAll; });
+          } else {
+            return work();
+          }
+        }) {}
+
+  [[nodiscard]] explicit operator bool() const { return static_cast<bool>(work_); }
+  [[nodiscard]] Result<Extent> operator()() const { return work_(); }
+
+ private:
+  std::function<Result<Extent>()> work_;
+};
 
 void add_plan_command(CLI::App& app, Action& chosen);
 void add_pose_commands(CLI::App& app, Action& chosen);         // simulate

@@ -184,25 +184,27 @@ ordered_json model_json(const CompensatedModel& model) {
     suspects.push_back(
         {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"sigmas", pose.sigmas}});
   }
-  ordered_json json = {{"model", provenance.id},
-                       {"hash", provenance.hash},
-                       {"cell", model.cell().name},
-                       {"level", provenance.level},
-                       {"bias", parts.bias ? parts.bias->kernel : "none"},
-                       {"batch", provenance.batch_id},
-                       {"batch_hash", provenance.batch_hash},
-                       {"trained_at_unix_s", provenance.trained_at},
-                       {"training_poses", provenance.training_poses},
-                       {"seed", provenance.seed},
-                       {"rank", parts.rank},
-                       {"condition_number", parts.condition_number},
-                       {"observability_index", parts.observability_index},
-                       {"cost_record", parts.cost_record},
-                       {"suspect_poses", suspects},
-                       {"correlations", correlations_json(parts)},
-                       {"parameters", parameters},
-                       {"not_identifiable", combinations},
-                       {"training", evaluation_json(parts.training)}};
+  ordered_json json = {
+      {"model", provenance.id},
+      {"hash", provenance.hash},
+      {"cell", model.cell().name},
+      {"level", provenance.level},
+      {"bias", parts.bias ? parts.bias->kernel : "none"},
+      {"batch", provenance.batch_id},
+      {"batch_hash", provenance.batch_hash},
+      {"trained_at_unix_s", provenance.trained_at},
+      {"measured_at_unix_s", provenance.measured_at ? ordered_json(*provenance.measured_at) : ordered_json(nullptr)},
+      {"training_poses", provenance.training_poses},
+      {"seed", provenance.seed},
+      {"rank", parts.rank},
+      {"condition_number", parts.condition_number},
+      {"observability_index", parts.observability_index},
+      {"cost_record", parts.cost_record},
+      {"suspect_poses", suspects},
+      {"correlations", correlations_json(parts)},
+      {"parameters", parameters},
+      {"not_identifiable", combinations},
+      {"training", evaluation_json(parts.training)}};
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
   if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);

@@ -1,10 +1,13 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <type_traits>
 
 #include "clients/cli/commands.h"
 #include "clients/cli/options.h"
 #include "clients/cli/output.h"
+#include "clients/cli/service_text.h"
 #include "server/base/text_file.h"
+#include "server/base/unix_time.h"
 
 namespace trammel::cli {
 
@@ -22,77 +25,13 @@ struct ServiceArguments {
   ServiceOptions service;
 };
 
-ordered_json job_json(const client::JobStatus& job) {
-  return {{"job", job.job},          {"cell", job.cell},   {"stage", job.stage},
-          {"what", job.what},        {"share", job.share}, {"model_version", job.model_version},
-          {"in_force", job.in_force}};
-}
-
-ordered_json model_json(const client::ModelInfo& model) {
-  return {{"cell", model.cell},
-          {"version", model.version},
-          {"in_force", model.in_force},
-          {"id", model.id},
-          {"hash", model.hash},
-          {"level", model.level},
-          {"batch", model.batch_id},
-          {"trained_at_unix_s", model.trained_at_unix_s},
-          {"data_age_s", model.data_age_s},
-          {"training_poses", model.training_poses},
-          {"validation_rms_mm", model.validation_rms_mm}};
-}
-
-ordered_json models_json(const std::vector<client::ModelInfo>& models) {
-  ordered_json json = ordered_json::array();
-  for (const client::ModelInfo& model : models) json.push_back(model_json(model));
-  return json;
-}
-
-std::string models_text(const std::vector<client::ModelInfo>& models) {
-  if (models.empty()) return "no models\n";
-  std::string text =
-      fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {}\n", "cell", "version", "id", "poses", "held out mm", "level");
-  for (const client::ModelInfo& model : models) {
-    text += fmt::format("{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {}\n", model.in_force ? '*' : ' ', model.cell,
-                        model.version, model.id, model.training_poses,
-                        model.validation_rms_mm > 0 ? fmt::format("{:.4f}", model.validation_rms_mm) : "-",
-                        model.level.empty() ? "nominal" : model.level);
-  }
-  return text + "  (* in force)\n";
-}
-
-std::string server_text(const client::ServerStatus& server) {
-  return fmt::format("server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
-                     server.server_id, server.version, server.state, server.uptime_s, server.requests, server.refused,
-                     server.queued_jobs,
-                     server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " ")));
-}
-
-ordered_json server_json(const client::ServerStatus& server) {
-  return {{"server", server.server_id},  {"version", server.version},        {"state", server.state},
-          {"cells", server.cells},       {"requests", server.requests},      {"refused", server.refused},
-          {"uptime_s", server.uptime_s}, {"queued_jobs", server.queued_jobs}};
-}
-
-std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches) {
-  std::string text;
-  for (const client::QuarantinedBatch& one : batches) {
-    text +=
-        fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell, one.poses, one.reason);
-  }
-  return text;
-}
-
-ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches) {
-  ordered_json list = ordered_json::array();
-  for (const client::QuarantinedBatch& one : batches) {
-    list.push_back({{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
-  }
-  return list;
+/// A job did all that it was to if it made no model, or one that is in force.
+Extent extent_of(const client::JobStatus& job) {
+  return job.model_version == 0 || job.in_force ? Extent::kAll : Extent::kPart;
 }
 
 /// Follows a job to its end; a failed one is an error.
-Status follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
   const Result<client::JobStatus> end = [&] {
     ProgressLine progress;
     return session.wait_for_job(job, std::chrono::milliseconds(static_cast<std::int64_t>(arguments.limit_s * 1e3)),
@@ -102,22 +41,30 @@ Status follow(client::Session& session, std::int64_t job, const ServiceArguments
                                 });
   }();
   if (!end) return tl::make_unexpected(end.error());
-  if (const Status written = write_json(arguments.json, job_json(*end)); !written) return written;
-  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
-  tell(fmt::format("job {} of cell {} {}: version {}{}\n", end->job, end->cell, end->stage, end->model_version,
-                   end->in_force ? ", in force" : ", not in force"),
-       {arguments.json});
-  return {};
+  if (const Status written = write_json(arguments.json, job_json(*end)); !written) {
+    return tl::make_unexpected(written.error());
+  }
+  const std::string next = next_step(*end);
+  if (end->stage == "failed") {
+    return refused("job {} of cell {} failed: {}{}{}", end->job, end->cell, end->what, next.empty() ? "" : "\n", next);
+  }
+  std::string text = fmt::format("job {} of cell {} {}", end->job, end->cell, end->stage);
+  if (end->model_version > 0) {
+    text += fmt::format(": version {}, {}", end->model_version, end->in_force ? "in force" : "not in force");
+  }
+  text += "\n" + (end->what.empty() ? "" : end->what + "\n") + (next.empty() ? "" : next + "\n");
+  tell(text, {arguments.json});
+  return extent_of(*end);
 }
 
 /// Tells the job's number, or with --watch follows it.
-Status started(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+Result<Extent> started(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
   if (arguments.watch) return follow(session, job, arguments);
   tell(fmt::format("job {}\n", job), {arguments.json});
-  return write_json(arguments.json, {{"job", job}});
+  return write_json(arguments.json, {{"job", job}}).map([] { return Extent::kAll; });
 }
 
-Status submit(client::Session& session, const ServiceArguments& arguments) {
+Result<Extent> submit(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<std::string> csv = read_text_file(arguments.batch);
@@ -129,17 +76,15 @@ Status submit(client::Session& session, const ServiceArguments& arguments) {
   return started(session, *job, arguments);
 }
 
-Status retrain(client::Session& session, const ServiceArguments& arguments) {
+Result<Extent> retrain(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   if (arguments.release && arguments.batch_ids.empty()) {
     return failure(ErrorCode::kUsage, "--release needs --batch: which one is good");
   }
-  for (const std::string& id : arguments.batch_ids) {
-    if (!arguments.release) break;
-    if (const Status released = session.release(*cell, id); !released) return released;
-  }
-  const Result<std::int64_t> job = session.train(*cell, arguments.batch_ids, arguments.level, arguments.bias);
+  const Result<std::int64_t> job =
+      arguments.release ? session.release_and_train(*cell, arguments.batch_ids, arguments.level, arguments.bias)
+                        : session.train(*cell, arguments.batch_ids, arguments.level, arguments.bias);
   if (!job) return tl::make_unexpected(job.error());
   return started(session, *job, arguments);
 }
@@ -151,18 +96,22 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   if (!models) return tl::make_unexpected(models.error());
   const Result<std::vector<client::QuarantinedBatch>> apart = session.quarantine("");
   if (!apart) return tl::make_unexpected(apart.error());
+  const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
+  if (!jobs) return tl::make_unexpected(jobs.error());
   std::string text;
   ordered_json list = ordered_json::array();
   for (const client::ServerStatus& server : *servers) {
     text += server_text(server);
     list.push_back(server_json(server));
   }
-  tell(text + models_text(*models) + quarantine_text(*apart), {arguments.json});
-  return write_json(arguments.json,
-                    {{"servers", list}, {"models", models_json(*models)}, {"quarantine", quarantine_json(*apart)}});
+  tell(text + models_text(*models, unix_now()) + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
+  return write_json(arguments.json, {{"servers", list},
+                                     {"models", models_json(*models)},
+                                     {"jobs", jobs_json(*jobs)},
+                                     {"quarantine", quarantine_json(*apart)}});
 }
 
-Status watch(client::Session& session, const ServiceArguments& arguments) {
+Result<Extent> watch(client::Session& session, const ServiceArguments& arguments) {
   return follow(session, arguments.job, arguments);
 }
 
@@ -171,7 +120,7 @@ Status list_models(client::Session& session, const ServiceArguments& arguments) 
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<std::vector<client::ModelInfo>> models = session.models(*cell);
   if (!models) return tl::make_unexpected(models.error());
-  tell(models_text(*models), {arguments.json});
+  tell(models_text(*models, unix_now()), {arguments.json});
   return write_json(arguments.json, {{"cell", *cell}, {"models", models_json(*models)}});
 }
 
@@ -222,9 +171,9 @@ class ServiceCommands {
  public:
   ServiceCommands(CLI::App& app, Action& chosen) : app_(app), chosen_(chosen) {}
 
-  using Talk = Status (*)(client::Session&, const ServiceArguments&);
-  /// A command whose action opens a session and hands it to `talk`. Its options are added by `add_options`.
-  template <typename AddOptions>
+  /// A command whose action opens a session and hands it to `talk`, a function of the session and the arguments that
+  /// answers as an Action does. Its options are added by `add_options`.
+  template <typename Talk, typename AddOptions>
   void add(const char* name, const char* description, Talk talk, AddOptions add_options) {
     const auto arguments = std::make_shared<ServiceArguments>();
     CLI::App* command = app_.add_subcommand(name, description);
@@ -232,7 +181,7 @@ class ServiceCommands {
     add_json_option(*command, arguments->json);
     add_service_options(*command, arguments->service);
     command->callback([arguments, talk, &chosen = chosen_] {
-      chosen = [arguments, talk]() -> Status {
+      chosen = [arguments, talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
         const auto session = open_session(arguments->service);
         if (!session) return tl::make_unexpected(session.error());
         return talk(**session, *arguments);
@@ -277,12 +226,13 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->allow_extra_args(false);
                  command.add_option("--level", arguments.level, "What to identify instead of the cell's error sources");
                  command.add_option("--bias", arguments.bias, "Kernel of the learned bias instead of the cell's");
-                 command.add_flag("--release", arguments.release,
-                                  "The batches named are good: take them out of quarantine first");
+                 command.add_flag(
+                     "--release", arguments.release,
+                     "The batches named are good: take them out of quarantine, if the training is accepted");
                  add_watch(command, arguments);
                });
-  commands.add("status", "Show the servers that answer, the models in force and the batches in quarantine", status,
-               [](CLI::App&, ServiceArguments&) {});
+  commands.add("status", "Show the servers that answer, the models in force, jobs, and the batches in quarantine",
+               status, [](CLI::App&, ServiceArguments&) {});
   commands.add("watch", "Follow a training until it is done", watch,
                [](CLI::App& command, ServiceArguments& arguments) {
                  command.add_option("--job", arguments.job, "Number that submit or retrain gave")->required();

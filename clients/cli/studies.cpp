@@ -301,7 +301,12 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
       context.q = q;
       return ((X_BW * robot.truth.pose_W(context)).translation() - correction.X_BT_wanted.translation()).norm();
     };
-    study.holes.push_back({holes[i].row, name, correction.status, true_error(context.q), true_error(correction.q)});
+    // One that is left alone is drilled where it is drilled uncorrected.
+    const JointVector uncorrected = context.q;
+    const bool corrected =
+        correction.status == CorrectionStatus::kOk || correction.status == CorrectionStatus::kOutOfDomain;
+    study.holes.push_back({holes[i].row, name, correction.status, true_error(uncorrected),
+                           true_error(corrected ? correction.q : uncorrected), correction.error_after});
   }
 }
 

@@ -47,6 +47,7 @@ struct DrilledHole {
   std::string model;
   CorrectionStatus status = CorrectionStatus::kRefused;
   double error_before = 0, error_after = 0;  ///< m, true distance from the wanted point, uncorrected and corrected
+  double expected_after = 0;                 ///< m, what the model said of error_after
 };
 
 struct Study {

@@ -146,11 +146,11 @@ std::string hole_table(const Study& study) {
   std::map<std::string, double> worst;
   for (const DrilledHole& hole : study.holes) {
     if (text.empty()) {
-      text = fmt::format("\n{:<12}{:<8}{:<16}{:>18}{:>18}\n", "hole in row", "model", "status", "true before, mm",
-                         "true after, mm");
+      text = fmt::format("\n{:<12}{:<8}{:<16}{:>18}{:>18}{:>16}\n", "hole in row", "model", "status", "true before, mm",
+                         "true after, mm", "expected, mm");
     }
-    text += fmt::format("{:<12}{:<8}{:<16}{:>18.4f}{:>18.4f}\n", hole.row, hole.model, to_string(hole.status),
-                        to_mm(hole.error_before), to_mm(hole.error_after));
+    text += fmt::format("{:<12}{:<8}{:<16}{:>18.4f}{:>18.4f}{:>16.4f}\n", hole.row, hole.model, to_string(hole.status),
+                        to_mm(hole.error_before), to_mm(hole.error_after), to_mm(hole.expected_after));
     worst[hole.model] = std::max(worst[hole.model], hole.error_after);
   }
   for (const auto& [model, error] : worst) {
@@ -199,7 +199,8 @@ ordered_json hole_json(const DrilledHole& hole) {
           {"model", hole.model},
           {"status", to_string(hole.status)},
           {"error_before_mm", to_mm(hole.error_before)},
-          {"error_after_mm", to_mm(hole.error_after)}};
+          {"error_after_mm", to_mm(hole.error_after)},
+          {"expected_after_mm", to_mm(hole.expected_after)}};
 }
 
 }  // namespace

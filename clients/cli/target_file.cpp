@@ -79,10 +79,11 @@ Result<TargetFile> parse_targets_csv(const std::string& text, const std::string&
   const Result<TargetColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
   if (table->size() == 0) return refused("{}: no targets below the header, at least 1 is needed", where);
-  TargetFile file{where, columns->commanded.joint_types(), {}};
+  TargetFile file{where, columns->commanded.joint_types(), {}, table->columns()};
   for (std::size_t row = 0; row < table->size(); ++row) {
     TargetRow& target = file.rows.emplace_back();
     target.row = table->line(row);
+    for (std::size_t k = 0; k < file.columns.size(); ++k) target.fields.push_back(table->field(row, k));
     if (const Status read = read_target(*table, row, *columns, target.target); !read) {
       return tl::make_unexpected(read.error());
     }

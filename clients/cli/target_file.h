@@ -12,16 +12,18 @@ namespace trammel::cli {
 struct TargetRow {
   int row = 0;
   Target target;
+  std::vector<std::string> fields = {};  ///< as they stand there, one a column
 };
 
 struct TargetFile {
   std::string where;
   std::vector<JointType> joint_types;  ///< of the joint columns; empty when there are none
   std::vector<TargetRow> rows;
+  std::vector<std::string> columns = {};  ///< of the file, all of them
 };
 
 /// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or `q1_deg`... as the seed,
-/// or `q1_deg`... alone. Other columns are passed over. Refuses as batches are, and a pose with neither conf nor seed.
+/// or `q1_deg`... alone. Other columns are kept. Refuses as batches are, and a pose with neither conf nor seed.
 [[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 

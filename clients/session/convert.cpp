@@ -178,6 +178,48 @@ Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json) {
   return batches;
 }
 
+std::string release_text(const std::vector<std::string>& batch_ids, const std::string& level, const std::string& bias) {
+  return nlohmann::ordered_json({{"batches", batch_ids}, {"level", level}, {"bias", bias}})
+      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+namespace {
+
+DatedJob job_from(const nlohmann::json& one, const std::string& server) {
+  const auto time = [&](const char* key) -> std::optional<std::int64_t> {
+    if (!one.contains(key) || !one[key].is_number_integer()) return std::nullopt;
+    return one[key].get<std::int64_t>();
+  };
+  DatedJob job;
+  job.server = server;
+  job.kind = one.value("kind", "");
+  job.batches = one.value("batches", std::vector<std::string>());
+  job.status = {one.value("job", std::int64_t{0}),
+                one.value("cell", ""),
+                one.value("stage", ""),
+                one.value("what", ""),
+                one.value("share", 0.0),
+                one.value("model_version", 0),
+                one.value("in_force", false)};
+  job.created_unix_s = time("created_unix_s").value_or(0);
+  job.started_unix_s = time("started_unix_s");
+  job.finished_unix_s = time("finished_unix_s");
+  return job;
+}
+
+}  // namespace
+
+Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::string& server) {
+  try {
+    std::vector<DatedJob> jobs;
+    const auto list = nlohmann::json::parse(json);
+    for (const auto& one : list.at("jobs")) jobs.push_back(job_from(one, server));
+    return jobs;
+  } catch (const nlohmann::json::exception& error) {
+    return failure(ErrorCode::kInternal, "the list of jobs of server {} is none: {}", server, error.what());
+  }
+}
+
 Error error_of(const wire::ReplyHeader& header) { return {from_wire(header.result()), header.message()}; }
 
 }  // namespace trammel::client

@@ -8,25 +8,31 @@ namespace {
 
 constexpr std::size_t kJobsRemembered = 1000;
 
+double unix_time_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticipant& participant,
                                                        wire::dds::Subscriber& subscriber) {
   std::unique_ptr<ServerWatch> watch(new ServerWatch);
   ServerWatch* self = watch.get();
-  auto status = StateReader<wire::ServiceStatusTopic>::open(
-      participant, subscriber, wire::state_reader_qos(),
-      [self](const wire::ServiceStatus* sample, const std::string& writer) { self->on_status(sample, writer); });
+  auto status =
+      StateReader<wire::ServiceStatusTopic>::open(participant, subscriber, wire::state_reader_qos(),
+                                                  [self](const wire::ServiceStatus* sample, const std::string& writer,
+                                                         double) { self->on_status(sample, writer); });
   if (!status) return tl::make_unexpected(status.error());
   watch->status_reader_ = std::move(*status);
-  auto model = StateReader<wire::ModelStatusTopic>::open(
-      participant, subscriber, wire::state_reader_qos(),
-      [self](const wire::ModelStatus* sample, const std::string& writer) { self->on_model(sample, writer); });
+  auto model =
+      StateReader<wire::ModelStatusTopic>::open(participant, subscriber, wire::state_reader_qos(),
+                                                [self](const wire::ModelStatus* sample, const std::string& writer,
+                                                       double written) { self->on_model(sample, writer, written); });
   if (!model) return tl::make_unexpected(model.error());
   watch->model_reader_ = std::move(*model);
   auto progress = StateReader<wire::TrainingProgressTopic>::open(
       participant, subscriber, wire::progress_reader_qos(),
-      [self](const wire::TrainingProgress* sample, const std::string&) { self->on_progress(sample); });
+      [self](const wire::TrainingProgress* sample, const std::string&, double) { self->on_progress(sample); });
   if (!progress) return tl::make_unexpected(progress.error());
   watch->progress_reader_ = std::move(*progress);
   return watch;
@@ -86,7 +92,9 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
     });
   });
   std::map<std::string, wire::ModelInfo> newest;
-  for (const auto& [key, model] : models_) {
+  for (const auto& [key, known] : models_) {
+    wire::ModelInfo model = known.model;
+    model.data_age_s(model.data_age_s() + std::max(0.0, unix_time_s() - known.written_unix_s));
     const auto [entry, added] = newest.emplace(key.second, model);
     if (!added && model.version() > entry->second.version()) entry->second = model;
   }
@@ -122,11 +130,11 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
   changed_.notify_all();
 }
 
-void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant) {
+void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s) {
   {
     const std::lock_guard lock(mutex_);
     if (status != nullptr) {
-      models_[{participant, status->cell().to_string()}] = status->model();
+      models_[{participant, status->cell().to_string()}] = {status->model(), written_unix_s};
     } else {
       std::erase_if(models_, [&](const auto& entry) { return entry.first.first == participant; });
     }

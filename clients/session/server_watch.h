@@ -25,8 +25,8 @@ template <typename State>
 class StateReader final : private wire::dds::DataReaderListener {
  public:
   using Sample = typename State::Type::type;
-  /// The sample and the participant that wrote it; no sample: the participant has left.
-  using Listener = std::function<void(const Sample*, const std::string& participant)>;
+  /// The sample, the participant that wrote it and when (Unix time, s); no sample: the participant has left.
+  using Listener = std::function<void(const Sample*, const std::string& participant, double written_unix_s)>;
 
   [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(wire::dds::DomainParticipant& participant,
                                                                  wire::dds::Subscriber& subscriber,
@@ -54,13 +54,15 @@ class StateReader final : private wire::dds::DataReaderListener {
     Sample sample;
     wire::dds::SampleInfo info;
     while (reader->take_next_sample(&sample, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-      if (info.valid_data) listener_(&sample, wire::participant_of(info.sample_identity.writer_guid()));
+      if (!info.valid_data) continue;
+      const double written = 1e-9 * static_cast<double>(info.source_timestamp.to_ns());
+      listener_(&sample, wire::participant_of(info.sample_identity.writer_guid()), written);
     }
   }
 
   void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
     if (status.current_count_change >= 0) return;
-    listener_(nullptr, wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle)));
+    listener_(nullptr, wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle)), 0);
   }
 
   wire::dds::Subscriber& subscriber_;
@@ -75,6 +77,12 @@ struct KnownServer {
   Clock::time_point heard;
 
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
+};
+
+/// A model in force as it was described at a time.
+struct KnownModel {
+  wire::ModelInfo model;
+  double written_unix_s = 0;
 };
 
 /// What servers say without being asked, and which of them are there. Thread-safe.
@@ -93,7 +101,8 @@ class ServerWatch {
 
   /// Waits until `count` servers are known, or until `deadline`; after the first one only as long as a status takes.
   [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count, Clock::time_point deadline);
-  /// Waits for as many models as the servers say they have in force, one status period at most.
+  /// Waits for as many models as the servers say they have in force, one status period at most. Their data's age is
+  /// that of now, not that of when they were put in force.
   [[nodiscard]] std::vector<wire::ModelInfo> models_in_force();
 
   /// Waits for a progress of the job that is later than the `seen`-th (which it updates); empty at `deadline`. An empty
@@ -104,15 +113,15 @@ class ServerWatch {
  private:
   ServerWatch() = default;
   void on_status(const wire::ServiceStatus* status, const std::string& participant);
-  void on_model(const wire::ModelStatus* status, const std::string& participant);
+  void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
   void on_progress(const wire::TrainingProgress* progress);
   [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
                                           const std::function<bool(const KnownServer&)>& reachable) const;
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::map<std::string, KnownServer> servers_;                             // guarded by mutex_; by id
-  std::map<std::pair<std::string, std::string>, wire::ModelInfo> models_;  // guarded; by participant and cell
+  std::map<std::string, KnownServer> servers_;                        // guarded by mutex_; by id
+  std::map<std::pair<std::string, std::string>, KnownModel> models_;  // guarded; by participant and cell
   std::map<std::int64_t, std::map<std::string, std::pair<std::uint64_t, wire::Job>>> jobs_;  // guarded; by server
   std::uint64_t progress_count_ = 0;                                                         // guarded by mutex_
   std::unique_ptr<StateReader<wire::ServiceStatusTopic>> status_reader_;

@@ -272,6 +272,32 @@ Status Session::release(const std::string& cell, const std::string& batch_id) {
   return {};
 }
 
+Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,
+                                                const std::string& level, const std::string& bias) {
+  const auto reply =
+      participant_->manage(cell, wire::MANAGE_RELEASE_AND_TRAIN, 0, release_text(batch_ids, level, bias));
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job().number();
+}
+
+Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
+  const auto known = servers();
+  if (!known) return tl::make_unexpected(known.error());
+  std::vector<DatedJob> jobs;
+  for (const ServerStatus& server : *known) {
+    wire::ManageModelsRequest request;
+    request.about().cell(cell);
+    request.action(wire::MANAGE_JOBS);
+    const auto reply = participant_->call<wire::ManageModels>(*participant_->manage_models, std::move(request),
+                                                              {cell, server.server_id, false});
+    if (!reply) return tl::make_unexpected(reply.error());
+    auto listed = jobs_from(reply->text(), server.server_id);
+    if (!listed) return listed;
+    jobs.insert(jobs.end(), listed->begin(), listed->end());
+  }
+  return jobs;
+}
+
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
   const auto reply = participant_->manage(cell, wire::MANAGE_LIST, 0);
   if (!reply) return tl::make_unexpected(reply.error());

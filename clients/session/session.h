@@ -39,7 +39,7 @@ struct ModelInfo {
   std::string cell, id, hash, level, batch_id;
   int version = 0;
   std::int64_t trained_at_unix_s = 0;
-  double data_age_s = 0;
+  double data_age_s = 0;  ///< of its newest measurement, now
   int training_poses = 0;
   double validation_rms_mm = 0;
   bool in_force = false;
@@ -80,6 +80,15 @@ struct JobStatus {
   double share = 0;
   int model_version = 0;
   bool in_force = false;
+};
+
+/// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
+struct DatedJob {
+  JobStatus status;
+  std::string server, kind;  ///< kind: `train diagnose`
+  std::vector<std::string> batches;
+  std::int64_t created_unix_s = 0;
+  std::optional<std::int64_t> started_unix_s, finished_unix_s;
 };
 
 /// What a diagnosis found.
@@ -131,6 +140,12 @@ class Session {
   /// Of every server, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  /// As train(), from batches that leave quarantine with it: only if the training is accepted.
+  [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
+                                                       const std::vector<std::string>& batch_ids,
+                                                       const std::string& level, const std::string& bias);
+  /// Of every server, of one cell or (empty) of all, oldest first: what waits or runs and what ended lately.
+  [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version);

@@ -1,5 +1,6 @@
 #include "server/base/text_file.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -8,6 +9,8 @@
 #include <fstream>
 #include <sstream>
 #include <system_error>
+
+#include "server/base/unix_time.h"
 
 namespace trammel {
 
@@ -26,6 +29,12 @@ Result<std::string> read_text_file(const std::string& path, std::size_t limit_by
   text << in.rdbuf();
   if (!in) return refused("{}: cannot be read: {}", path, std::strerror(errno));
   return std::move(text).str();
+}
+
+std::int64_t written_at(const std::string& path) {
+  struct stat about {};
+  const bool is_file = ::stat(path.c_str(), &about) == 0 && S_ISREG(about.st_mode);
+  return is_file ? static_cast<std::int64_t>(about.st_mtime) : unix_now();
 }
 
 namespace {

@@ -8,14 +8,12 @@
 #include "server/base/units.h"
 #include "server/bias/kernel_spelling.h"
 #include "server/compensate/model_file.h"
-#include "server/robot/inverse_kinematics.h"
 
 namespace trammel {
 
 namespace {
 
 constexpr double kInterval95 = 1.959963984540;  // standard deviations
-constexpr double kRotationTolerance = 1e-7;     // rad, of a corrected target
 
 /// Mean over the coordinates of minus the log density of errors in normal distributions of these stddevs, nat.
 std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
@@ -52,26 +50,6 @@ ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
         ((e_B.colwise() - figures.axis_mean).rowwise().squaredNorm() / static_cast<double>(n - 1)).cwiseSqrt();
   }
   return figures;
-}
-
-std::string_view to_string(CorrectionStatus status) {
-  switch (status) {
-    case CorrectionStatus::kOk:
-      return "ok";
-    case CorrectionStatus::kOutOfDomain:
-      return "out_of_domain";
-    case CorrectionStatus::kJointLimit:
-      return "joint_limit";
-    case CorrectionStatus::kUnreachable:
-      return "unreachable";
-    case CorrectionStatus::kSingular:
-      return "singular";
-    case CorrectionStatus::kNotConverged:
-      return "not_converged";
-    case CorrectionStatus::kRefused:
-      return "refused";
-  }
-  return "refused";
 }
 
 namespace {
@@ -182,100 +160,6 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
   }
   return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
                  cell().name, tool, payload, known);
-}
-
-Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
-                                     const CorrectOptions& options) const {
-  const Chain& robot = cell().robot;
-  PoseContext context;
-  context.tool = tool;
-  context.payload = payload;
-  context.served = true;
-  Correction result;
-  const auto end = [&](CorrectionStatus status, std::string message) {
-    result.status = status;
-    result.message = std::move(message);
-    return result;
-  };
-
-  const Pose X_TF = parts().physics.tools.at(tool).inverse();
-  // The joints the controller would go to for a tool pose, by its nominal inverse kinematics.
-  const auto nominal_joints = [&](const Pose& X_BT, const JointVector& seed) {
-    return inverse_kinematics(robot, X_BT * X_TF, seed);
-  };
-  InverseResult joints;
-  if (target.joint_target) {
-    if (!target.seed) return end(CorrectionStatus::kRefused, "a joint target without joints");
-    context.q = *target.seed;
-    if (robot.joint_outside_limits(context.q))
-      joints.status = InverseStatus::kJointLimit;
-    else
-      joints.status = InverseStatus::kOk;
-    joints.q = context.q;
-    result.X_BT_wanted = parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context);
-  } else {
-    result.X_BT_wanted = target.X_BT;
-    if (target.conf) {
-      const Result<InverseResult> branch = inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
-      if (!branch) return end(CorrectionStatus::kRefused, branch.error().message);
-      joints = *branch;
-    } else if (target.seed) {
-      joints = nominal_joints(target.X_BT, *target.seed);
-    } else {
-      return end(CorrectionStatus::kRefused, "a target needs a branch (conf) or joints as a seed");
-    }
-  }
-  result.X_BT_commanded = result.X_BT_wanted;
-  result.q = joints.q;
-
-  const auto why = [&](InverseStatus status) {
-    switch (status) {
-      case InverseStatus::kJointLimit:
-        return end(CorrectionStatus::kJointLimit, "only reachable outside the joint limits");
-      case InverseStatus::kSingular:
-        return end(CorrectionStatus::kSingular, "the arm is singular there");
-      default:
-        return end(CorrectionStatus::kUnreachable, "no joints bring the tool there");
-    }
-  };
-  if (joints.status != InverseStatus::kOk) return why(joints.status);
-
-  context.q = joints.q;
-  ErrorPrediction prediction = predict(context, std::nullopt);
-  // Decided once, at the target: what the bias is worth there does not change by the little that a correction moves.
-  const bool in_domain = prediction.in_domain;
-  const double bias_weight = prediction.bias_weight;
-  result.error_before = (prediction.X_BT_predicted.translation() - result.X_BT_wanted.translation()).norm();
-  Vector6 missing = pose_difference(result.X_BT_wanted, prediction.X_BT_predicted);
-  const auto settled = [&] {
-    return missing.head<3>().norm() < options.tolerance && missing.tail<3>().norm() < kRotationTolerance;
-  };
-  // Until it settles only the mean is asked for: the variance costs a hundred times as much.
-  while (!settled() && result.iterations < options.max_iterations) {
-    ++result.iterations;
-    result.X_BT_commanded.translation() += missing.head<3>();
-    result.X_BT_commanded.linear() = (rotation_exp(missing.tail<3>()) * result.X_BT_commanded.linear()).eval();
-    joints = nominal_joints(result.X_BT_commanded, context.q);
-    if (joints.status != InverseStatus::kOk) return why(joints.status);
-    context.q = joints.q;
-    missing = pose_difference(result.X_BT_wanted, pose_B(context, bias_weight));
-  }
-  if (result.iterations > 0) prediction = predict(context, bias_weight);
-  result.q = joints.q;
-  result.error_after = missing.head<3>().norm();
-  result.stddev = prediction.stddev_B.norm();
-  if (!settled()) {
-    return end(CorrectionStatus::kNotConverged,
-               fmt::format("{:.2e} mm left after {} iterations", 1e3 * result.error_after, result.iterations));
-  }
-  if (!in_domain) {
-    const bool has_blocks = inside_->bias && inside_->bias->needs_features();
-    return end(CorrectionStatus::kOutOfDomain,
-               fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
-                           has_blocks ? ", the blocks of the bias" : "", 100 * bias_weight,
-                           has_blocks ? "its kernel" : "the learned bias"));
-  }
-  return end(CorrectionStatus::kOk, "");
 }
 
 bool CompensatedModel::is_own(const MeasurementBatch& batch) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -13,6 +14,7 @@
 #include "server/bias/choose_bias.h"
 #include "server/calibrate/calibrate.h"
 #include "server/compensate/bias_physics.h"
+#include "server/robot/inverse_kinematics.h"
 
 namespace trammel {
 
@@ -73,16 +75,22 @@ struct Target {
   bool joint_target = false;        ///< X_BT is unset: the pose wanted is the nominal one of `seed`
 };
 
+/// A target as corrected; one that is neither ok nor out of domain is left alone: commanded as it was wanted. What to
+/// expect are root mean squares of the true distance from the target, without the instrument's own noise; NaN where no
+/// joints bring the tool there, so that nothing can be said.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();
   Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
   JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
-  double error_before = 0;                 ///< m, expected |error| without correction
-  double error_after = 0;                  ///< m, what the iteration left
-  double stddev = 0;                       ///< m, root sum of squares of the three axes, of the tool position reached
+  double error_before = kNothingToSay;     ///< m, to expect without correction
+  double error_after = kNothingToSay;      ///< m, to expect with it; left alone, the same as before
+  double stddev = kNothingToSay;           ///< m, of the true position reached, per axis: root mean square of the three
+  double left = 0;                         ///< m, what the iteration left; part of error_after
   int iterations = 0;
   std::string message;  ///< why not ok
+
+  static constexpr double kNothingToSay = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct CorrectOptions {
@@ -98,6 +106,8 @@ struct ModelProvenance {
   std::string batch_id;
   std::string batch_hash;       ///< of the batch text
   std::int64_t trained_at = 0;  ///< Unix time, s
+  /// Unix time, s, of the newest measurement that it was made from; empty where nobody recorded it.
+  std::optional<std::int64_t> measured_at;
   int training_poses = 0;
   std::uint64_t seed = 0;
   std::string program_version;
@@ -200,6 +210,22 @@ class CompensatedModel {
   /// approached, how warm the arm is.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
+  /// The joints that the controller goes to for a target as it stands.
+  [[nodiscard]] Result<InverseResult> nominal_joints(const Target& target, const Pose& X_TF) const;
+  /// How far the iteration came from the nominal joints to those that bring the tool where it is wanted.
+  struct Approach {
+    Pose X_BT_commanded;
+    InverseResult joints;  ///< the last ones asked for; not kOk: it ended there
+    Vector6 missing;       ///< of the pose wanted: m, rad
+    int iterations = 0;
+    bool settled = false;
+  };
+  /// From the joints in `context`, where the tool is predicted to be at `X_BT_predicted`.
+  [[nodiscard]] Approach approach(const Pose& X_BT_wanted, PoseContext context, const Pose& X_BT_predicted,
+                                  double bias_weight, const CorrectOptions& options) const;
+  /// The other branches (conf) on which the target can be corrected; none where the arm's have no numbers.
+  [[nodiscard]] std::vector<int> branches_that_reach(const Target& asked, const Pose& X_BT_wanted, PoseContext context,
+                                                     const CorrectOptions& options) const;
   void add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,
                      const std::vector<ErrorPrediction>& predictions, LevelErrors* errors) const;
   [[nodiscard]] bool is_own(const MeasurementBatch& batch) const;

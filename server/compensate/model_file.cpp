@@ -333,8 +333,10 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.provenance.batch_hash = provenance.at("batch_hash");
   parts.provenance.training_poses = provenance.at("training_poses");
   parts.provenance.seed = provenance.at("seed");
-  parts.provenance.trained_at = file.at("stamp").at("trained_at");
-  parts.provenance.program_version = file.at("stamp").at("program_version");
+  const Json& stamp = file.at("stamp");
+  parts.provenance.trained_at = stamp.at("trained_at");
+  parts.provenance.program_version = stamp.at("program_version");
+  if (stamp.contains("measured_at")) parts.provenance.measured_at = stamp.at("measured_at").get<std::int64_t>();
   return CompensatedModel::make(std::move(parts)).map_error([&](Error error) {
     error.message = where + ": " + error.message;
     return error;
@@ -347,11 +349,12 @@ std::string content_hash(const CompensatedModel::Parts& parts) { return sha256_h
 
 std::string serialize(const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
-  const Json file = {
-      {"trammel_model", kFormat},
-      {"hash", provenance.hash},
-      {"stamp", {{"trained_at", provenance.trained_at}, {"program_version", provenance.program_version}}},
-      {"content", content_of(model.parts())}};
+  Json stamp = {{"trained_at", provenance.trained_at}, {"program_version", provenance.program_version}};
+  if (provenance.measured_at) stamp["measured_at"] = *provenance.measured_at;
+  const Json file = {{"trammel_model", kFormat},
+                     {"hash", provenance.hash},
+                     {"stamp", std::move(stamp)},
+                     {"content", content_of(model.parts())}};
   return file.dump() + "\n";
 }
 

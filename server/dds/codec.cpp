@@ -75,7 +75,7 @@ wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t n
   info.batch_id(provenance.batch_id);
   info.version(served.version);
   info.trained_at_unix_s(provenance.trained_at);
-  info.data_age_s(age_s(provenance.trained_at, now_unix_s));
+  info.data_age_s(age_s(provenance.measured_at.value_or(provenance.trained_at), now_unix_s));
   info.training_poses(provenance.training_poses);
   info.validation_rms_mm(validation ? to_mm(validation->compensated.rms) : 0);
   info.in_force(in_force);
@@ -90,8 +90,8 @@ wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s) {
   info.level(stored.level);
   info.batch_id(stored.batch_id);
   info.version(stored.version);
-  info.trained_at_unix_s(stored.created_at);
-  info.data_age_s(age_s(stored.created_at, now_unix_s));
+  info.trained_at_unix_s(stored.trained_at);
+  info.data_age_s(age_s(stored.measured_at.value_or(stored.trained_at), now_unix_s));
   info.training_poses(stored.training_poses);
   info.validation_rms_mm(to_mm(stored.validation_rms));
   info.in_force(stored.in_force);

@@ -6,7 +6,7 @@ namespace trammel {
 namespace {
 
 /// Keeps the largest reply below its sample limit.
-constexpr std::size_t kMaxMessage = 120;
+constexpr std::size_t kMaxMessage = 180;
 constexpr int kMaxConf = 7;
 
 Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const std::string& where) {

@@ -57,6 +57,8 @@ class Handlers {
 
  private:
   [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ManageModelsReply> release_and_train(const std::string& cell, const std::string& text);
 
   Trainer& trainer_;
   Store& store_;

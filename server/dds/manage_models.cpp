@@ -19,6 +19,62 @@ std::string as_json(const std::vector<StoredBatch>& batches) {
   return list.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
+const char* text(JobStage stage) {
+  switch (stage) {
+    case JobStage::kQueued:
+      return "queued";
+    case JobStage::kTraining:
+      return "training";
+    case JobStage::kStoring:
+      return "storing";
+    case JobStage::kDone:
+      return "done";
+    case JobStage::kFailed:
+      return "failed";
+  }
+  return "failed";
+}
+
+nlohmann::ordered_json as_json(const std::optional<std::int64_t>& unix_s) {
+  return unix_s ? nlohmann::ordered_json(*unix_s) : nlohmann::ordered_json(nullptr);
+}
+
+std::string as_json(const std::vector<Trainer::DatedJob>& jobs) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const auto& [asked, progress] : jobs) {
+    list.push_back({{"job", progress.job},
+                    {"cell", progress.cell},
+                    {"kind", asked.kind == JobKind::kDiagnose ? "diagnose" : "train"},
+                    {"stage", text(progress.stage)},
+                    {"what", progress.what},
+                    {"share", progress.share},
+                    {"batches", asked.batch_ids},
+                    {"model_version", progress.model_version},
+                    {"in_force", progress.in_force},
+                    {"created_unix_s", asked.created_at},
+                    {"started_unix_s", as_json(asked.started_at)},
+                    {"finished_unix_s", as_json(asked.finished_at)}});
+  }
+  return nlohmann::ordered_json({{"jobs", std::move(list)}})
+      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+/// What MANAGE_RELEASE_AND_TRAIN asks for.
+struct ReleasedTraining {
+  std::vector<std::string> batches;
+  std::string level, bias;
+};
+
+Result<ReleasedTraining> released_training(const std::string& text) {
+  try {
+    const auto json = nlohmann::json::parse(text);
+    return ReleasedTraining{json.at("batches").get<std::vector<std::string>>(), json.value("level", ""),
+                            json.value("bias", "")};
+  } catch (const nlohmann::json::exception& error) {
+    return refused("what to release and to train from is not said: {}", error.what());
+  }
+}
+
 }  // namespace
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
@@ -31,6 +87,7 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
   }
 
   if (request.action() == wire::MANAGE_QUARANTINE && request.about().cell().empty()) return quarantine_of("");
+  if (request.action() == wire::MANAGE_JOBS && request.about().cell().empty()) return jobs_of("");
 
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const std::string& cell = request.about().cell();
@@ -85,10 +142,38 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
       if (!released) return tl::make_unexpected(released.error());
       return reply;
     }
+    case wire::MANAGE_RELEASE_AND_TRAIN:
+      return release_and_train(cell, request.text());
+    case wire::MANAGE_JOBS:
+      return jobs_of(cell);
     case wire::MANAGE_JOB:
       break;
   }
   TRAMMEL_CHECK(false);
+}
+
+Result<wire::ManageModelsReply> Handlers::jobs_of(const std::string& cell) const {
+  const auto jobs = trainer_.jobs(cell);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  wire::ManageModelsReply reply;
+  reply.text(as_json(*jobs));
+  return reply;
+}
+
+Result<wire::ManageModelsReply> Handlers::release_and_train(const std::string& cell, const std::string& text) {
+  const auto wanted = released_training(text);
+  if (!wanted) return tl::make_unexpected(wanted.error());
+  if (wanted->batches.size() > wire::MAX_BATCHES) {
+    return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", wanted->batches.size(),
+                   wire::MAX_BATCHES);
+  }
+  const auto job = trainer_.retrain(cell, wanted->batches, wanted->level, wanted->bias, Trainer::Quarantine::kReleased);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto progress = trainer_.progress(*job);
+  if (!progress) return tl::make_unexpected(progress.error());
+  wire::ManageModelsReply reply;
+  reply.job(to_wire(*progress));
+  return reply;
 }
 
 Result<wire::ManageModelsReply> Handlers::quarantine_of(const std::string& cell) const {
@@ -101,7 +186,8 @@ Result<wire::ManageModelsReply> Handlers::quarantine_of(const std::string& cell)
 
 bool happens_once(const wire::ManageModelsRequest& request) {
   return request.action() == wire::MANAGE_ACTIVATE || request.action() == wire::MANAGE_ROLLBACK ||
-         request.action() == wire::MANAGE_IMPORT || request.action() == wire::MANAGE_RELEASE;
+         request.action() == wire::MANAGE_IMPORT || request.action() == wire::MANAGE_RELEASE ||
+         request.action() == wire::MANAGE_RELEASE_AND_TRAIN;
 }
 
 }  // namespace trammel

@@ -129,7 +129,9 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
 }
 
 Result<MeasurementBatch> read_batch_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_batch_csv(text, path); });
+  return read_text_file(path)
+      .and_then([&](const std::string& text) { return parse_batch_csv(text, path); })
+      .map([&](MeasurementBatch batch) { return dated(std::move(batch), written_at(path)); });
 }
 
 namespace {

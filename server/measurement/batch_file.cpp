@@ -67,7 +67,9 @@ Result<MeasurementBatch> parse_batch(const std::string& text, const std::string&
 }
 
 Result<MeasurementBatch> read_batch(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_batch(text, path); });
+  return read_text_file(path)
+      .and_then([&](const std::string& text) { return parse_batch(text, path); })
+      .map([&](MeasurementBatch batch) { return dated(std::move(batch), written_at(path)); });
 }
 
 }  // namespace trammel

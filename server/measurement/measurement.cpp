@@ -12,6 +12,24 @@
 
 namespace trammel {
 
+namespace {
+
+constexpr double kOldestUnixTime = 1e9;  // s: September 2001; what is less counts from some other start
+constexpr double kClockAhead = 86400;    // s by which the instrument's clock may be ahead of ours
+
+}  // namespace
+
+MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in) {
+  std::optional<double> newest;
+  for (const Measurement& m : batch.measurements) {
+    const double time = m.context.time.value_or(0);
+    if (time < kOldestUnixTime || time > static_cast<double>(taken_in) + kClockAhead) continue;
+    newest = std::max(newest.value_or(time), time);
+  }
+  batch.measured_at = newest ? static_cast<std::int64_t>(*newest) : taken_in;
+  return batch;
+}
+
 Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& cell) {
   const std::string where = batch.where.empty() ? "batch " + batch.id : batch.where;
   if (batch.measurements.empty()) return refused("{}: no measurements, at least 1 is needed", where);

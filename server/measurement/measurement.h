@@ -33,7 +33,13 @@ struct MeasurementBatch {
   std::vector<JointType> joint_types;      ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
   std::vector<std::string> extra_columns;  ///< header names of columns that Trammel does not know, kept
   std::string source_text;                 ///< the CSV as it came
+  std::optional<std::int64_t> measured_at = {};  ///< Unix time, s, of the newest measurement; empty = nobody knows
 };
+
+/// The batch with its measured_at: the latest `time_s` where that column is Unix time, else `taken_in`, when the batch
+/// was received or its file was written (Unix time, s). Times from before 2001 count from some start of their own, and
+/// those of more than a day after `taken_in` are no times of day.
+[[nodiscard]] MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in);
 
 /// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit: an empty file, a
 /// missing or doubled column, a row of another length, a number that is not finite, a quaternion that is not a unit one

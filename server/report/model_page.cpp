@@ -127,6 +127,7 @@ std::string provenance_table(const CompensatedModel& model, const Evaluation& ev
          line("error sources", provenance.level.empty() ? "none (nominal)" : provenance.level) +
          line("learned bias", bias_text(parts)) + line("batch", provenance.batch_id) +
          line("batch hash (SHA-256)", provenance.batch_hash) +
+         line("newest measurement", provenance.measured_at ? date_of(*provenance.measured_at) : "not recorded") +
          line("trained", fmt::format("{}, {} poses, seed {}, trammel {}", date_of(provenance.trained_at),
                                      provenance.training_poses, provenance.seed, provenance.program_version)) +
          line("joints of the training", trained_ranges(model)) +

@@ -97,6 +97,28 @@ CREATE TABLE diagnoses (
 );
 )sql";
 
+/// Beside the tables of the schema, so that programs that do not know them can still open the file: when jobs began and
+/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded).
+constexpr const char* kTimes = R"sql(
+CREATE TABLE IF NOT EXISTS job_times (
+  job         INTEGER PRIMARY KEY REFERENCES jobs (id),
+  started_at  INTEGER,
+  finished_at INTEGER
+);
+CREATE TABLE IF NOT EXISTS model_times (
+  cell        TEXT    NOT NULL,
+  version     INTEGER NOT NULL,
+  trained_at  INTEGER NOT NULL,
+  measured_at INTEGER,
+  PRIMARY KEY (cell, version),
+  FOREIGN KEY (cell, version) REFERENCES models (cell, version)
+) WITHOUT ROWID;
+INSERT INTO model_times (cell, version, trained_at)
+  SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models
+  WHERE NOT EXISTS (SELECT 1 FROM model_times t WHERE t.cell = models.cell AND t.version = models.version)
+    AND json_valid(content) AND json_type(content, '$.stamp.trained_at') = 'integer';
+)sql";
+
 constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
                                                                          {JobState::kRunning, "running"},
                                                                          {JobState::kDone, "done"},
@@ -149,7 +171,13 @@ std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind FROM jobs ";
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at "
+    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id ";
+
+std::optional<std::int64_t> optional_integer(SQLite::Statement& row, int column) {
+  if (row.isColumnNull(column)) return std::nullopt;
+  return row.getColumn(column).getInt64();
+}
 
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
@@ -163,6 +191,8 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.model_version = row.getColumn(7).getInt();
   job.attempts = row.getColumn(8).getInt();
   job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
+  job.started_at = optional_integer(row, 10);
+  job.finished_at = optional_integer(row, 11);
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -171,6 +201,26 @@ Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = ?").c_str(), id);
   if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id);
   return job_of(database, row);
+}
+
+std::vector<StoredJob> jobs_of(SQLite::Database& database, SQLite::Statement rows) {
+  std::vector<StoredJob> jobs;
+  while (rows.executeStep()) jobs.push_back(job_of(database, rows));
+  return jobs;
+}
+
+void record_start(SQLite::Database& database, std::int64_t job) {
+  change(database,
+         "INSERT INTO job_times (job, started_at) VALUES (?, ?) "
+         "ON CONFLICT (job) DO UPDATE SET started_at = excluded.started_at",
+         job, now());
+}
+
+void record_end(SQLite::Database& database, std::int64_t job) {
+  change(database,
+         "INSERT INTO job_times (job, finished_at) VALUES (?, ?) "
+         "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
+         job, now());
 }
 
 std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
@@ -253,6 +303,17 @@ void activate_on_top(SQLite::Database& database, const std::string& cell, int ve
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
 }
 
+void insert_model_times(SQLite::Database& database, const std::string& cell, int version,
+                        const ModelProvenance& provenance) {
+  SQLite::Statement row(database,
+                        "INSERT INTO model_times (cell, version, trained_at, measured_at) VALUES (?, ?, ?, ?)");
+  row.bind(1, cell);
+  row.bind(2, version);
+  row.bind(3, provenance.trained_at);
+  if (provenance.measured_at) row.bind(4, *provenance.measured_at);  // unbound is NULL
+  row.exec();
+}
+
 int next_version(SQLite::Database& database, const std::string& cell) {
   auto row = prepare(database, "SELECT COALESCE(MAX(version), 0) + 1 FROM models WHERE cell = ?", cell);
   row.executeStep();
@@ -284,12 +345,14 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
   const int schema = database.execAndGet("PRAGMA user_version").getInt();
-  if (schema == kSchemaVersion) return {};
   SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
   if (schema == 0) database.exec(kSchema);
-  database.exec(kSchemaAdded);
-  database.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
-  database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
+  if (schema < kSchemaVersion) {
+    database.exec(kSchemaAdded);
+    database.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
+    database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
+  }
+  database.exec(kTimes);
   transaction.commit();
   return {};
 }
@@ -370,8 +433,13 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
   });
 }
 
-Result<StoredJob> Store::add_job(const StoredJob& job) {
-  return connection_->in_transaction([&](SQLite::Database& database) { return insert_job_over(database, job); });
+Result<StoredJob> Store::add_job(const StoredJob& job, bool release) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    for (const std::string& id : job.batch_ids) {
+      if (release) change(database, "UPDATE batches SET quarantine = '' WHERE cell = ? AND id = ?", job.cell, id);
+    }
+    return insert_job_over(database, job);
+  });
 }
 
 Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis) {
@@ -461,11 +529,21 @@ Result<StoredJob> Store::job(std::int64_t id) const {
 
 Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
-    auto rows =
-        prepare(database, (std::string(kJobColumns) + "WHERE state IN ('queued', 'running') ORDER BY id").c_str());
-    std::vector<StoredJob> jobs;
-    while (rows.executeStep()) jobs.push_back(job_of(database, rows));
-    return jobs;
+    return jobs_of(
+        database,
+        prepare(database, (std::string(kJobColumns) + "WHERE state IN ('queued', 'running') ORDER BY id").c_str()));
+  });
+}
+
+Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int finished) const {
+  const std::string wanted = std::string(kJobColumns) +
+                             "WHERE (?1 = '' OR cell = ?1) AND (state IN ('queued', 'running') "
+                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'done' "
+                             "ORDER BY id DESC LIMIT ?2) "
+                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'failed' "
+                             "ORDER BY id DESC LIMIT ?2)) ORDER BY id";
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
+    return jobs_of(database, prepare(database, wanted.c_str(), cell, finished));
   });
 }
 
@@ -475,7 +553,8 @@ Status Store::set_job_running(std::int64_t id) {
                               "UPDATE jobs SET state = 'running', attempts = attempts + 1 "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               id),
-                       id);
+                       id)
+        .map([&] { record_start(database, id); });
   });
 }
 
@@ -495,7 +574,8 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message) {
                               "UPDATE jobs SET state = 'failed', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
-                       id);
+                       id)
+        .map([&] { record_end(database, id); });
   });
 }
 
@@ -505,7 +585,8 @@ Status Store::set_job_done(std::int64_t id, const std::string& message) {
                               "UPDATE jobs SET state = 'done', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
-                       id);
+                       id)
+        .map([&] { record_end(database, id); });
   });
 }
 
@@ -521,12 +602,14 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
            "content) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
            cell, version, from.id, from.hash, from.level, from.batch_id, now(), from.training_poses,
            validation ? validation->compensated.rms : 0.0, content);
+    insert_model_times(database, cell, version, from);
     if (job != 0) {
       const int changes = change(database,
                                  "UPDATE jobs SET state = 'done', model_version = ?, message = ? "
                                  "WHERE id = ? AND cell = ? AND state IN ('queued', 'running')",
                                  version, message, job, cell);
       if (auto status = changed_one(changes, job); !status) return tl::make_unexpected(status.error());
+      record_end(database, job);
     }
     if (put_in_force) activate_on_top(database, cell, version);
     return version;
@@ -570,8 +653,9 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredModel>> {
     const auto present = present_activation(database, cell);
     auto rows = prepare(database,
-                        "SELECT version, id, hash, level, batch_id, created_at, training_poses, validation_rms "
-                        "FROM models WHERE cell = ? ORDER BY version",
+                        "SELECT version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
+                        "COALESCE(trained_at, created_at), measured_at "
+                        "FROM models LEFT JOIN model_times USING (cell, version) WHERE cell = ? ORDER BY version",
                         cell);
     std::vector<StoredModel> models;
     while (rows.executeStep()) {
@@ -586,6 +670,8 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
       model.training_poses = rows.getColumn(6).getInt();
       model.validation_rms = rows.getColumn(7).getDouble();
       model.in_force = present && present->version == model.version;
+      model.trained_at = rows.getColumn(8).getInt64();
+      model.measured_at = optional_integer(rows, 9);
       models.push_back(std::move(model));
     }
     return models;

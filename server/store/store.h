@@ -41,6 +41,8 @@ struct StoredJob {
   int model_version = 0;        ///< 0 until done
   int attempts = 0;             ///< times it was begun without being finished or put back
   JobKind kind = JobKind::kTrain;
+  std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last beginning; empty: not yet, not recorded
+  std::optional<std::int64_t> finished_at = {};  ///< likewise of its end
 };
 
 /// What a diagnosis was asked and what it found.
@@ -60,6 +62,8 @@ struct StoredModel {
   int training_poses = 0;
   double validation_rms = 0;  ///< m; 0 when nothing was held out
   bool in_force = false;
+  std::int64_t trained_at = 0;                   ///< Unix time, s; where nobody recorded it, that of its being stored
+  std::optional<std::int64_t> measured_at = {};  ///< see ModelProvenance
 };
 
 /// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, on disk when
@@ -76,8 +80,9 @@ class Store {
   /// same request with the same content again returns the job it made then. Refuses (kConflict) an id that this cell
   /// already has otherwise.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
-  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones.
-  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job);
+  /// Queues a job over batches that are already there. With `release` these leave quarantine in the same transaction.
+  /// Refuses (kNotFound) unknown ones.
+  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false);
   /// Queues a diagnosis: of the one batch that the job names, or of the one that comes with it. Refuses as add_job().
   [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis);
   /// kNotFound: the job is not there, or is no diagnosis.
@@ -93,6 +98,8 @@ class Store {
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
   /// Queued and running ones of all cells, oldest first: what a restart must finish.
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;
+  /// Of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished` done and as many failed.
+  [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
   /// These refuse (kNotFound) a job that is done or failed already. Running counts an attempt; queued takes it back.
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id);

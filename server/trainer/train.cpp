@@ -218,6 +218,7 @@ void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& bat
   parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
   parts.provenance.seed = options.seed;
   parts.provenance.trained_at = options.trained_at;
+  parts.provenance.measured_at = batch.measured_at;
   parts.provenance.program_version = kProgramVersion;
 }
 

@@ -25,6 +25,7 @@ namespace {
 
 constexpr int kMaxAttempts = 3;                           // of one job that takes the process down
 constexpr std::size_t kMaxBatchId = 128;                  // bytes
+constexpr int kJobsListed = 20;                           // of those done and of those failed, the last ones
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running training, for its watchers
 
 Status check_batch_id(const std::string& id) {
@@ -87,6 +88,7 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
     all.measurements.push_back(std::move(m));
   }
   all.joint_types = next.joint_types;
+  all.measured_at = std::max(all.measured_at, next.measured_at);
   all.id += (all.id.empty() ? "" : "+") + next.id;
   all.source_text += next.source_text;
 }
@@ -96,7 +98,7 @@ Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& ce
   auto parsed = parse_batch(stored.csv, "batch " + stored.id);
   if (!parsed) return parsed;
   parsed->id = stored.id;
-  return check_against_cell(std::move(*parsed), cell);
+  return check_against_cell(dated(std::move(*parsed), stored.accepted_at), cell);
 }
 
 /// Whether the model knows the tools and payloads of these poses (its cell file may be an older one).
@@ -331,7 +333,7 @@ Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_na
 }
 
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
-                                      const std::string& level, const std::string& bias) {
+                                      const std::string& level, const std::string& bias, Quarantine quarantine) {
   const auto cell_found = cell(cell_name);
   if (!cell_found) return tl::make_unexpected(cell_found.error());
   if (!level.empty()) {
@@ -344,6 +346,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (!bias.empty()) {
     if (const Status spelled = check_bias_spelling(bias); !spelled) return tl::make_unexpected(spelled.error());
   }
+  const bool release = quarantine == Quarantine::kReleased;
+  if (release && batch_ids.empty()) return refused("to release a batch takes its id: which one is good");
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());
   if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name);
@@ -359,7 +363,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   std::int64_t poses = 0;
   for (const StoredBatch& batch : *stored) {
     if (!wanted.contains(batch.id)) continue;
-    if (const Status free = check_released(batch); !free) return tl::make_unexpected(free.error());
+    if (const Status free = check_released(batch); !free && !release) return tl::make_unexpected(free.error());
     poses += batch.poses;
   }
   if (poses > options_.max_poses) {
@@ -368,7 +372,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
 
   const std::lock_guard lock(submit_mutex_);
   if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_job(job);
+  const auto accepted = store_.add_job(job, release);
   if (!accepted) return tl::make_unexpected(accepted.error());
   enqueue(*accepted);
   return accepted->id;
@@ -436,6 +440,18 @@ Result<JobProgress> Trainer::progress(std::int64_t job) const {
   const auto present = registry_.in_force(stored->cell);
   progress.in_force = present && stored->model_version != 0 && present->version == stored->model_version;
   return progress;
+}
+
+Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_name) const {
+  const auto stored = store_.recent_jobs(cell_name, kJobsListed);
+  if (!stored) return tl::make_unexpected(stored.error());
+  std::vector<DatedJob> jobs;
+  for (const StoredJob& job : *stored) {
+    auto now = progress(job.id);
+    if (!now) return tl::make_unexpected(now.error());
+    jobs.push_back({job, std::move(*now)});
+  }
+  return jobs;
 }
 
 int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }

@@ -82,10 +82,13 @@ class Trainer {
   /// queue is full, everything new (kBusy).
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
+  /// Whether batches of a training that is asked for leave quarantine; they do if it is accepted, and only then.
+  enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
-  /// and what the model in force has besides. Refuses batches in quarantine.
+  /// and what the model in force has besides. Refuses batches that stay in quarantine.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                             const std::string& level, const std::string& bias);
+                                             const std::string& level, const std::string& bias,
+                                             Quarantine quarantine = Quarantine::kStays);
   /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of the model in force
   /// (of the cell, where there is none) do not explain. With `apply` trains the causes found beside them and puts the
   /// model in force only if it is better on the rows held out beyond chance. Returns the job; its findings are
@@ -110,6 +113,13 @@ class Trainer {
 
   /// Of an unfinished job as it goes on, of a finished one from the store.
   [[nodiscard]] Result<JobProgress> progress(std::int64_t job) const;
+  /// A job with what was asked for and when.
+  struct DatedJob {
+    StoredJob asked;
+    JobProgress progress;
+  };
+  /// Of one cell or (empty) of all, oldest first: those that wait or run, and the last ones that ended.
+  [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell) const;
   /// Waiting, without the one being trained.
   [[nodiscard]] int queued_jobs() const;
 

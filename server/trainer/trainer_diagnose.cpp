@@ -85,16 +85,18 @@ Result<MeasurementBatch> Trainer::batch_to_diagnose(const StoredJob& job, const 
                                                     const Cell& cell) const {
   std::string csv = asked.csv;
   std::string id = "sent-" + sha256_hex(csv).substr(0, kIdOfSentBatch);
+  std::int64_t taken_in = job.created_at;
   if (!job.batch_ids.empty()) {
     auto stored = store_.batch(job.cell, job.batch_ids.front());
     if (!stored) return tl::make_unexpected(stored.error());
     csv = std::move(stored->csv);
     id = stored->id;
+    taken_in = stored->accepted_at;
   }
   auto parsed = parse_batch(csv, "batch " + id);
   if (!parsed) return parsed;
   parsed->id = id;
-  return check_against_cell(std::move(*parsed), cell);
+  return check_against_cell(dated(std::move(*parsed), taken_in), cell);
 }
 
 Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<const Cell>& cell_found,

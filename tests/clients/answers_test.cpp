@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "server/base/units.h"
 #include "server/measurement/csv_table.h"
 
@@ -36,15 +38,64 @@ TEST(Answers, CorrectionsAreWrittenWithRowStatusPoseJointsAndErrors) {
             "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,\n");
 }
 
+/// The table that corrections of these targets are written as.
+CsvTable written(const TargetFile& file, const Corrections& corrections) {
+  return CsvTable::parse(corrections_csv(file, corrections), "c.csv").value();
+}
+
+std::string field(const CsvTable& table, const std::string& column) {
+  return table.field(0, table.require(column).value());
+}
+
 TEST(Answers, ATargetWithoutACorrectionHasNoNumbersThatCouldBeCommanded) {
   for (const char* status : {"unreachable", "joint_limit", "singular", "not_converged", "refused"}) {
-    const std::string text = corrections_csv(targets(1), {"abc", kTypes, {corrected(status)}});
-    const CsvTable table = CsvTable::parse(text, "c.csv").value();
-    for (std::size_t column = 2; column <= 13; ++column) EXPECT_EQ(table.field(0, column), "") << status;
-    EXPECT_EQ(table.field(0, table.require("message").value()), "because, so");
+    const CsvTable table = written(targets(1), {"abc", kTypes, {corrected(status)}});
+    for (std::size_t column = 2; column <= 10; ++column) EXPECT_EQ(table.field(0, column), "") << status;
+    EXPECT_EQ(field(table, "message"), "because, so");
     EXPECT_FALSE(
         corrections_json(targets(1), {"abc", kTypes, {corrected(status)}})["targets"][0].contains("commanded"));
   }
+}
+
+TEST(Answers, ATargetLeftAloneSaysWhatErrorToExpectWhereSomethingCanBeSaid) {
+  client::CorrectedTarget left = corrected("joint_limit");
+  left.error_after_mm = left.error_before_mm;
+  EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_before_mm"), "1.5");
+  EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_after_mm"), "1.5");
+  left.error_before_mm = left.error_after_mm = left.sigma_mm = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(field(written(targets(1), {"abc", kTypes, {left}}), "error_after_mm"), "");
+  EXPECT_TRUE(corrections_json(targets(1), {"abc", kTypes, {left}})["targets"][0]["error_after_mm"].is_null());
+}
+
+TEST(Answers, TheUsersColumnsComeFirstAsTheyWereAndNoneIsNamedTwice) {
+  const std::string text =
+      "hole,\"name, long\",status,X_mm,input_status,conf,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"
+      "\"#1\",\"a \"\"b\"\"\nc\",old,7,before,3,1.50,2,3,1,0,0,0\n";
+  const TargetFile file = parse_targets_csv(text, "t.csv").value();
+  const CsvTable table = written(file, {"abc", kTypes, {corrected("ok")}});
+  EXPECT_EQ(std::vector<std::string>(table.columns().begin(), table.columns().begin() + 15),
+            (std::vector<std::string>{"hole", "name, long", "input_input_status", "input_X_mm", "input_status", "conf",
+                                      "input_input_x_mm", "input_y_mm", "input_z_mm", "input_qw", "input_qx",
+                                      "input_qy", "input_qz", "row", "status"}));
+  EXPECT_EQ(field(table, "hole"), "#1");
+  EXPECT_EQ(field(table, "name, long"), "a \"b\"\nc");
+  EXPECT_EQ(field(table, "input_input_status"), "old");
+  EXPECT_EQ(field(table, "input_status"), "before");
+  EXPECT_EQ(field(table, "input_input_x_mm"), "1.50") << "as it stood there";
+  EXPECT_EQ(field(table, "x_mm"), "1") << "ours";
+  EXPECT_EQ(field(table, "status"), "ok");
+  EXPECT_EQ(field(table, "row"), "2");
+  const auto json = corrections_json(file, {"abc", kTypes, {corrected("ok")}});
+  EXPECT_EQ(json["targets"][0]["input"]["hole"], "#1");
+  EXPECT_EQ(json["targets"][0]["input"]["x_mm"], "1.50");
+}
+
+TEST(Answers, WhatIsLeftAloneIsNamedByFileRowAndReason) {
+  EXPECT_EQ(left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("out_of_domain")}}), "");
+  EXPECT_EQ(left_alone_text(targets(2), {"abc", kTypes, {corrected("ok"), corrected("joint_limit")}}),
+            "1 of 2 targets are left as they were:\n  t.csv row 3: joint_limit: because, so\n");
+  const Corrections many{"abc", kTypes, std::vector<client::CorrectedTarget>(12, corrected("unreachable"))};
+  EXPECT_NE(left_alone_text(targets(12), many).find("  and 2 more\n"), std::string::npos);
 }
 
 TEST(Answers, OutOfDomainIsACorrectionAndSaysSo) {

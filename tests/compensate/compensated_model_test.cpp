@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <tuple>
+
 #include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/trainer/train.h"
@@ -110,7 +113,7 @@ TEST_F(Compensated, CorrectedTargetsLandWhereTheyWereWanted) {
     if (correction.status == CorrectionStatus::kOutOfDomain) continue;
     ASSERT_EQ(correction.status, CorrectionStatus::kOk) << correction.message;
     EXPECT_LE(correction.iterations, 10);
-    EXPECT_LT(correction.error_after, 1e-7);
+    EXPECT_LT(correction.left, 1e-7);
     const double before = (true_pose_B(m.context.q).translation() - target.X_BT.translation()).norm();
     const double after = (true_pose_B(correction.q).translation() - target.X_BT.translation()).norm();
     EXPECT_GT(to_mm(before), 1);
@@ -154,7 +157,7 @@ TEST_F(Compensated, OutsideTheDomainItFallsBackToTheCalibratedModelAndSaysSo) {
   EXPECT_GT(prediction.stddev_B.norm(), 3 * model().predict(inside(), "spindle", "spindle").stddev_B.norm());
   const Correction correction = correct(target_at(far));
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
-  EXPECT_LT(correction.error_after, 1e-7);  // corrected all the same, by physics alone
+  EXPECT_LT(correction.left, 1e-7);  // corrected all the same, by physics alone
   EXPECT_LT((true_pose_B(correction.q).translation() - correction.X_BT_wanted.translation()).norm(),
             correction.error_before);
 }
@@ -208,7 +211,7 @@ TEST_F(Compensated, ACorrectionInTheFadeSettlesAndTellsHowMuchOfTheBiasItTook) {
   ASSERT_LT(weight, 0.95);
   const Correction correction = correct(target_at(q));
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
-  EXPECT_LT(correction.error_after, 1e-7);
+  EXPECT_LT(correction.left, 1e-7);
   EXPECT_NE(correction.message.find(fmt::format("{:.0f} % of the learned bias", 100 * weight)), std::string::npos)
       << correction.message;
 }
@@ -259,9 +262,12 @@ TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
   Target far = target_at(inside());
   far.X_BT.translation().x() += 3;
   EXPECT_EQ(correct(far).status, CorrectionStatus::kUnreachable);
+  EXPECT_TRUE(std::isnan(correct(far).error_before) && std::isnan(correct(far).error_after)) << "no silent zero";
   JointVector beyond = inside();
   beyond(2) = from_deg(75);  // limit 70
   EXPECT_EQ(correct(target_at(beyond)).status, CorrectionStatus::kJointLimit);
+  EXPECT_NE(correct(target_at(beyond)).message.find("joint 3 would be at 75.0 deg, limit 70"), std::string::npos)
+      << correct(target_at(beyond)).message;
   JointVector straight = inside();
   straight(4) = 0;
   EXPECT_EQ(correct(target_at(straight)).status, CorrectionStatus::kSingular);
@@ -269,6 +275,152 @@ TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
   nothing.seed.reset();
   EXPECT_EQ(correct(nothing).status, CorrectionStatus::kRefused);
   EXPECT_FALSE(correct(nothing).message.empty());
+}
+
+TEST_F(Compensated, ATargetThatIsLeftAloneIsCommandedAsItWasAndRepeatsItsErrorBefore) {
+  JointVector beyond = inside();
+  beyond(2) = from_deg(75);  // limit 70
+  const Target target = target_at(beyond);
+  const Correction correction = correct(target);
+  ASSERT_EQ(correction.status, CorrectionStatus::kJointLimit);
+  EXPECT_GT(to_mm(correction.error_before), 0.5);
+  EXPECT_EQ(correction.error_after, correction.error_before);
+  EXPECT_GT(correction.stddev, 0);
+  EXPECT_EQ(correction.X_BT_commanded.matrix(), target.X_BT.matrix());
+  EXPECT_LT((correction.q - beyond).norm(), 1e-8);
+}
+
+TEST_F(Compensated, ATargetThatMeetsALimitOnlyOnceCorrectedSaysByHowMuch) {
+  // A joint stands on its limit: half of all corrections push it over.
+  int met = 0;
+  for (int j = 1; j < 6; ++j) {
+    const Joint& joint = model().cell().robot.joint(j);
+    for (const double limit : {joint.lower, joint.upper}) {
+      JointVector edge = inside();
+      edge(j) = limit;
+      Target target;
+      target.joint_target = true;
+      target.seed = edge;
+      const Correction correction = correct(target);
+      if (correction.status != CorrectionStatus::kJointLimit) continue;
+      ++met;
+      EXPECT_NE(correction.message.find(fmt::format("joint {} would be at ", j + 1)), std::string::npos)
+          << correction.message;
+      EXPECT_NE(correction.message.find(fmt::format(" deg, limit {:.6g}", to_deg(limit))), std::string::npos)
+          << correction.message;
+      EXPECT_EQ(correction.message.find(fmt::format("at {:.1f} deg", to_deg(limit))), std::string::npos)
+          << "not told from its limit: " << correction.message;
+      EXPECT_EQ(correction.error_after, correction.error_before);
+      EXPECT_EQ(correction.q, edge) << "left as it was";
+    }
+  }
+  EXPECT_GT(met, 2);
+}
+
+TEST_F(Compensated, WhereAnotherBranchWouldReachItIsSaidAndItDoes) {
+  Target target = target_at(inside());
+  target.conf = *branch_of(model().cell().robot, inside());
+  target.seed.reset();
+  int advised = 0;
+  for (int conf = 0; conf < 8; ++conf) {
+    Target elsewhere = target;
+    elsewhere.conf = conf;
+    const Correction tried = correct(elsewhere);
+    const bool reached = tried.status == CorrectionStatus::kOk || tried.status == CorrectionStatus::kOutOfDomain;
+    const std::size_t at = tried.message.find("; conf ");
+    if (reached) {
+      EXPECT_EQ(at, std::string::npos) << tried.message;
+      continue;
+    }
+    ASSERT_NE(at, std::string::npos) << conf << ": " << tried.message;
+    const std::string list = tried.message.substr(at);
+    for (char digit = '0'; digit <= '7'; ++digit) {
+      elsewhere.conf = digit - '0';
+      const CorrectionStatus status = correct(elsewhere).status;
+      const bool would = status == CorrectionStatus::kOk || status == CorrectionStatus::kOutOfDomain;
+      EXPECT_EQ(list.find(digit) != std::string::npos, would) << "conf " << digit << ": " << tried.message;
+    }
+    ++advised;
+  }
+  EXPECT_GT(advised, 2);
+}
+
+TEST_F(Compensated, WhatIsExpectedAfterwardsIsTheTrueErrorsStddevWithoutTheInstrumentsNoise) {
+  const Correction correction = correct(target_at(inside()));
+  ASSERT_EQ(correction.status, CorrectionStatus::kOk) << correction.message;
+  const ErrorPrediction there = model().predict(correction.q, "spindle", "spindle");
+  EXPECT_NEAR(to_mm(correction.error_after), to_mm(there.true_stddev_B.norm()), 1e-6);
+  EXPECT_NEAR(correction.stddev * std::sqrt(3.0), correction.error_after, 1e-12);
+  EXPECT_LT(correction.error_after, there.stddev_B.norm());
+  EXPECT_GT(to_mm(correction.error_after), 1e-3) << "what the iteration leaves is no error to expect";
+}
+
+/// rms of the true errors after correction over rms of those expected.
+struct Honesty {
+  double true_squared = 0, expected_squared = 0;
+  int targets = 0;
+  void add(double true_error, double expected) {
+    true_squared += true_error * true_error;
+    expected_squared += expected * expected;
+    ++targets;
+  }
+  [[nodiscard]] double ratio() const { return std::sqrt(true_squared / expected_squared); }
+};
+
+struct InAndOut {
+  Honesty in_domain, out_of_domain;
+};
+
+/// Of the targets that `poses` are the nominal poses of.
+void correct_all(const CompensatedModel& model, const VirtualRobot& robot, const MeasurementBatch& poses,
+                 InAndOut& honesty) {
+  for (const Measurement& m : poses.measurements) {
+    PoseContext context = m.context;
+    Target target;
+    target.X_BT = robot.truth.nominal_pose_W(context);
+    target.seed = context.q;
+    const Correction correction = model.correct(target, "spindle", "spindle");
+    const bool in_domain = correction.status == CorrectionStatus::kOk;
+    if (!in_domain && correction.status != CorrectionStatus::kOutOfDomain) continue;
+    context.q = correction.q;
+    const Vector3 missed = robot.truth.pose_W(context).translation() - target.X_BT.translation();
+    (in_domain ? honesty.in_domain : honesty.out_of_domain).add(missed.norm(), correction.error_after);
+  }
+}
+
+TEST(Corrections, ExpectTheTrueErrorOnAverageOverModels) {
+  auto narrow = std::make_shared<Cell>(*test::cell_7());
+  narrow->joint_ranges = {{-0.9, 0.9}, {-0.5, 0.5}, {-0.6, 0.5}, {-1, 1}, {0.4, 1.4}, {-1, 1}};
+  const VirtualRobot measured_in = test::chapter_5_robot(narrow);
+  const VirtualRobot anywhere = test::chapter_5_robot(test::cell_7());
+  double in_domain = 0, out_of_domain = 0;
+  std::uint64_t seed = 100;
+  const std::vector<std::tuple<const char*, const char*, int>> trainings = {
+      {"M3", "none", 60}, {"M3", "se", 100}, {"M3", "se", 150}, {"M3", "none", 120}, {"M2", "se + parameters", 120},
+      {"M2", "se", 200}};
+  for (const auto& [level, bias, poses] : trainings) {
+    TrainOptions options;
+    options.level = level;
+    options.bias = bias;
+    options.seed = ++seed;
+    const auto model = test::demand(train(narrow, test::measured(measured_in, poses, seed), options));
+    InAndOut honesty;
+    correct_all(model, measured_in, test::measured(measured_in, 200, 500 + seed), honesty);
+    correct_all(model, measured_in, test::measured(anywhere, 200, 600 + seed), honesty);
+    std::printf("%s %s %d: in %.3f (%d) %.4f, out %.3f (%d) %.4f\n", level, bias, poses, honesty.in_domain.ratio(),
+                honesty.in_domain.targets,
+                std::sqrt(honesty.in_domain.expected_squared / honesty.in_domain.targets) * 1e3,
+                honesty.out_of_domain.ratio(), honesty.out_of_domain.targets,
+                std::sqrt(honesty.out_of_domain.expected_squared / honesty.out_of_domain.targets) * 1e3);
+    in_domain += honesty.in_domain.ratio() / static_cast<double>(trainings.size());
+    out_of_domain += honesty.out_of_domain.ratio() / static_cast<double>(trainings.size());
+  }
+  RecordProperty("in_domain", std::to_string(in_domain));
+  RecordProperty("out_of_domain", std::to_string(out_of_domain));
+  EXPECT_GT(in_domain, 0.7);
+  EXPECT_LT(in_domain, 1.3);
+  EXPECT_GT(out_of_domain, 0.5);
+  EXPECT_LT(out_of_domain, 1.3);
 }
 
 TEST_F(Compensated, AModelIsTheSameAfterItWasStored) {
@@ -281,6 +433,18 @@ TEST_F(Compensated, AModelIsTheSameAfterItWasStored) {
   const ErrorPrediction after = again->predict(inside(), "spindle", "spindle");
   EXPECT_EQ(before.error_B, after.error_B);  // bit for bit
   EXPECT_EQ(before.stddev_B, after.stddev_B);
+}
+
+TEST_F(Compensated, WhenItWasMeasuredIsKeptAndModelsOfBeforeItWasKeptLoad) {
+  CompensatedModel::Parts parts = model().parts();
+  parts.provenance.measured_at = 1'600'000'000;
+  const CompensatedModel dated = CompensatedModel::make(parts).value();
+  EXPECT_EQ(dated.provenance().hash, model().provenance().hash) << "what it is, not of when";
+  EXPECT_EQ(deserialize(serialize(dated), "memory")->provenance().measured_at, 1'600'000'000);
+  parts.provenance.measured_at.reset();
+  const std::string old = serialize(CompensatedModel::make(std::move(parts)).value());
+  EXPECT_EQ(old.find("measured_at"), std::string::npos);
+  EXPECT_FALSE(test::demand(deserialize(old, "memory")).provenance().measured_at);
 }
 
 TEST_F(Compensated, ADamagedModelIsRefused) {

@@ -211,7 +211,7 @@ TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {
   target.seed = far;
   const Correction correction = model.correct(target, "spindle", "spindle");
   EXPECT_EQ(correction.status, CorrectionStatus::kOutOfDomain);
-  EXPECT_LT(correction.error_after, 1e-7);
+  EXPECT_LT(correction.left, 1e-7);
   EXPECT_NE(correction.message.find("the blocks of the bias and 0 % of its kernel"), std::string::npos)
       << correction.message;
   const Vector3 reached = robot_->truth.pose_W(posed(correction.q)).translation();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
@@ -47,6 +48,9 @@ class HandlersTest : public testing::Test {
     request.action(action);
     request.version(version);
     return request;
+  }
+  std::string request_payload() const {
+    return backend_.cell->payloads.empty() ? "" : backend_.cell->payloads.begin()->first;
   }
   template <typename Request>
   ErrorCode refusal(const Request& request, const std::string& part) {
@@ -181,13 +185,48 @@ TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
   const wire::CorrectedTarget& corrected = reply->corrections()[0];
   EXPECT_EQ(corrected.status(), wire::TARGET_OK) << corrected.message();
   EXPECT_NEAR(corrected.error_before_mm(), 0.8, 1e-6);
-  EXPECT_LT(corrected.error_after_mm(), 1e-3);
+  const CompensatedModel& model = backend_.registry.in_force("cell-7")->model;
+  const JointVector q = Eigen::Map<const JointVector>(corrected.joints_rad().data(), 6);
+  const double stddev = to_mm(model.predict(q, "spindle", request_payload()).true_stddev_B.norm());
+  EXPECT_NEAR(corrected.error_after_mm(), stddev, 1e-4);
 
   wire::PredictErrorRequest check = predict_request();
   check.joints_rad({kJoints, corrected.joints_rad()});
   const auto there = handlers_.answer(check);
   ASSERT_TRUE(there) << there.error().message;
   EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(), 1e-3);
+}
+
+TEST_F(HandlersTest, ATargetLeftAloneNamesJointAndLimitAndRepeatsItsErrorBefore) {
+  backend_.serve(8);
+  auto request = correct_request();
+  request.targets()[0].joints_rad()[2] = 1.5;  // limit 70 deg
+  const auto reply = handlers_.answer(request);
+  ASSERT_TRUE(reply) << reply.error().message;
+  const wire::CorrectedTarget& left = reply->corrections().front();
+  EXPECT_EQ(left.status(), wire::TARGET_JOINT_LIMIT);
+  EXPECT_NE(left.message().find("joint 3 would be at 85.9 deg, limit 70"), std::string::npos) << left.message();
+  EXPECT_NEAR(left.error_before_mm(), 0.8, 1e-6);
+  EXPECT_EQ(left.error_after_mm(), left.error_before_mm());
+  EXPECT_EQ(left.joints_rad(), request.targets()[0].joints_rad());
+}
+
+TEST_F(HandlersTest, WhereNoJointsLeadNothingIsExpected) {
+  backend_.serve(8);
+  auto request = correct_request();
+  wire::Target& target = request.targets()[0];
+  target.pose().qw(1);
+  for (const double far_mm : {9000.0, 1e12, 1e300}) {
+    for (const auto kind : {wire::TARGET_POSE_NEAR_JOINTS, wire::TARGET_POSE_ON_BRANCH}) {
+      target.kind(kind);
+      target.pose().x_mm(far_mm);
+      const auto reply = handlers_.answer(request);
+      ASSERT_TRUE(reply) << reply.error().message;
+      const wire::CorrectedTarget& left = reply->corrections().front();
+      EXPECT_EQ(left.status(), wire::TARGET_UNREACHABLE) << far_mm << ": " << left.message();
+      EXPECT_TRUE(std::isnan(left.error_before_mm()) && std::isnan(left.error_after_mm())) << far_mm;
+    }
+  }
 }
 
 TEST_F(HandlersTest, EveryNumberOfAPredictionIsTheModels) {
@@ -328,6 +367,65 @@ TEST_F(HandlersTest, BatchesInQuarantineAreListedAndReleased) {
   EXPECT_TRUE(handlers_.answer(request));
   request.action(wire::MANAGE_QUARANTINE);
   EXPECT_EQ(handlers_.answer(request)->text(), "[]");
+}
+
+TEST_F(HandlersTest, ABatchIsReleasedOnlyWithATrainingThatIsAccepted) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  ASSERT_TRUE(backend_.store->set_quarantine("cell-7", "lt-07", "another tool"));
+  auto request = manage_request(wire::MANAGE_RELEASE_AND_TRAIN);
+  for (const char* text : {R"({"batches": ["lt-07"], "level": "M9"})", R"({"batches": ["lt-07", "lt-99"]})",
+                           R"({"batches": []})", R"({"batches": "lt-07"})", R"({"level": 3})", "lt-07", "[", ""}) {
+    request.text(text);
+    EXPECT_FALSE(handlers_.answer(request)) << text;
+    EXPECT_EQ(backend_.trainer->quarantined("")->size(), 1u) << text;
+  }
+  request.text(R"({"batches": ["lt-07"], "level": "M1", "bias": "none"})");
+  const auto accepted = handlers_.answer(request);
+  ASSERT_TRUE(accepted) << accepted.error().message;
+  EXPECT_GT(accepted->job().number(), 0);
+  EXPECT_EQ(backend_.store->job(accepted->job().number())->level, "M1");
+  EXPECT_TRUE(backend_.trainer->quarantined("")->empty());
+  EXPECT_TRUE(happens_once(request));
+}
+
+TEST_F(HandlersTest, JobsAreListedWithStageReasonAndTimes) {
+  const auto first = handlers_.answer(submit_request("lt-07"));
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(backend_.store->set_job_running(first->job()));
+  ASSERT_TRUE(backend_.store->set_job_failed(first->job(), "too \"few\" rows"));
+  auto request = manage_request(wire::MANAGE_JOBS);
+  const auto of_cell = handlers_.answer(request);
+  ASSERT_TRUE(of_cell) << of_cell.error().message;
+  const auto job = nlohmann::json::parse(of_cell->text()).at("jobs").at(0);
+  EXPECT_EQ(job.at("job"), first->job());
+  EXPECT_EQ(job.at("stage"), "failed");
+  EXPECT_EQ(job.at("what"), "too \"few\" rows");
+  EXPECT_EQ(job.at("batches").at(0), "lt-07");
+  EXPECT_GE(job.at("finished_unix_s"), job.at("started_unix_s"));
+  EXPECT_GE(job.at("started_unix_s"), job.at("created_unix_s"));
+  request.about().cell("");
+  EXPECT_EQ(handlers_.answer(request)->text(), of_cell->text());
+  request.about().cell("cell-8");
+  EXPECT_EQ(handlers_.answer(request)->text(), R"({"jobs":[]})");
+}
+
+TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
+  const std::int64_t now = unix_now_s();
+  CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
+  parts.provenance.trained_at = now - 100;
+  const auto age = [&](std::optional<std::int64_t> measured_at) {
+    parts.provenance.measured_at = measured_at;
+    parts.provenance.batch_id += "+";
+    const CompensatedModel model = CompensatedModel::make(parts).value();
+    const int version = backend_.store->add_model("cell-7", model, 0, true, "").value();
+    backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
+    const double listed = handlers_.answer(manage_request(wire::MANAGE_LIST))->models().back().data_age_s();
+    EXPECT_NEAR(handlers_.answer(predict_request())->model().data_age_s(), listed, 5);
+    EXPECT_EQ(handlers_.answer(manage_request(wire::MANAGE_LIST))->models().back().trained_at_unix_s(), now - 100);
+    return listed;
+  };
+  EXPECT_NEAR(age(now - 5000), 5000, 5);
+  EXPECT_NEAR(age(std::nullopt), 100, 5) << "of the training, where nobody recorded it";
 }
 
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {

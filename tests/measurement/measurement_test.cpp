@@ -228,5 +228,21 @@ TEST(SplitBatch, LeavesARowForTraining) {
   EXPECT_EQ(split_batch(MeasurementBatch{}, 0.5, 1).train.measurements.size(), 0u);
 }
 
+/// When the newest of measurements of these times was taken, in a batch taken in at 1.7e9.
+std::int64_t newest_of(const std::vector<std::optional<double>>& times) {
+  MeasurementBatch batch;
+  for (const std::optional<double>& time : times) batch.measurements.emplace_back().context.time = time;
+  return dated(std::move(batch), 1'700'000'000).measured_at.value();
+}
+
+TEST(Dated, TheNewestUnixTimeCountsElseWhenTheBatchWasTakenIn) {
+  EXPECT_EQ(newest_of({1.6e9, 1'600'000'100.7, std::nullopt, 1.5e9}), 1'600'000'100);
+  EXPECT_EQ(newest_of({}), 1'700'000'000);
+  EXPECT_EQ(newest_of({std::nullopt, std::nullopt}), 1'700'000'000);
+  EXPECT_EQ(newest_of({0.0, 3600.0, 1e6}), 1'700'000'000) << "counted from some start of its own";
+  EXPECT_EQ(newest_of({1.6e12}), 1'700'000'000) << "milliseconds";
+  EXPECT_EQ(newest_of({1.7e9 + 3600}), 1'700'003'600) << "a clock that is a little ahead";
+}
+
 }  // namespace
 }  // namespace trammel

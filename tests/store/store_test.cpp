@@ -192,6 +192,79 @@ TEST_F(StoreTest, TakesAFileOfTheFirstSchemaOn) {
   EXPECT_TRUE(store_->add_diagnosis(job(), {"csv", false, "", ""}));
 }
 
+TEST_F(StoreTest, TakesOnAFileOfBeforeTimesWereKeptAndKnowsWhenItsModelsWereTrained) {
+  const auto id = store_->add_batch(batch("lt-07"), job())->id;
+  CompensatedModel::Parts parts = test::nominal_model(cell_, 40).parts();
+  parts.provenance.trained_at = 1'650'000'000;
+  ASSERT_TRUE(store_->add_model("cell-7", CompensatedModel::make(parts).value(), id, true, "made"));
+  ASSERT_EQ(add_model(41), 2);
+  store_.reset();
+  {
+    SQLite::Database file(path_, SQLite::OPEN_READWRITE);
+    file.exec("DROP TABLE job_times");
+    file.exec("DROP TABLE model_times");
+    file.exec("UPDATE models SET content = 'damaged' WHERE version = 2");
+  }
+  open();
+  const auto models = store_->models("cell-7");
+  ASSERT_TRUE(models) << models.error().message;
+  EXPECT_EQ(models->at(0).trained_at, 1'650'000'000);
+  EXPECT_FALSE(models->at(0).measured_at);
+  EXPECT_EQ(models->at(1).trained_at, models->at(1).created_at);
+  EXPECT_FALSE(store_->job(id)->finished_at);
+  EXPECT_EQ(store_->job(id)->state, JobState::kDone);
+  EXPECT_EQ(in_force(), 1);
+}
+
+TEST_F(StoreTest, KeepsWhenAModelWasTrainedAndTheNewestOfItsMeasurementsTaken) {
+  CompensatedModel::Parts parts = test::nominal_model(cell_, 40).parts();
+  parts.provenance.trained_at = 1'650'000'000;
+  parts.provenance.measured_at = 1'600'000'000;
+  ASSERT_TRUE(store_->add_model("cell-7", CompensatedModel::make(parts).value(), 0, true, ""));
+  reopen();
+  EXPECT_EQ(store_->models("cell-7")->front().trained_at, 1'650'000'000);
+  EXPECT_EQ(store_->models("cell-7")->front().measured_at, 1'600'000'000);
+  EXPECT_GT(store_->models("cell-7")->front().created_at, 1'700'000'000);
+}
+
+TEST_F(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
+  const auto first = store_->add_batch(batch("a"), job())->id;
+  EXPECT_FALSE(store_->job(first)->started_at);
+  ASSERT_TRUE(store_->set_job_running(first));
+  EXPECT_GT(store_->job(first)->started_at.value_or(0), 1'700'000'000);
+  EXPECT_FALSE(store_->job(first)->finished_at);
+  ASSERT_TRUE(store_->set_job_failed(first, "too few rows"));
+  EXPECT_GE(store_->job(first)->finished_at.value_or(0), *store_->job(first)->started_at);
+  const auto second = store_->add_batch(batch("b", "2", "client:2"), job())->id;
+  ASSERT_TRUE(store_->set_job_running(second));
+  ASSERT_EQ(add_model(40, true, second), 1);
+  EXPECT_TRUE(store_->job(second)->finished_at);
+  const auto third = store_->add_batch(batch("c", "3", "client:3"), job())->id;
+  ASSERT_TRUE(store_->set_job_done(third, "nothing"));
+  const auto fourth = store_->add_batch(batch("d", "4", "client:4"), job())->id;
+  const auto numbers = [&](const std::string& cell, int finished) {
+    std::vector<std::int64_t> ids;
+    const std::vector<StoredJob> jobs = store_->recent_jobs(cell, finished).value();
+    for (const StoredJob& one : jobs) ids.push_back(one.id);
+    return ids;
+  };
+  EXPECT_EQ(numbers("", 20), (std::vector{first, second, third, fourth}));
+  EXPECT_EQ(numbers("cell-7", 1), (std::vector{first, third, fourth})) << "the last done, the last failed";
+  EXPECT_TRUE(numbers("cell-8", 20).empty());
+}
+
+TEST_F(StoreTest, ReleasesBatchesWithTheJobThatTakesThemOrNotAtAll) {
+  ASSERT_TRUE(store_->add_batch(batch("a"), job()));
+  ASSERT_TRUE(store_->set_quarantine("cell-7", "a", "another tool"));
+  StoredJob wanted = job();
+  wanted.batch_ids = {"a", "never-seen"};
+  EXPECT_EQ(store_->add_job(wanted, true).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "another tool");
+  wanted.batch_ids = {"a"};
+  ASSERT_TRUE(store_->add_job(wanted, true));
+  EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "");
+}
+
 TEST_F(StoreTest, RefusesAJobOverAnUnknownBatch) {
   StoredJob lost = job();
   lost.batch_ids = {"never-seen"};

@@ -9,6 +9,7 @@
 #include <new>
 #include <thread>
 
+#include "server/base/hash.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "server/trainer/extend.h"
@@ -607,6 +608,90 @@ TEST_F(TrainerTest, ABatchThatNothingExplainsIsKeptApartUntilItIsReleased) {
   ASSERT_TRUE(trainer_->release("cell-7", "lt-08"));
   EXPECT_TRUE(trainer_->quarantined("")->empty());
   EXPECT_EQ(retrain({"lt-08"}).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsRefused) {
+  options_.queue_capacity = 2;
+  make_trainer();
+  submit("lt-07");
+  ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
+  const auto released = [this](const std::vector<std::string>& ids, const std::string& level, const std::string& bias) {
+    const auto job = trainer_->retrain("cell-7", ids, level, bias, Trainer::Quarantine::kReleased);
+    EXPECT_EQ(trainer_->quarantined("")->empty(), job.has_value());
+    return job;
+  };
+  EXPECT_FALSE(released({"lt-07"}, "M9", ""));
+  EXPECT_FALSE(released({"lt-07"}, "", "automatic"));
+  EXPECT_FALSE(released({"lt-07", "lt-99"}, "", ""));
+  EXPECT_FALSE(released({"lt-07", "lt-07"}, "", ""));
+  EXPECT_FALSE(released({}, "", "")) << "which one is good must be said";
+  submit("lt-08", {.seed = 2});
+  const auto busy = released({"lt-07"}, "", "");
+  ASSERT_FALSE(busy);
+  EXPECT_EQ(busy.error().code, ErrorCode::kBusy);
+  options_.queue_capacity = 3;
+  make_trainer();
+  EXPECT_TRUE(released({"lt-07"}, "", ""));
+}
+
+TEST_F(TrainerTest, AModelOfOldMeasurementsIsAsOldAsTheyAre) {
+  const std::int64_t yesterday = 1'600'000'000;
+  const auto stored = [&](const std::string& id, std::int64_t accepted_at, const std::string& text) {
+    StoredJob job;
+    job.cell = "cell-7";
+    job.batch_ids = {id};
+    const auto added = store_->add_batch({"cell-7", id, text, sha256_hex(text), id, accepted_at, 40}, job);
+    ASSERT_TRUE(added) << added.error().message;
+    ASSERT_TRUE(store_->set_job_failed(added->id, "not by itself"));
+  };
+  std::string timed = csv({.seed = 3});
+  int row = 0;
+  std::string with_time;
+  for (std::size_t at = 0; at < timed.size();) {
+    const std::size_t end = timed.find('\n', at);
+    with_time += timed.substr(at, end - at) + (row == 0 ? ",time_s\n" : fmt::format(",{}\n", 1'500'000'000 + row));
+    at = end + 1;
+    ++row;
+  }
+  stored("old", yesterday, csv());
+  stored("older", yesterday - 1000, csv({.seed = 2}));
+  stored("timed", yesterday, with_time);
+  start();
+  const auto measured_at = [this](const JobProgress& done) {
+    EXPECT_EQ(done.stage, JobStage::kDone) << done.what;
+    return store_->model("cell-7", done.model_version)->provenance().measured_at.value_or(0);
+  };
+  EXPECT_EQ(measured_at(retrain({"older"})), yesterday - 1000) << "when it was received, not when it was trained";
+  EXPECT_EQ(measured_at(retrain({"old", "older"})), yesterday) << "the newest of several";
+  EXPECT_EQ(measured_at(retrain({"timed"})), 1'500'000'000 + row - 1) << "when it was measured, where it says so";
+  const std::string exported = serialize(store_->model("cell-7", 1).value());
+  ASSERT_TRUE(trainer_->activate("cell-7", 1));
+  EXPECT_EQ(registry_->in_force("cell-7")->model.provenance().measured_at, yesterday - 1000);
+  EXPECT_EQ(trainer_->import_model("cell-7", exported).value_or(0), 1);
+  EXPECT_EQ(store_->models("cell-7")->front().measured_at, yesterday - 1000);
+}
+
+TEST_F(TrainerTest, JobsAreListedWithWhatBecameOfThemAndWhen) {
+  start();
+  train("lt-07");
+  test::SmallBatch noisy;
+  noisy.noise = 2e-3;
+  noisy.seed = 5;
+  const JobProgress refused = train("lt-08", noisy);
+  trainer_->stop();
+  const std::int64_t waiting = submit("lt-09", {.seed = 7});
+  const auto jobs = trainer_->jobs("");
+  ASSERT_TRUE(jobs) << jobs.error().message;
+  ASSERT_EQ(jobs->size(), 3u);
+  EXPECT_EQ(jobs->at(0).progress.stage, JobStage::kDone);
+  EXPECT_TRUE(jobs->at(0).progress.in_force);
+  EXPECT_TRUE(jobs->at(0).asked.started_at && jobs->at(0).asked.finished_at);
+  EXPECT_EQ(jobs->at(1).progress.stage, JobStage::kFailed);
+  EXPECT_EQ(jobs->at(1).progress.what, refused.what);
+  EXPECT_EQ(jobs->at(2).progress.job, waiting);
+  EXPECT_EQ(jobs->at(2).progress.stage, JobStage::kQueued);
+  EXPECT_EQ(jobs->at(2).asked.batch_ids, std::vector<std::string>{"lt-09"});
+  EXPECT_FALSE(jobs->at(2).asked.started_at);
 }
 
 TEST_F(TrainerTest, ABatchOfATrackerThatWasSetUpElsewhereIsLearnedFromAndSaysSo) {

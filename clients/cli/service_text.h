@@ -1,0 +1,30 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "clients/session/session.h"
+
+/// What a service says of its servers, models, jobs and batches, for people (dates in UTC) and for programs.
+namespace trammel::cli {
+
+[[nodiscard]] nlohmann::ordered_json job_json(const client::JobStatus& job);
+[[nodiscard]] nlohmann::ordered_json jobs_json(const std::vector<client::DatedJob>& jobs);
+/// A line a job: those that run and wait, of those that are done the last one of each cell, those that failed.
+[[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
+
+[[nodiscard]] nlohmann::ordered_json models_json(const std::vector<client::ModelInfo>& models);
+/// `now`: Unix time, s, that their ages count from.
+[[nodiscard]] std::string models_text(const std::vector<client::ModelInfo>& models, std::int64_t now);
+
+[[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
+[[nodiscard]] std::string server_text(const client::ServerStatus& server);
+
+[[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches);
+[[nodiscard]] std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches);
+
+/// What to do next where a job did not put a model in force; empty where there is nothing.
+[[nodiscard]] std::string next_step(const client::JobStatus& job);
+
+}  // namespace trammel::cli

@@ -1,0 +1,215 @@
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/compensate/compensated_model.h"
+#include "server/measurement/pose_columns.h"
+#include "server/robot/inverse_kinematics.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kRotationTolerance = 1e-7;  // rad, of a corrected target
+constexpr int kHighestConf = 7;
+constexpr int kJointsNamed = 2;  // of those outside their limits, in one message
+constexpr int kMostDecimals = 9;
+
+/// A joint value with as many decimals as tell it from the limit that it is beyond.
+std::string told_from(double limit, double value) {
+  if (std::abs(value) > 1e6) return fmt::format("{:.6g}", value);
+  std::string text;
+  for (int decimals = 1; decimals <= kMostDecimals; ++decimals) {
+    text = fmt::format("{:.{}f}", value, decimals);
+    if (std::abs(std::stod(text) - limit) > 0.5 * std::abs(value - limit)) break;
+  }
+  return text;
+}
+
+std::string limit_text(const Joint& joint, int number, double value) {
+  const double limit = value < joint.lower ? joint.lower : joint.upper;
+  const double limit_shown = joint_to_column(limit, joint.type);
+  return fmt::format("joint {} would be at {} {}, limit {:.6g}", number,
+                     told_from(limit_shown, joint_to_column(value, joint.type)),
+                     joint.type == JointType::kRevolute ? "deg" : "mm", limit_shown);
+}
+
+/// `joint 5 would be at 121.3 deg, limit 120`, of each joint outside its limits.
+std::string limits_text(const Chain& robot, const JointVector& q) {
+  constexpr double kTolerance = 1e-9;  // as Chain::joint_outside_limits()
+  std::vector<std::string> outside;
+  for (int i = 0; i < robot.size(); ++i) {
+    const Joint& joint = robot.joint(i);
+    if (q(i) < joint.lower - kTolerance || q(i) > joint.upper + kTolerance)
+      outside.push_back(limit_text(joint, i + 1, q(i)));
+  }
+  const auto named = std::min<std::size_t>(outside.size(), kJointsNamed);
+  const std::string text = fmt::format("{}", fmt::join(outside.begin(), outside.begin() + named, "; "));
+  return outside.size() == named ? text : fmt::format("{} and {} more", text, outside.size() - named);
+}
+
+/// `; conf 1, 3 or 7 would reach it`; nothing where none would.
+std::string reached_by(const std::vector<int>& branches) {
+  if (branches.empty()) return "";
+  std::string list = fmt::format("{}", branches.front());
+  for (std::size_t i = 1; i < branches.size(); ++i)
+    list += fmt::format("{}{}", i + 1 == branches.size() ? " or " : ", ", branches[i]);
+  return fmt::format("; conf {} would reach it", list);
+}
+
+CorrectionStatus status_of(InverseStatus status) {
+  switch (status) {
+    case InverseStatus::kJointLimit:
+      return CorrectionStatus::kJointLimit;
+    case InverseStatus::kSingular:
+      return CorrectionStatus::kSingular;
+    default:
+      return CorrectionStatus::kUnreachable;
+  }
+}
+
+std::string why_not(const Chain& robot, const InverseResult& joints, const std::optional<int>& conf) {
+  switch (joints.status) {
+    case InverseStatus::kJointLimit:
+      return limits_text(robot, joints.q);
+    case InverseStatus::kSingular:
+      return "the arm is singular there";
+    default:
+      return conf ? fmt::format("no joints of conf {} bring the tool there", *conf) : "no joints bring the tool there";
+  }
+}
+
+/// rms of an error of this mean whose true value spreads by this stddev.
+double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.squaredNorm() + stddev.squaredNorm()); }
+
+}  // namespace
+
+std::string_view to_string(CorrectionStatus status) {
+  switch (status) {
+    case CorrectionStatus::kOk:
+      return "ok";
+    case CorrectionStatus::kOutOfDomain:
+      return "out_of_domain";
+    case CorrectionStatus::kJointLimit:
+      return "joint_limit";
+    case CorrectionStatus::kUnreachable:
+      return "unreachable";
+    case CorrectionStatus::kSingular:
+      return "singular";
+    case CorrectionStatus::kNotConverged:
+      return "not_converged";
+    case CorrectionStatus::kRefused:
+      return "refused";
+  }
+  return "refused";
+}
+
+Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
+  const Chain& robot = cell().robot;
+  if (target.joint_target) {
+    if (!target.seed) return refused("a joint target without joints");
+    const bool outside = robot.joint_outside_limits(*target.seed).has_value();
+    return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed, 0};
+  }
+  if (target.conf) return inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
+  if (target.seed) return inverse_kinematics(robot, target.X_BT * X_TF, *target.seed);
+  return refused("a target needs a branch (conf) or joints as a seed");
+}
+
+CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, PoseContext context,
+                                                      const Pose& X_BT_predicted, double bias_weight,
+                                                      const CorrectOptions& options) const {
+  const Pose X_TF = parts().physics.tools.at(context.tool).inverse();
+  Approach now{X_BT_wanted, {InverseStatus::kOk, context.q, 0}, pose_difference(X_BT_wanted, X_BT_predicted), 0};
+  const auto settled = [&] {
+    return now.missing.head<3>().norm() < options.tolerance && now.missing.tail<3>().norm() < kRotationTolerance;
+  };
+  // Until it settles only the mean is asked for: the variance costs a hundred times as much.
+  while (!settled() && now.iterations < options.max_iterations) {
+    ++now.iterations;
+    now.X_BT_commanded.translation() += now.missing.head<3>();
+    now.X_BT_commanded.linear() = (rotation_exp(now.missing.tail<3>()) * now.X_BT_commanded.linear()).eval();
+    now.joints = inverse_kinematics(cell().robot, now.X_BT_commanded * X_TF, context.q);
+    if (now.joints.status != InverseStatus::kOk) return now;
+    context.q = now.joints.q;
+    now.missing = pose_difference(X_BT_wanted, pose_B(context, bias_weight));
+  }
+  now.settled = settled();
+  return now;
+}
+
+std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, const Pose& X_BT_wanted,
+                                                       PoseContext context, const CorrectOptions& options) const {
+  std::vector<int> found;
+  if (!has_spherical_wrist(cell().robot)) return found;
+  const Pose X_BF = X_BT_wanted * parts().physics.tools.at(context.tool).inverse();
+  for (int conf = 0; conf <= kHighestConf; ++conf) {
+    if (asked.conf == conf) continue;
+    const Result<InverseResult> joints = inverse_kinematics(cell().robot, X_BF, conf, asked.seed);
+    if (!joints || joints->status != InverseStatus::kOk) continue;
+    context.q = joints->q;
+    if (approach(X_BT_wanted, context, pose_B(context, 1), 1, options).settled) found.push_back(conf);
+  }
+  return found;
+}
+
+Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
+                                     const CorrectOptions& options) const {
+  PoseContext context;
+  context.tool = tool;
+  context.payload = payload;
+  context.served = true;
+  Correction result;
+  const auto end = [&](CorrectionStatus status, std::string message) {
+    result.status = status;
+    result.message = std::move(message);
+    return result;
+  };
+  const auto not_reached = [&](const InverseResult& joints) {
+    return end(status_of(joints.status),
+               why_not(cell().robot, joints, target.conf) +
+                   reached_by(branches_that_reach(target, result.X_BT_wanted, context, options)));
+  };
+
+  const Result<InverseResult> start = nominal_joints(target, parts().physics.tools.at(tool).inverse());
+  if (!start) return end(CorrectionStatus::kRefused, start.error().message);
+  context.q = start->q;
+  result.X_BT_wanted =
+      target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context) : target.X_BT;
+  // Left alone, the arm is sent where the target says.
+  result.X_BT_commanded = result.X_BT_wanted;
+  result.q = start->q;
+  if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
+
+  const ErrorPrediction before = predict(context, std::nullopt);
+  result.error_before =
+      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
+  result.error_after = result.error_before;
+  result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
+  if (start->status != InverseStatus::kOk) return not_reached(*start);
+
+  // Decided once, at the target: what the bias is worth there does not change by the little that a correction moves.
+  const double bias_weight = before.bias_weight;
+  const Approach found = approach(result.X_BT_wanted, context, before.X_BT_predicted, bias_weight, options);
+  result.iterations = found.iterations;
+  result.left = found.missing.head<3>().norm();
+  if (found.joints.status != InverseStatus::kOk) return not_reached(found.joints);
+  if (!found.settled) {
+    return end(CorrectionStatus::kNotConverged,
+               fmt::format("{:.2e} mm left after {} iterations", to_mm(result.left), result.iterations));
+  }
+  context.q = found.joints.q;
+  result.X_BT_commanded = found.X_BT_commanded;
+  result.q = found.joints.q;
+  const ErrorPrediction after = found.iterations > 0 ? predict(context, bias_weight) : before;
+  result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
+  result.stddev = result.error_after / std::sqrt(3.0);
+  if (before.in_domain) return end(CorrectionStatus::kOk, "");
+  const bool has_blocks = inside_->bias && inside_->bias->needs_features();
+  return end(CorrectionStatus::kOutOfDomain,
+             fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
+                         has_blocks ? ", the blocks of the bias" : "", 100 * bias_weight,
+                         has_blocks ? "its kernel" : "the learned bias"));
+}
+
+}  // namespace trammel

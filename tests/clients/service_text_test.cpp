@@ -1,0 +1,56 @@
+#include "clients/cli/service_text.h"
+
+#include <gtest/gtest.h>
+
+namespace trammel::cli {
+namespace {
+
+client::DatedJob job(std::int64_t number, const std::string& stage, const std::string& what) {
+  client::DatedJob job;
+  job.status = {number, "cell-7", stage, what, 0.4, 0, false};
+  job.server = "a";
+  job.kind = "train";
+  job.batches = {"lt-07"};
+  job.created_unix_s = 1'700'000'000;
+  return job;
+}
+
+TEST(ServiceText, JobsThatRunWaitAndFailedAreShownWithReasonAndDates) {
+  client::DatedJob failed = job(1, "failed", "too few rows");
+  failed.started_unix_s = 1'700'000'060;
+  failed.finished_unix_s = 1'700'003'600;
+  const std::string text = jobs_text({failed, job(2, "done", "old"), job(3, "done", "in force: better"),
+                                      job(4, "training", "learning the bias"), job(5, "queued", "")});
+  EXPECT_EQ(text,
+            "job 4 of cell cell-7 (training of lt-07) training 40 %, accepted 2023-11-14 22:13: learning the bias\n"
+            "job 5 of cell cell-7 (training of lt-07) queued, accepted 2023-11-14 22:13\n"
+            "job 3 of cell cell-7 (training of lt-07) done, accepted 2023-11-14 22:13: in force: better\n"
+            "job 1 of cell cell-7 (training of lt-07) failed, accepted 2023-11-14 22:13, begun 2023-11-14 22:14, ended "
+            "2023-11-14 23:13: too few rows\n");
+  EXPECT_EQ(jobs_text({}), "no job runs or waits\n");
+  EXPECT_EQ(jobs_json({failed})[0]["finished_unix_s"], 1'700'003'600);
+  EXPECT_TRUE(jobs_json({job(5, "queued", "")})[0]["started_unix_s"].is_null());
+}
+
+TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
+  client::ModelInfo model;
+  model.cell = "cell-7";
+  model.version = 2;
+  model.trained_at_unix_s = 1'700'000'000;
+  model.data_age_s = 86'400;
+  const std::string text = models_text({model}, 1'700'003'600);
+  EXPECT_NE(text.find("2023-11-14 22:13  2023-11-13 23:13"), std::string::npos) << text;
+}
+
+TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
+  client::JobStatus end{3, "cell-7", "done", "not in force: worse", 1, 4, false};
+  EXPECT_NE(next_step(end).find("trammel activate --service --model cell-7@4"), std::string::npos);
+  end.in_force = true;
+  EXPECT_EQ(next_step(end), "");
+  EXPECT_EQ(next_step({3, "cell-7", "done", "nothing", 1, 0, false}), "") << "a diagnosis";
+  EXPECT_NE(next_step({3, "cell-7", "failed", "batch b is in quarantine: another tool", 0, 0, false}).find("--release"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace trammel::cli
