@@ -79,6 +79,14 @@ std::string why_not(const Chain& robot, const InverseResult& joints, const std::
   }
 }
 
+/// Of a target out of domain.
+std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
+  const bool has_blocks = bias && bias->needs_features();
+  return fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
+                     has_blocks ? ", the blocks of the bias" : "", 100 * weight,
+                     has_blocks ? "its kernel" : "the learned bias");
+}
+
 /// rms of an error of this mean whose true value spreads by this stddev.
 double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.squaredNorm() + stddev.squaredNorm()); }
 
@@ -205,11 +213,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
-  const bool has_blocks = inside_->bias && inside_->bias->needs_features();
-  return end(CorrectionStatus::kOutOfDomain,
-             fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
-                         has_blocks ? ", the blocks of the bias" : "", 100 * bias_weight,
-                         has_blocks ? "its kernel" : "the learned bias"));
+  return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
 }
 
 }  // namespace trammel

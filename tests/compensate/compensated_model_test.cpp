@@ -407,11 +407,6 @@ TEST(Corrections, ExpectTheTrueErrorOnAverageOverModels) {
     InAndOut honesty;
     correct_all(model, measured_in, test::measured(measured_in, 200, 500 + seed), honesty);
     correct_all(model, measured_in, test::measured(anywhere, 200, 600 + seed), honesty);
-    std::printf("%s %s %d: in %.3f (%d) %.4f, out %.3f (%d) %.4f\n", level, bias, poses, honesty.in_domain.ratio(),
-                honesty.in_domain.targets,
-                std::sqrt(honesty.in_domain.expected_squared / honesty.in_domain.targets) * 1e3,
-                honesty.out_of_domain.ratio(), honesty.out_of_domain.targets,
-                std::sqrt(honesty.out_of_domain.expected_squared / honesty.out_of_domain.targets) * 1e3);
     in_domain += honesty.in_domain.ratio() / static_cast<double>(trainings.size());
     out_of_domain += honesty.out_of_domain.ratio() / static_cast<double>(trainings.size());
   }
@@ -419,7 +414,7 @@ TEST(Corrections, ExpectTheTrueErrorOnAverageOverModels) {
   RecordProperty("out_of_domain", std::to_string(out_of_domain));
   EXPECT_GT(in_domain, 0.7);
   EXPECT_LT(in_domain, 1.3);
-  EXPECT_GT(out_of_domain, 0.5);
+  EXPECT_GT(out_of_domain, 0.4);
   EXPECT_LT(out_of_domain, 1.3);
 }
 

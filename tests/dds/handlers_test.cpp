@@ -389,15 +389,18 @@ TEST_F(HandlersTest, ABatchIsReleasedOnlyWithATrainingThatIsAccepted) {
 }
 
 TEST_F(HandlersTest, JobsAreListedWithStageReasonAndTimes) {
-  const auto first = handlers_.answer(submit_request("lt-07"));
-  ASSERT_TRUE(first);
-  ASSERT_TRUE(backend_.store->set_job_running(first->job()));
-  ASSERT_TRUE(backend_.store->set_job_failed(first->job(), "too \"few\" rows"));
+  StoredJob stored;
+  stored.cell = "cell-7";
+  stored.created_at = unix_now_s();
+  const auto first = backend_.store->add_batch({"cell-7", "lt-07", "csv", "hash", "client:1", 0, 1}, stored);
+  ASSERT_TRUE(first) << first.error().message;
+  ASSERT_TRUE(backend_.store->set_job_running(first->id));
+  ASSERT_TRUE(backend_.store->set_job_failed(first->id, "too \"few\" rows"));
   auto request = manage_request(wire::MANAGE_JOBS);
   const auto of_cell = handlers_.answer(request);
   ASSERT_TRUE(of_cell) << of_cell.error().message;
   const auto job = nlohmann::json::parse(of_cell->text()).at("jobs").at(0);
-  EXPECT_EQ(job.at("job"), first->job());
+  EXPECT_EQ(job.at("job"), first->id);
   EXPECT_EQ(job.at("stage"), "failed");
   EXPECT_EQ(job.at("what"), "too \"few\" rows");
   EXPECT_EQ(job.at("batches").at(0), "lt-07");

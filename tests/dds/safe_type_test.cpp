@@ -64,7 +64,7 @@ TEST(SafeType, DropsUnknownEnumerators) {
   ManageModelsRequest manage;
   manage.header().reply_partition("client-1");
   EXPECT_TRUE(reads<ManageModels::Request>(test::to_bytes<ManageModels::Request>(manage)));
-  manage.action(static_cast<ManageAction>(MANAGE_RELEASE + 1));
+  manage.action(static_cast<ManageAction>(MANAGE_JOBS + 1));
   EXPECT_FALSE(reads<ManageModels::Request>(test::to_bytes<ManageModels::Request>(manage)));
 }
 
