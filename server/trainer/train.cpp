@@ -218,7 +218,10 @@ void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& bat
   parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
   parts.provenance.seed = options.seed;
   parts.provenance.trained_at = options.trained_at;
-  parts.provenance.measured_at = batch.measured_at;
+  // What it starts from is made of measurements too.
+  const std::optional<std::int64_t> before =
+      options.from ? options.from->provenance().measured_at : parts.provenance.measured_at;
+  parts.provenance.measured_at = std::max(before, batch.measured_at);
   parts.provenance.program_version = kProgramVersion;
 }
 

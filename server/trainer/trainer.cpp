@@ -18,7 +18,6 @@
 #include "server/measurement/measurement.h"
 #include "server/measurement/velocity.h"
 #include "server/trainer/extend.h"
-#include "server/trainer/paired_gain.h"
 
 namespace trammel {
 namespace {
@@ -93,27 +92,6 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
   all.source_text += next.source_text;
 }
 
-/// Whether trainings may take the batch.
-Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& cell) {
-  auto parsed = parse_batch(stored.csv, "batch " + stored.id);
-  if (!parsed) return parsed;
-  parsed->id = stored.id;
-  return check_against_cell(dated(std::move(*parsed), stored.accepted_at), cell);
-}
-
-/// Whether the model knows the tools and payloads of these poses (its cell file may be an older one).
-bool fits(const CompensatedModel& model, const MeasurementBatch& batch) {
-  return std::all_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-    return resolve_tool(model.cell(), m.context.tool) && resolve_payload(model.cell(), m.context.payload);
-  });
-}
-
-/// Whether a new model takes the place of the one in force, and why.
-struct Acceptance {
-  bool put_in_force = false;
-  std::string message;
-};
-
 /// The cell's own list and what the model in force has besides, as an applied diagnosis or somebody's level put it
 /// there: what was won stays won. Empty where there is nothing besides.
 std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force) {
@@ -131,53 +109,6 @@ std::optional<std::string> level_with_additions(const Cell& cell, const Compensa
   }
   if (level.size() == own) return std::nullopt;
   return level_of(level);
-}
-
-/// Against the nominal model: the first one of a cell, or the first with a tool that the one in force does not know.
-Acceptance judge_alone(const CompensatedModel& candidate, const MeasurementBatch& held_out, Trainer::Bar bar) {
-  const CompensatedModel::LevelErrors errors = candidate.errors_B(held_out);
-  const PairedGain gain = paired_gain(errors.nominal, errors.compensated);
-  const bool better = bar == Trainer::Bar::kBetter ? gain.beyond_chance() : gain.rms_after < gain.rms_before;
-  return {better,
-          fmt::format("{}: held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", better ? "in force" : "not in force",
-                      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses)};
-}
-
-/// Against the one in force: not worse by more than `accept_ratio`, or better by more than chance brings.
-Acceptance judge_against(const CompensatedModel& candidate, const ServedModel& present,
-                         const MeasurementBatch& held_out, Trainer::Bar bar, double accept_ratio) {
-  const PairedGain gain = paired_gain(present.model, candidate, held_out);
-  if (bar == Trainer::Bar::kBetter) {
-    const bool good = gain.beyond_chance();
-    return {good, fmt::format("{}: {}; before is version {}{}", good ? "in force" : "not in force", to_string(gain),
-                              present.version, good ? "" : ", which stays in force")};
-  }
-  const bool good = gain.rms_after <= accept_ratio * gain.rms_before;
-  return {good, fmt::format("{}: held-out rms {:.4f} mm, limit {} x {:.4f} mm of version {}, {} poses",
-                            good ? "in force" : "not in force", to_mm(gain.rms_after), accept_ratio,
-                            to_mm(gain.rms_before), present.version, gain.poses)};
-}
-
-Acceptance judge(const CompensatedModel& candidate, const ServedModel* present, const MeasurementBatch& held_out,
-                 Trainer::Bar bar, double accept_ratio) {
-  if (held_out.measurements.empty()) {
-    return {false, "not in force: no pose was held out to judge it; activate it if it is wanted"};
-  }
-  if (!std::isfinite(candidate.evaluate(held_out).compensated.rms)) {
-    return {false, "not in force: its held-out rms is not finite"};
-  }
-  if (present == nullptr || !fits(present->model, held_out)) return judge_alone(candidate, held_out, bar);
-  return judge_against(candidate, *present, held_out, bar, accept_ratio);
-}
-
-/// Where the version marked in force cannot be asked: against what its own held-out poses said when it was made.
-Acceptance judge_by_record(const CompensatedModel& candidate, const StoredModel& record,
-                           const MeasurementBatch& held_out, double accept_ratio, Acceptance otherwise) {
-  const double rms = candidate.evaluate(held_out).compensated.rms;
-  if (record.validation_rms == 0 || rms <= accept_ratio * record.validation_rms) return otherwise;
-  return {false, fmt::format("not in force: held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its "
-                             "own, which is marked in force but cannot be loaded; activate it if it is wanted",
-                             to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version)};
 }
 
 JobStage stage_of(JobState state) {
@@ -206,6 +137,13 @@ JobProgress progress_of(const StoredJob& job) {
 }
 
 }  // namespace
+
+Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& cell) {
+  auto parsed = parse_batch(stored.csv, "batch " + stored.id);
+  if (!parsed) return parsed;
+  parsed->id = stored.id;
+  return check_against_cell(dated(std::move(*parsed), stored.accepted_at), cell);
+}
 
 Status check_released(const StoredBatch& batch) {
   if (batch.quarantine.empty()) return {};
@@ -493,16 +431,6 @@ Result<CompensatedModel> Trainer::load_for_service(const std::string& cell_name,
   return model;
 }
 
-Result<std::optional<StoredModel>> Trainer::record_not_loaded(const std::string& cell_name) const {
-  if (registry_.in_force(cell_name)) return std::nullopt;
-  const auto models = store_.models(cell_name);
-  if (!models) return tl::make_unexpected(models.error());
-  const auto marked = std::find_if(models->begin(), models->end(), [](const StoredModel& m) { return m.in_force; });
-  // One that can be loaded was set aside for its robot or tools: its figures say nothing about others.
-  if (marked == models->end() || store_.model(cell_name, marked->version)) return std::nullopt;
-  return *marked;
-}
-
 /// Of a model that the store has put in force; activation_mutex_ is held.
 void Trainer::put_in_force(std::shared_ptr<const ServedModel> model) {
   registry_.publish(model);
@@ -554,10 +482,10 @@ Status Trainer::attempt(std::int64_t id, const std::stop_token& stop) {
   const auto batch = load_batches(*job, **cell_found);
   if (!batch) return tl::make_unexpected(batch.error());
 
-  const auto model = train(*cell_found, *batch, train_options(*job, **cell_found, progress, stop));
+  std::string note = looked_at->empty() ? "" : "the batch: " + *looked_at;
+  const auto model = trained(*job, *batch, train_options(*job, **cell_found, progress, stop), note);
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), Bar::kNotWorse,
-              looked_at->empty() ? "" : "the batch: " + *looked_at);
+  return keep(*model, std::move(progress), Bar::kBetter, note);
 }
 
 std::function<bool(const std::string&, double)> Trainer::reporter(const JobProgress& progress,
@@ -599,50 +527,12 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
     auto checked = checked_batch(*stored, cell);
     if (!checked) return checked;
     // The drawing of the rows held out is a property of the batch: see the class.
-    batches.push_back(with_held_out(std::move(*checked), options_.validation_share, options_.seed));
+    batches.push_back(held_out_by_service(std::move(*checked), options_.validation_share, options_.seed));
   }
   if (batches.size() == 1) return std::move(batches.front());
   MeasurementBatch all;
   for (MeasurementBatch& batch : batches) append(all, std::move(batch));
   return all;
-}
-
-Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
-                     const std::string& note, const Diagnosis* diagnosis) {
-  progress.stage = JobStage::kStoring;
-  progress.what.clear();
-  progress.share = 1;
-  report(progress);
-  {
-    const std::lock_guard lock(activation_mutex_);
-    MeasurementBatch whole = batch;
-    fill_velocity(whole);
-    Judges judges{split_batch(whole, options_.validation_share, options_.seed).validation, {}};
-    if (diagnosis != nullptr) judges = judges_of(*diagnosis, std::move(judges.batch));
-    Acceptance verdict =
-        judge(model, registry_.in_force(progress.cell).get(), judges.batch, bar, options_.accept_ratio);
-    if (verdict.put_in_force) {
-      const auto record = record_not_loaded(progress.cell);
-      if (!record) return tl::make_unexpected(record.error());
-      if (*record) verdict = judge_by_record(model, **record, judges.batch, options_.accept_ratio, std::move(verdict));
-    }
-    verdict.message += judged_without(judges.left_out);
-    if (!note.empty()) verdict.message += "; " + note;
-    const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
-    if (!version) return tl::make_unexpected(version.error());
-    const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});
-    if (verdict.put_in_force) {
-      put_in_force(served);
-    } else if (on_model_) {
-      on_model_(*served, false);
-    }
-    progress.what = verdict.message;
-    progress.model_version = *version;
-    progress.in_force = verdict.put_in_force;
-  }
-  progress.stage = JobStage::kDone;
-  report(progress);
-  return {};
 }
 
 void Trainer::report(const JobProgress& progress) {

@@ -13,6 +13,7 @@
 #include "server/base/bounded_queue.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
+#include "server/trainer/gate.h"
 #include "server/trainer/train.h"
 
 namespace trammel {
@@ -22,8 +23,8 @@ struct Diagnosis;
 struct TrainerOptions {
   int queue_capacity = 16;        ///< jobs waiting; one more is refused (kBusy) and nothing is stored
   int max_poses = 5000;           ///< of one training, all its batches together; memory grows with the square
-  double validation_share = 0.2;  ///< of the rows of a batch without `set` column
-  double accept_ratio = 1.02;     ///< put in force only if held-out rms <= this times that of the model in force
+  double validation_share = 0.2;  ///< of the poses of a batch are held out to judge models by (judging_rows())
+  double accept_ratio = 1.02;     ///< see GateOptions
   std::uint64_t seed = 1;
 };
 
@@ -45,12 +46,11 @@ struct JobProgress {
 /// take_up(), start() and stop() excepted.
 ///
 /// Which rows are held out is drawn batch by batch: a row held out once is held out in every training of that batch, so
-/// that the model in force and its successor are compared on poses that neither was trained on.
+/// that the model in force and its successor are compared on poses of all stored batches that neither was trained on
+/// (judge()). A batch that covers much less of the joint ranges than the model in force, or fewer of its tools, teaches
+/// base and tool only; the rest of that model stays.
 class Trainer {
  public:
-  /// What a new model must be to be put in force: as TrainerOptions::accept_ratio says, or better than the one in force
-  /// beyond chance (PairedGain).
-  enum class Bar { kNotWorse, kBetter };
   /// Called by whichever thread changes the job; for one job never by two at a time.
   using ProgressListener = std::function<void(const JobProgress&)>;
   /// A model was stored (in_force: and put in force). Called in the order of the changes, while no other can happen: it
@@ -134,6 +134,8 @@ class Trainer {
   void put_in_force(std::shared_ptr<const ServedModel> model);
   /// The version marked in force, where it could not be loaded.
   [[nodiscard]] Result<std::optional<StoredModel>> record_not_loaded(const std::string& cell) const;
+  /// The last versions that served the cell before the one in force, as far as they load.
+  [[nodiscard]] Result<std::vector<ServedModel>> served_before(const std::string& cell) const;
 
   void work(const std::stop_token& stop);
   void run(std::int64_t job, const std::stop_token& stop);
@@ -150,10 +152,23 @@ class Trainer {
                                                                          const std::stop_token& stop);
   [[nodiscard]] TrainOptions train_options(const StoredJob& job, const Cell& cell, const JobProgress& progress,
                                            const std::stop_token& stop);
-  /// Stores the model and, if it is good enough, puts it in force. `note` goes with the outcome; poses that fit neither
+  /// The model that the job asks for, from `batch`. Where the job asks for nothing special and the batch covers much
+  /// less than the model in force, that model with base and tool refitted; `note` then says so.
+  [[nodiscard]] Result<CompensatedModel> trained(const StoredJob& job, const MeasurementBatch& batch,
+                                                 TrainOptions options, std::string& note) const;
+  /// Stores the model and, if judge() says so, puts it in force. `note` goes with the outcome; poses that fit neither
   /// model by a `diagnosis` do not judge.
-  [[nodiscard]] Status keep(const CompensatedModel& model, const MeasurementBatch& batch, JobProgress progress, Bar bar,
-                            const std::string& note, const Diagnosis* diagnosis = nullptr);
+  [[nodiscard]] Status keep(const CompensatedModel& model, JobProgress progress, Bar bar, const std::string& note,
+                            const Diagnosis* diagnosis = nullptr);
+  /// The stored batches whose rows may judge what `job` makes: not in quarantine, not waiting, nothing that failed.
+  [[nodiscard]] Result<std::vector<JudgingSession>> judging_sessions(const StoredJob& job) const;
+  /// That of the batch that a diagnosis was of; appended where it is not among them.
+  [[nodiscard]] Result<JudgingSession*> session_of_diagnosis(const StoredJob& job,
+                                                             std::vector<JudgingSession>& sessions) const;
+  /// Of the model against `present`; null: none in force.
+  [[nodiscard]] Result<GateVerdict> verdict(const CompensatedModel& model, const ServedModel* present,
+                                            const std::vector<JudgingSession>& sessions, const std::string& cell,
+                                            Bar bar) const;
   /// Ends a job that makes no model.
   [[nodiscard]] Status finish(JobProgress progress, const std::string& outcome);
   void report(const JobProgress& progress);
@@ -175,5 +190,7 @@ class Trainer {
 
 /// Refused while the batch is in quarantine: nothing is learned from it.
 [[nodiscard]] Status check_released(const StoredBatch& batch);
+/// Read and checked against its cell.
+[[nodiscard]] Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& cell);
 
 }  // namespace trammel

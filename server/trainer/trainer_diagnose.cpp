@@ -106,7 +106,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   auto batch = batch_to_diagnose(job, *asked, *cell_found);
   if (!batch) return tl::make_unexpected(batch.error());
   // What is to judge an extended model must not have been looked at.
-  if (asked->apply) *batch = with_held_out(std::move(*batch), options_.validation_share, options_.seed);
+  if (asked->apply) *batch = held_out_by_service(std::move(*batch), options_.validation_share, options_.seed);
   DiagnoseOptions options;
   options.seed = options_.seed;
   const double whole = asked->apply ? kDiagnosisShare : 1;
@@ -141,7 +141,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   };
   const auto model = train(cell_found, *batch, training);
   if (!model) return tl::make_unexpected(model.error());
-  return keep(*model, *batch, std::move(progress), Bar::kBetter, to_string(supported->left_out), &*diagnosis);
+  return keep(*model, std::move(progress), Bar::kBetterBeyondChance, to_string(supported->left_out), &*diagnosis);
 }
 
 Status Trainer::finish(JobProgress progress, const std::string& outcome) {

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+/// By which rows the models of a cell are judged, and what a model leaves of them.
+namespace trammel {
+
+/// The rows (Measurement::row) of `batch` that judge models: `share` of its poses and, of 100 poses and more, at
+/// least 34. Drawn by the service with `seed` from the rows that the submitter does not hold out himself (`set`), so
+/// that he can hold out more but not choose who judges. Repeats of a pose are drawn together: a copy of a judge is not
+/// learned from. Reproducible: same rows, share and seed, same judges.
+[[nodiscard]] std::set<int> judging_rows(const MeasurementBatch& batch, double share, std::uint64_t seed);
+
+/// `batch` with a set for every row: kValidation where it judges, is a copy of one that does, or is held out by its
+/// submitter; else kTrain.
+[[nodiscard]] MeasurementBatch held_out_by_service(MeasurementBatch batch, double share, std::uint64_t seed);
+
+/// One stored batch as it judges. A tracker is set up anew each time, so a session has a base of its own.
+struct JudgingSession {
+  std::string batch_id;
+  MeasurementBatch training;  ///< tells each model where the base of this session stands
+  MeasurementBatch judges;    ///< that no model was trained on
+};
+/// `batch` is checked against the cell and held_out_by_service() is not applied to it yet.
+[[nodiscard]] JudgingSession judging_session(const MeasurementBatch& batch, double share, std::uint64_t seed);
+
+/// Measured - predicted of the judges of one session, in B, with the base where the session's training rows put it for
+/// this very model: 3 x N. A column is not a number where the model does not know the tool or payload; of rotations
+/// also where no orientation was measured.
+struct LocatedErrors {
+  Eigen::Matrix3Xd position;       ///< m
+  Eigen::Matrix3Xd rotation;       ///< rotation vectors, rad
+  Eigen::VectorXd expected;        ///< N, m: what the model expects of one measurement, Euclidean
+  Eigen::VectorXd expected_truth;  ///< N, m: what it expects of its true error, Euclidean
+};
+enum class JudgedLevel { kNominal, kCompensated };
+[[nodiscard]] LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession& session,
+                                           JudgedLevel level = JudgedLevel::kCompensated);
+
+/// Whether the model knows this tool with this payload, and both are still in its cell.
+[[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
+
+/// The share of the joint ranges [q_min, q_max] (rad) that poses spread over, of the joint where it is least: the
+/// middle 80 % of the poses over 80 % of the range, so that a single pose far out widens nothing. Joints whose range is
+/// below 1e-3 rad do not count.
+[[nodiscard]] double coverage(const std::vector<JointVector>& poses, const JointVector& q_min,
+                              const JointVector& q_max);
+
+}  // namespace trammel

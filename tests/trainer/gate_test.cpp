@@ -1,0 +1,197 @@
+// What may take the place of a good model by itself: batches that would make it worse, and batches that are a gain.
+// Each is measured on the virtual robot, by its true error before and after.
+#include "server/trainer/gate.h"
+
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "server/trainer/train.h"
+#include "tests/support/demand.h"
+#include "tests/support/learning_cell.h"
+
+namespace trammel {
+namespace {
+
+using test::Day;
+using test::LearningCell;
+using test::measured_on;
+using test::true_error;
+
+class GateTest : public testing::Test {
+ protected:
+  GateTest() { use(*test::cell_7()); }
+  void use(Cell cell) {
+    cell.model.bias = "se";
+    cell_ = std::make_shared<const Cell>(std::move(cell));
+    robot_ = test::chapter_5_robot(cell_);
+  }
+  /// 200 poses over the whole range.
+  MeasurementBatch first_day(const std::string& tool = {}) const {
+    return measured_on(robot_, {.seed = 31, .tool = tool});
+  }
+  /// A good model is in force; `days` are submitted. Its true error must not grow.
+  void expect_not_worse(const std::vector<MeasurementBatch>& days, const std::string& tool = {}) {
+    LearningCell learning(cell_);
+    const JobProgress first = learning.submit(first_day(tool));
+    ASSERT_TRUE(first.in_force) << first.what;
+    const double before = true_error(learning.model(), robot_, tool);
+    EXPECT_LT(to_mm(before), 0.012);
+    std::string what;
+    for (const MeasurementBatch& day : days) what += learning.submit(day).what + "\n";
+    const double after = true_error(learning.model(), robot_, tool);
+    EXPECT_LE(after, std::max(1.15 * before, before + 1e-6)) << what;
+  }
+  [[nodiscard]] VirtualRobot with_joint_2_off(double rad) const {
+    VirtualRobot changed = robot_;
+    const std::vector<Parameter> parameters = changed.truth.parameters();
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      if (parameters[k].name == "q2") changed.truth.values(static_cast<Eigen::Index>(k)) += rad;
+    }
+    return changed;
+  }
+
+  std::shared_ptr<const Cell> cell_;
+  VirtualRobot robot_;
+};
+
+TEST_F(GateTest, ACornerMeasuredAfterTheTrackerWasSetUpElsewhereDoesNotReplaceAGoodModel) {
+  expect_not_worse({measured_on(robot_, {.poses = 25, .seed = 32, .corner = 0.3, .set_up_anew = true})});
+}
+
+TEST_F(GateTest, NoisierPosesOverTheWholeRangeDoNotReplaceAGoodModel) {
+  expect_not_worse({measured_on(robot_, {.poses = 100, .seed = 33, .noise = 1.45, .set_up_anew = true})});
+}
+
+TEST_F(GateTest, ASubmitterDoesNotChooseHisJudges) {
+  MeasurementBatch corner = measured_on(robot_, {.poses = 40, .seed = 34, .corner = 0.3});
+  const std::vector<Measurement> rows = corner.measurements;
+  for (Measurement& m : corner.measurements) m.set = MeasurementSet::kTrain;
+  for (Measurement copy : rows) {
+    copy.pose_id = "copy-" + copy.pose_id;
+    copy.set = MeasurementSet::kValidation;
+    corner.measurements.push_back(std::move(copy));
+  }
+  expect_not_worse({corner});
+}
+
+TEST_F(GateTest, EverNoisierBatchesDoNotAddUpToAWorseModel) {
+  std::vector<MeasurementBatch> days;
+  for (const double noise : {1.35, 1.7, 2.05, 2.4, 2.75, 3.1}) {
+    days.push_back(measured_on(robot_, {.poses = 60, .seed = 35 + days.size(), .noise = noise}));
+  }
+  expect_not_worse(days);
+}
+
+class TwoToolsTest : public GateTest {
+ protected:
+  TwoToolsTest() {
+    Cell cell = *test::cell_7();
+    Pose probe = *cell.tools.at("spindle");
+    probe.translation() += Vector3(0.03, 0.05, 0.12);
+    cell.tools["probe"] = probe;
+    use(std::move(cell));
+  }
+};
+
+TEST_F(TwoToolsTest, AnotherToolAloneDoesNotSpoilTheFirst) {
+  expect_not_worse({measured_on(robot_, {.poses = 80, .seed = 36, .tool = "probe"})}, "spindle");
+}
+
+TEST_F(TwoToolsTest, ABatchOfAnotherToolAloneTeachesThatTool) {
+  LearningCell learning(cell_);
+  learning.submit(first_day("spindle"));
+  const JobProgress done = learning.submit(measured_on(robot_, {.poses = 80, .seed = 36, .tool = "probe"}));
+  EXPECT_TRUE(done.in_force) << done.what;
+  EXPECT_TRUE(learning.model().check_trained_with("spindle", "spindle"));
+  EXPECT_TRUE(learning.model().check_trained_with("probe", "spindle"));
+}
+
+TEST_F(GateTest, ManyGoodPosesAfterFewNoisyOnesGoInForceWhereverTheTrackerStands) {
+  for (const bool anew : {false, true}) {
+    LearningCell learning(cell_);
+    learning.submit(measured_on(robot_, {.poses = 40, .seed = 37, .noise = 2}));
+    const double before = true_error(learning.model(), robot_);
+    const JobProgress done = learning.submit(measured_on(robot_, {.poses = 400, .seed = 38, .set_up_anew = anew}));
+    EXPECT_TRUE(done.in_force) << done.what;
+    EXPECT_LT(true_error(learning.model(), robot_), 0.5 * before);
+  }
+}
+
+TEST_F(GateTest, AnArmThatHasChangedIsLearnedAnew) {
+  const VirtualRobot changed = with_joint_2_off(1e-3);
+  LearningCell learning(cell_);
+  learning.submit(first_day());
+  const JobProgress done = learning.submit(measured_on(changed, {.poses = 120, .seed = 39, .set_up_anew = true}));
+  EXPECT_TRUE(done.in_force) << done.what;
+  EXPECT_LT(to_mm(true_error(learning.model(), changed)), 0.02);
+}
+
+TEST_F(GateTest, TheOutcomeSaysBeforeAfterLimitAndWhy) {
+  LearningCell learning(cell_);
+  learning.submit(first_day());
+  const JobProgress done = learning.submit(measured_on(robot_, {.poses = 100, .seed = 40, .noise = 1.45}));
+  EXPECT_FALSE(done.in_force);
+  for (const char* part : {"not in force", "held-out rms", "before", "(version 1)", "limit", "activate"})
+    EXPECT_NE(done.what.find(part), std::string::npos) << part << " in: " << done.what;
+}
+
+TEST_F(GateTest, FewJudgesLeaveItToAPerson) {
+  LearningCell learning(cell_);
+  learning.submit(measured_on(robot_, {.poses = 40, .seed = 41, .noise = 2}));
+  const JobProgress done = learning.submit(measured_on(robot_, {.poses = 60, .seed = 42}));
+  EXPECT_FALSE(done.in_force) << done.what;
+  EXPECT_NE(done.what.find("30 are needed"), std::string::npos) << done.what;
+  EXPECT_TRUE(learning.trainer().activate(cell_->name, done.model_version));
+}
+
+/// Judged without a trainer.
+class JudgeTest : public GateTest {
+ protected:
+  [[nodiscard]] MeasurementBatch day(const Day& day) const {
+    MeasurementBatch batch = test::demand(check_against_cell(measured_on(robot_, day), *cell_));
+    batch.id = fmt::format("day-{}", day.seed);
+    return batch;
+  }
+  [[nodiscard]] JudgingSession session(const Day& of) const { return judging_session(day(of), 0.2, 1); }
+  [[nodiscard]] CompensatedModel trained(const Day& of) const {
+    TrainOptions options;
+    options.bias = "none";
+    return test::demand(train(cell_, held_out_by_service(day(of), 0.2, 1), options));
+  }
+};
+
+TEST_F(JudgeTest, WithoutAnyPoseHeldOutNothingGoesInForce) {
+  const CompensatedModel model = trained({.seed = 1});
+  EXPECT_FALSE(judge({model, nullptr, {}, {}, 0}, {}).put_in_force);
+}
+
+TEST_F(JudgeTest, NothingThatIsWorseThanWhatServedBeforeGoesInForce) {
+  const ServedModel best{cell_->name, 1, trained({.seed = 1})};
+  const ServedModel worst{cell_->name, 2, trained({.poses = 40, .seed = 2, .noise = 4})};
+  const CompensatedModel middle = trained({.poses = 60, .seed = 3, .noise = 2});
+  const std::vector<JudgingSession> sessions = {session({.poses = 400, .seed = 1})};
+  EXPECT_TRUE(judge({middle, &worst, {}, sessions, 0}, {}).put_in_force);
+  const GateVerdict held = judge({middle, &worst, {best}, sessions, 0}, {});
+  EXPECT_FALSE(held.put_in_force);
+  EXPECT_NE(held.message.find("version 1 has"), std::string::npos) << held.message;
+}
+
+TEST_F(JudgeTest, WhereTheNewestSessionsDoNotFitOnlyTheyJudge) {
+  const ServedModel present{cell_->name, 1, trained({.seed = 1})};
+  const JudgingSession old = session({.seed = 1}), later = session({.seed = 2});
+  robot_ = with_joint_2_off(1e-3);
+  const JudgingSession changed = session({.seed = 3}), again = session({.seed = 4});
+  const auto today = [&](const std::vector<JudgingSession>& sessions, std::size_t first_new) {
+    std::vector<std::string> ids;
+    for (const JudgingSession& one : sessions_of_today({present.model, &present, {}, sessions, first_new}))
+      ids.push_back(one.batch_id);
+    return ids;
+  };
+  EXPECT_EQ(today({old, later}, 1), (std::vector<std::string>{"day-1", "day-2"}));
+  EXPECT_EQ(today({old, changed, again}, 1), (std::vector<std::string>{"day-3", "day-4"}));
+  EXPECT_EQ(today({changed, old, later}, 2), (std::vector<std::string>{"day-1", "day-2"})) << "an arm that was";
+  EXPECT_EQ(today({old, changed, later}, 1), (std::vector<std::string>{"day-1", "day-2"})) << "one bad day";
+}
+
+}  // namespace
+}  // namespace trammel
