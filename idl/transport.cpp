@@ -114,8 +114,10 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
 
   dds::DomainParticipantQos qos;
   qos.name(options.name);
+  const std::string mark = domain_mark(options.domain);
+  qos.user_data().setValue(std::vector<unsigned char>(mark.begin(), mark.end()));
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports = {udp};
+  qos.transport().user_transports = {with_domain_gate(udp, options.domain, options.heard_of_itself)};
   qos.transport().send_socket_buffer_size = kSocketBuffer;
   qos.transport().listen_socket_buffer_size = kSocketBuffer;
   auto& builtin = qos.wire_protocol().builtin;
@@ -125,6 +127,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   builtin.metatrafficUnicastLocatorList.push_back(locator(options.address, options.listen_port));
   for (const std::uint16_t port : options.peer_ports)
     builtin.initialPeersList.push_back(locator(options.address, port));
+  if (options.heard_of_itself) builtin.initialPeersList.push_back(locator(options.address, options.listen_port));
 
   dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, discovery, dds::StatusMask::none());

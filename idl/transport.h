@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/domain_gate.h"
 #include "idl/safe_type.h"
 #include "idl/topics.h"
 #include "server/base/result.h"
@@ -32,6 +33,8 @@ struct ParticipantOptions {
   std::string address = "127.0.0.1";      ///< IPv4 of the only interface that is used
   std::uint16_t listen_port = 0;          ///< where others look for it; 0 = any
   std::vector<std::uint16_t> peer_ports;  ///< on `address`: where it looks for others
+  /// Where given, it is among its own peers, on `listen_port`, and its announcements are counted as they come back.
+  std::shared_ptr<HeardOfItself> heard_of_itself = {};
 };
 
 struct ParticipantDeleter {
@@ -39,9 +42,9 @@ struct ParticipantDeleter {
 };
 using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
 
-/// UDPv4 on one interface, unicast only, nothing taken from the environment. Refuses an address that this host does not
-/// have now: such a participant would stay deaf even when the interface comes up. One participant a process.
-/// `discovery` outlives it and hears of nothing but who is found.
+/// UDPv4 on one interface, unicast only, nothing taken from the environment; deaf to other domains. Refuses an address
+/// that this host does not have now: such a participant would stay deaf even when the interface comes up. One
+/// participant a process. `discovery` outlives it and hears of nothing but who is found.
 [[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options,
                                                       dds::DomainParticipantListener* discovery = nullptr);
 

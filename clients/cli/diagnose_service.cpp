@@ -4,6 +4,7 @@
 
 #include "clients/cli/diagnose_text.h"
 #include "clients/cli/output.h"
+#include "server/base/json_guard.h"
 #include "server/base/text_file.h"
 
 namespace trammel::cli {
@@ -28,6 +29,28 @@ Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
   });
 }
 
+/// What a service found, read and told; its bytes come from outside.
+struct Findings {
+  ordered_json json;
+  std::string text;
+};
+
+Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
+  const std::string what = fmt::format("what job {} found", job);
+  if (const Status small = check_json_limits(bytes, what); !small) return tl::make_unexpected(small.error());
+  Findings findings{ordered_json::parse(bytes, nullptr, false), {}};
+  try {
+    if (findings.json.is_object()) {
+      findings.text = diagnosis_text(findings.json);
+      if (!findings.json.at("next_poses").empty()) static_cast<void>(next_poses_csv(findings.json));
+      return findings;
+    }
+  } catch (const ordered_json::exception& error) {
+    return failure(ErrorCode::kInternal, "{} is no diagnosis: {}", what, error.what());
+  }
+  return failure(ErrorCode::kInternal, "{} is not JSON", what);
+}
+
 }  // namespace
 
 Status diagnose_at_service(const DiagnoseArguments& arguments) {
@@ -47,9 +70,10 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
   if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
   auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
   if (!found) return tl::make_unexpected(found.error());
-  ordered_json json = ordered_json::parse(found->findings_json, nullptr, false);
-  if (!json.is_object()) return failure(ErrorCode::kInternal, "what job {} found is not JSON", *job);
-  say(diagnosis_text(json), arguments);
+  Result<Findings> findings = findings_of(found->findings_json, *job);
+  if (!findings) return tl::make_unexpected(findings.error());
+  ordered_json& json = findings->json;
+  say(findings->text, arguments);
   if (arguments.apply) {
     const int now = found->in_force.version;
     json["applied"] = {{"job", *job},

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/base/json_guard.h"
+
 namespace trammel::client {
 namespace {
 
@@ -169,11 +171,18 @@ ServerStatus from_wire(const wire::ServiceStatus& status) {
 }
 
 Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json) {
+  static const std::string kWhat = "the server's list of batches in quarantine";
+  if (const Status small = check_json_limits(json, kWhat); !small) return tl::make_unexpected(small.error());
   const auto list = nlohmann::json::parse(json, nullptr, false);
-  if (!list.is_array()) return failure(ErrorCode::kInternal, "the server's list of batches in quarantine is none");
+  if (!list.is_array()) return failure(ErrorCode::kInternal, "{} is none", kWhat);
   std::vector<QuarantinedBatch> batches;
-  for (const auto& one : list) {
-    batches.push_back({one.value("cell", ""), one.value("batch", ""), one.value("reason", ""), one.value("poses", 0)});
+  try {
+    for (const auto& one : list) {
+      batches.push_back(
+          {one.value("cell", ""), one.value("batch", ""), one.value("reason", ""), one.value("poses", 0)});
+    }
+  } catch (const nlohmann::json::exception& error) {
+    return failure(ErrorCode::kInternal, "{} is none: {}", kWhat, error.what());
   }
   return batches;
 }

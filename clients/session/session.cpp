@@ -62,6 +62,13 @@ struct Session::Participant {
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
+  /// For a message: how long, on which ports, in which domain.
+  [[nodiscard]] std::string where_it_looked() const {
+    std::string ports;
+    for (const std::uint16_t port : options.server_ports) ports += fmt::format(" 127.0.0.1:{}", port);
+    return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), ports, options.domain);
+  }
+
   /// One request; an error also when the server says so.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
@@ -69,10 +76,7 @@ struct Session::Participant {
                                                              const Route& route) {
     auto reply = caller.call(std::move(request), route, deadline());
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
-      std::string ports;
-      for (const std::uint16_t port : options.server_ports) ports += fmt::format(" 127.0.0.1:{}", port);
-      return failure(ErrorCode::kUnreachable, "{} ({} ms, looking at{})", reply.error().message,
-                     options.timeout.count(), ports);
+      return failure(ErrorCode::kUnreachable, "{} ({})", reply.error().message, where_it_looked());
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
@@ -101,7 +105,7 @@ struct Session::Participant {
 
   /// The server that has the job, and its present state.
   [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
-    Error last{ErrorCode::kUnreachable, fmt::format("no server found in {} ms", options.timeout.count())};
+    Error last{ErrorCode::kUnreachable, fmt::format("no server found ({})", where_it_looked())};
     for (const KnownServer& server : watch->wait_for_servers(options.server_ports.size(), deadline())) {
       auto found = job(server.id(), number);
       if (found) return std::pair(server.id(), std::move(*found));
@@ -335,7 +339,7 @@ Result<std::vector<ServerStatus>> Session::servers() {
   const auto& options = participant_->options;
   const auto known = participant_->watch->wait_for_servers(options.server_ports.size(), participant_->deadline());
   if (known.empty()) {
-    return failure(ErrorCode::kUnreachable, "no server found in {} ms", options.timeout.count());
+    return failure(ErrorCode::kUnreachable, "no server found ({})", participant_->where_it_looked());
   }
   std::vector<ServerStatus> servers;
   for (const KnownServer& server : known) servers.push_back(from_wire(server.status));

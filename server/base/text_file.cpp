@@ -7,7 +7,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <system_error>
 
 #include "server/base/unix_time.h"
@@ -15,6 +14,25 @@
 namespace trammel {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// A pipe or a device does not say how much will come of it.
+Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text;
+  std::vector<char> part(std::size_t{1} << 16);
+  while (in.read(part.data(), static_cast<std::streamsize>(part.size())) || in.gcount() > 0) {
+    text.append(part.data(), static_cast<std::size_t>(in.gcount()));
+    if (text.size() > limit_bytes) {
+      return failure(ErrorCode::kTooLarge, "{}: more than {} bytes, its limit", path, limit_bytes);
+    }
+  }
+  if (!in.eof()) return refused("{}: cannot be read: {}", path, std::strerror(errno));
+  return text;
+}
+
+}  // namespace
 
 Result<std::string> read_text_file(const std::string& path, std::size_t limit_bytes) {
   std::error_code error;
@@ -24,11 +42,7 @@ Result<std::string> read_text_file(const std::string& path, std::size_t limit_by
   if (fs::is_regular_file(path, error) && fs::file_size(path, error) > limit_bytes) {
     return failure(ErrorCode::kTooLarge, "{}: {} bytes, limit {}", path, fs::file_size(path, error), limit_bytes);
   }
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) return refused("{}: cannot be read: {}", path, std::strerror(errno));
-  return std::move(text).str();
+  return read_up_to(path, limit_bytes);
 }
 
 std::int64_t written_at(const std::string& path) {

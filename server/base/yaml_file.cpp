@@ -1,11 +1,76 @@
 #include "server/base/yaml_file.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <sstream>
+
+#include "server/base/near_miss.h"
 
 namespace trammel {
+namespace {
 
-YamlMap::YamlMap(YAML::Node node, std::string where) : node_(std::move(node)), where_(std::move(where)) {
+constexpr std::size_t kMostBytes = std::size_t{1} << 20;
+constexpr int kMostDepth = 20;
+constexpr int kMostEntries = 20'000;
+constexpr int kMostAliases = 100;
+
+/// Counts what the parser meets, and ends it where there is too much.
+class Counter final : public YAML::EventHandler {
+ public:
+  explicit Counter(const std::string& where) : where_(where) {}
+
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override { entry(); }
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override { within("aliases", ++aliases_, kMostAliases); }
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override { entry(); }
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    deeper();
+  }
+  void OnSequenceEnd() override { --depth_; }
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    deeper();
+  }
+  void OnMapEnd() override { --depth_; }
+
+ private:
+  void entry() { within("entries", ++entries_, kMostEntries); }
+  void deeper() {
+    entry();
+    within("lists and mappings inside one another", ++depth_, kMostDepth);
+  }
+  void within(const char* what, int count, int limit) const {
+    if (count > limit) throw YamlRefusal{fmt::format("{}: {} {}, limit {}", where_, count, what, limit)};
+  }
+
+  const std::string& where_;
+  int depth_ = 0, entries_ = 0, aliases_ = 0;
+};
+
+}  // namespace
+
+Status check_yaml_limits(const std::string& text, const std::string& where) {
+  if (text.size() > kMostBytes) {
+    return failure(ErrorCode::kTooLarge, "{}: {} bytes, limit {}", where, text.size(), kMostBytes);
+  }
+  std::istringstream stream(text);
+  Counter counter(where);
+  try {
+    YAML::Parser(stream).HandleNextDocument(counter);
+  } catch (const YamlRefusal& refusal) {
+    return failure(ErrorCode::kTooLarge, "{}", refusal.message);
+  }
+  return {};
+}
+
+YamlMap::YamlMap(YAML::Node node, std::string where)
+    : YamlMap(std::move(node), std::move(where), std::make_shared<std::vector<std::string>>()) {}
+
+YamlMap::YamlMap(YAML::Node node, std::string where, std::shared_ptr<std::vector<std::string>> problems)
+    : node_(std::move(node)), where_(std::move(where)), problems_(std::move(problems)) {
   if (!node_.IsMap()) throw YamlRefusal{fmt::format("{}: expected keys and values", where_)};
 }
 
@@ -14,22 +79,23 @@ void YamlMap::refuse(const std::string& key, const std::string& why) const {
 }
 
 void YamlMap::only(std::initializer_list<const char*> known) const {
-  std::string list;
-  for (const char* name : known) list += fmt::format("{}{}", list.empty() ? "" : " ", name);
-  for (const std::string& key : keys()) {
-    if (std::none_of(known.begin(), known.end(), [&](const char* name) { return key == name; })) {
-      refuse(key, fmt::format("unknown key; known here: {}", list));
+  const std::vector<std::string> names(known.begin(), known.end());
+  attempt([&] {
+    for (const std::string& key : keys()) {
+      if (std::find(names.begin(), names.end(), key) != names.end()) continue;
+      attempt([&] {
+        refuse(key, fmt::format("unknown key{}; known here: {}", did_you_mean(key, names), fmt::join(names, " ")));
+      });
     }
-  }
+  });
 }
 
 std::vector<std::string> YamlMap::keys() const {
   std::vector<std::string> names;
+  std::set<std::string> seen;
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) refuse("?", "a key that is not a word");
-    if (std::find(names.begin(), names.end(), entry.first.Scalar()) != names.end()) {
-      refuse(entry.first.Scalar(), "given twice");
-    }
+    if (!seen.insert(entry.first.Scalar()).second) refuse(entry.first.Scalar(), "given twice");
     names.push_back(entry.first.Scalar());
   }
   return names;
@@ -95,14 +161,14 @@ std::vector<std::string> YamlMap::texts(const std::string& key) const {
   return values;
 }
 
-YamlMap YamlMap::map(const std::string& key) const { return {at(key), where_ + ": " + key}; }
+YamlMap YamlMap::map(const std::string& key) const { return {at(key), where_ + ": " + key, problems_}; }
 
 std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
   const YAML::Node node = at(key);
   if (!node.IsSequence()) refuse(key, "expected a list");
   std::vector<YamlMap> list;
   for (std::size_t i = 0; i < node.size(); ++i)
-    list.emplace_back(node[i], fmt::format("{}: {} {}", where_, key, i + 1));
+    list.push_back(YamlMap(node[i], fmt::format("{}: {} {}", where_, key, i + 1), problems_));
   return list;
 }
 

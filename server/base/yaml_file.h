@@ -3,6 +3,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <initializer_list>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +24,19 @@ class YamlMap {
  public:
   YamlMap(YAML::Node node, std::string where);
 
-  /// Refuses keys that are not in `known`.
+  /// Refuses keys that are not in `known`, all of them, and goes on.
   void only(std::initializer_list<const char*> known) const;
+  /// What `read` refuses is noted for the end of read_yaml(), which says all that is wrong at once; goes on.
+  template <typename Read>
+  void attempt(const Read& read) const {
+    try {
+      read();
+    } catch (const YamlRefusal& refusal) {
+      problems_->push_back(refusal.message);
+    }
+  }
+  /// Noted so far, of the whole file.
+  [[nodiscard]] const std::vector<std::string>& problems() const { return *problems_; }
   [[nodiscard]] bool has(const std::string& key) const;
   /// Present and `null` (or absent).
   [[nodiscard]] bool is_null(const std::string& key) const;
@@ -41,19 +54,30 @@ class YamlMap {
   [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
 
  private:
+  YamlMap(YAML::Node node, std::string where, std::shared_ptr<std::vector<std::string>> problems);
   [[nodiscard]] YAML::Node at(const std::string& key) const;
   [[nodiscard]] double number_of(const YAML::Node& node, const std::string& key) const;
 
   YAML::Node node_;
   std::string where_;
+  std::shared_ptr<std::vector<std::string>> problems_;
 };
 
-/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into an Error.
+/// Refuses a text that nobody wrote by hand (kTooLarge): over a megabyte, 20 lists and mappings inside one another,
+/// 20,000 entries or 100 aliases. Goes through it once and keeps nothing. Throws what the parser throws.
+[[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
+
+/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into an Error, a line each.
 template <typename Read>
 auto read_yaml(const std::string& text, const std::string& where, Read&& read)
     -> Result<decltype(read(std::declval<const YamlMap&>()))> {
   try {
-    return read(YamlMap(YAML::Load(text), where));
+    if (const Status fine = check_yaml_limits(text, where); !fine) return tl::make_unexpected(fine.error());
+    const YamlMap map(YAML::Load(text), where);
+    std::optional<decltype(read(map))> value;
+    map.attempt([&] { value.emplace(read(map)); });
+    if (!map.problems().empty()) return refused("{}", fmt::join(map.problems(), "\n"));
+    return std::move(*value);
   } catch (const YamlRefusal& refusal) {
     return refused("{}", refusal.message);
   } catch (const YAML::Exception& error) {

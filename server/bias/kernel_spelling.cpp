@@ -9,7 +9,9 @@
 namespace trammel {
 namespace {
 
-constexpr int kMostDepth = 20;  // of parentheses; nobody means more, and the stack ends somewhere
+constexpr int kMostDepth = 20;            // of parentheses; nobody means more, and the stack ends somewhere
+constexpr std::size_t kMostBytes = 1000;  // of a spelling
+constexpr std::size_t kMostWords = 32;  // each has hyperparameters to be searched for: the time grows faster than they
 
 const std::array<LinearBlockPtr, 2>& known_blocks() {
   static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
@@ -140,13 +142,33 @@ class Reader {
 
 }  // namespace
 
-Result<KernelPtr> spelled_kernel(std::string_view spelling) { return Reader(spelling).whole(); }
+namespace {
+
+/// Before anything is made of it.
+Status check_length(std::string_view spelling) {
+  if (spelling.size() > kMostBytes) {
+    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostBytes);
+  }
+  const auto joins = std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
+  if (const auto words = static_cast<std::size_t>(joins) + 1; words > kMostWords) {
+    return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}", spelling, words, kMostWords);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<KernelPtr> spelled_kernel(std::string_view spelling) {
+  return check_length(spelling).and_then([&] { return Reader(spelling).whole(); });
+}
 
 bool SpelledBias::has(std::string_view block) const {
   return std::any_of(blocks.begin(), blocks.end(), [&](const LinearBlockPtr& one) { return one->name() == block; });
 }
 
-Result<SpelledBias> spelled_bias(std::string_view spelling) { return Reader(spelling).bias(); }
+Result<SpelledBias> spelled_bias(std::string_view spelling) {
+  return check_length(spelling).and_then([&] { return Reader(spelling).bias(); });
+}
 
 Status check_bias_spelling(std::string_view spelling) {
   if (spelling == "none" || spelling == "auto") return {};

@@ -11,7 +11,7 @@ namespace trammel {
 
 /// `matern52 + periodic`, `se(sincos) * (linear + white)`: words of kernel_names(), each also on (cos q, sin q); `*`
 /// binds before `+`. One word alone is that kernel itself. Refuses other words, naming them and those that are known,
-/// and what is not such a sum.
+/// and what is not such a sum, and more than 32 words or 1000 bytes.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
 
 /// What a bias is made of: what each coordinate has by itself, and what they share.

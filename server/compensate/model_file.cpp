@@ -1,9 +1,17 @@
 #include "server/compensate/model_file.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <new>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "server/base/hash.h"
+#include "server/base/json_guard.h"
 #include "server/base/text_file.h"
+#include "server/compensate/model_checks.h"
 
 namespace trammel {
 
@@ -22,33 +30,80 @@ Json to_json(const Eigen::MatrixXd& m) {
   return {{"rows", m.rows()}, {"columns", m.cols()}, {"values", std::move(values)}};
 }
 
+[[noreturn]] void wrong(const char* what, const Json& json) { throw Json::other_error::create(501, what, &json); }
+
+double number_from(const Json& json) {
+  if (!json.is_number() || !std::isfinite(json.get<double>())) wrong("expected a finite number", json);
+  return json.get<double>();
+}
+double number_from(const Json& json, const char* key) { return number_from(json.at(key)); }
+
+/// Within what `Whole` can hold.
+template <typename Whole>
+Whole whole_from(const Json& json) {
+  if (json.is_number_unsigned()) {
+    if (json.get<std::uint64_t>() <= static_cast<std::uint64_t>(std::numeric_limits<Whole>::max()))
+      return json.get<Whole>();
+  } else if (json.is_number_integer() && std::is_signed_v<Whole>) {
+    if (json.get<std::int64_t>() >= static_cast<std::int64_t>(std::numeric_limits<Whole>::min()))
+      return json.get<Whole>();
+  }
+  wrong("expected a whole number within its range", json);
+}
+template <typename Whole>
+Whole whole_from(const Json& json, const char* key) {
+  return whole_from<Whole>(json.at(key));
+}
+
+/// How many of something there are.
+int count_from(const Json& json, const char* key) {
+  const int count = whole_from<int>(json, key);
+  if (count < 0) wrong("a count below 0", json);
+  return count;
+}
+
+const Json& list_from(const Json& json) {
+  if (!json.is_array()) wrong("expected a list", json);
+  return json;
+}
+
+std::vector<double> numbers_from(const Json& json) {
+  std::vector<double> numbers;
+  for (const Json& one : list_from(json)) numbers.push_back(number_from(one));
+  return numbers;
+}
+
+bool truth_from(const Json& json) {
+  if (!json.is_boolean()) wrong("expected true or false", json);
+  return json.get<bool>();
+}
+
 Eigen::MatrixXd matrix_from(const Json& json) {
-  const auto rows = json.at("rows").get<Eigen::Index>();
-  const auto columns = json.at("columns").get<Eigen::Index>();
-  const Json& values = json.at("values");
+  const auto rows = whole_from<Eigen::Index>(json, "rows");
+  const auto columns = whole_from<Eigen::Index>(json, "columns");
+  const Json& values = list_from(json.at("values"));
   const auto count = static_cast<Eigen::Index>(values.size());
   // Divided, not multiplied: a product may overflow.
   if (rows < 0 || columns < 0 ||
       (columns == 0 || rows == 0 ? count != 0 : count % rows != 0 || count / rows != columns)) {
-    throw Json::other_error::create(501, "a matrix whose size does not fit its values", &json);
+    wrong("a matrix whose size does not fit its values", json);
   }
   Eigen::MatrixXd m(rows, columns);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < columns; ++j)
-      m(i, j) = values[static_cast<std::size_t>(i * columns + j)].get<double>();
+    for (Eigen::Index j = 0; j < columns; ++j) m(i, j) = number_from(values[static_cast<std::size_t>(i * columns + j)]);
   }
   return m;
 }
 
 Eigen::VectorXd vector_from(const Json& json) {
   const Eigen::MatrixXd m = matrix_from(json);
-  if (m.cols() != 1) throw Json::other_error::create(501, "a vector that is not one column", &json);
+  if (m.cols() != 1) wrong("a vector that is not one column", json);
   return m;
 }
 
 Vector3 vector3_from(const Json& json) {
   const Eigen::VectorXd v = vector_from(json);
-  if (v.size() != 3) throw Json::other_error::create(501, "a vector that is not 3 x 1", &json);
+  if (v.size() != 3) wrong("a vector that is not 3 x 1", json);
   return v;
 }
 
@@ -56,7 +111,7 @@ Json to_json(const Pose& X) { return to_json(Eigen::MatrixXd(X.matrix().topRows<
 
 Pose pose_from(const Json& json) {
   const Eigen::MatrixXd m = matrix_from(json);
-  if (m.rows() != 3 || m.cols() != 4) throw Json::other_error::create(501, "a pose that is not 3 x 4", &json);
+  if (m.rows() != 3 || m.cols() != 4) wrong("a pose that is not 3 x 4", json);
   Pose X = Pose::Identity();
   X.matrix().topRows<3>() = m;
   return X;
@@ -73,10 +128,10 @@ Json to_json(const ErrorFigures& f) {
 
 ErrorFigures figures_from(const Json& json) {
   ErrorFigures f;
-  f.rms = json.at("rms_m");
-  f.mean = json.at("mean_m");
-  f.p997 = json.at("p997_m");
-  f.max = json.at("max_m");
+  f.rms = number_from(json, "rms_m");
+  f.mean = number_from(json, "mean_m");
+  f.p997 = number_from(json, "p997_m");
+  f.max = number_from(json, "max_m");
   f.axis_mean = vector3_from(json.at("axis_mean_m"));
   f.axis_stddev = vector3_from(json.at("axis_stddev_m"));
   return f;
@@ -102,17 +157,21 @@ Json to_json(const Evaluation& e) {
 
 Evaluation evaluation_from(const Json& json) {
   Evaluation e;
-  e.poses = json.at("poses");
+  e.poses = count_from(json, "poses");
   e.nominal = figures_from(json.at("nominal"));
   e.calibrated = figures_from(json.at("calibrated"));
   e.compensated = figures_from(json.at("compensated"));
-  e.coverage_95 = json.at("coverage_95");
-  e.in_domain = json.at("in_domain");
-  if (json.contains("nlpd_of_m")) e.nlpd = json.at("nlpd_of_m").get<double>();
+  e.coverage_95 = number_from(json, "coverage_95");
+  e.in_domain = count_from(json, "in_domain");
+  if (json.contains("nlpd_of_m")) e.nlpd = number_from(json, "nlpd_of_m");
   if (json.contains("orientation")) {
     const Json& o = json.at("orientation");
-    e.orientation = {o.at("poses"), o.at("nominal_rad"), o.at("calibrated_rad"), o.at("compensated_rad"), {}};
-    if (o.contains("coverage_95")) e.orientation->coverage_95 = o.at("coverage_95").get<double>();
+    e.orientation = {count_from(o, "poses"),
+                     number_from(o, "nominal_rad"),
+                     number_from(o, "calibrated_rad"),
+                     number_from(o, "compensated_rad"),
+                     {}};
+    if (o.contains("coverage_95")) e.orientation->coverage_95 = number_from(o, "coverage_95");
   }
   return e;
 }
@@ -158,11 +217,13 @@ PoseContext context_from(const Json& json) {
   PoseContext context;
   context.tool = json.at("tool");
   context.payload = json.at("payload");
-  context.index = json.at("index");
-  if (json.contains("time_s")) context.time = json.at("time_s").get<double>();
-  if (json.contains("temperature_c")) context.temperature = json.at("temperature_c").get<double>();
+  context.index = whole_from<int>(json, "index");
+  if (json.contains("time_s")) context.time = number_from(json, "time_s");
+  if (json.contains("temperature_c")) context.temperature = number_from(json, "temperature_c");
   if (json.contains("velocity")) context.velocity = vector_from(json.at("velocity"));
-  if (json.contains("direction")) json.at("direction").get_to(context.direction);
+  if (json.contains("direction")) {
+    for (const Json& one : list_from(json.at("direction"))) context.direction.push_back(whole_from<int>(one));
+  }
   return context;
 }
 
@@ -184,10 +245,11 @@ Json to_json(const BiasChoice& choice) {
 
 BiasChoice choice_from(const Json& json) {
   BiasChoice choice{json.at("kernel"), {}, json.at("sentence")};
-  for (const Json& c : json.at("candidates")) {
-    choice.candidates.push_back({c.at("kernel"), c.at("leave_one_out_rms_m"), c.at("leave_one_out_nlpd_of_m"),
-                                 c.at("time_block_rms_m"), c.at("joint_block_rms_m"), c.at("gain_m2"),
-                                 c.at("gain_stddev_m2"), c.at("verdict"), c.value("skipped", false)});
+  for (const Json& c : list_from(json.at("candidates"))) {
+    choice.candidates.push_back(
+        {c.at("kernel"), number_from(c, "leave_one_out_rms_m"), number_from(c, "leave_one_out_nlpd_of_m"),
+         number_from(c, "time_block_rms_m"), number_from(c, "joint_block_rms_m"), number_from(c, "gain_m2"),
+         number_from(c, "gain_stddev_m2"), c.at("verdict"), c.contains("skipped") && truth_from(c.at("skipped"))});
   }
   return choice;
 }
@@ -258,15 +320,7 @@ Json content_of(const CompensatedModel::Parts& parts) {
   return content;
 }
 
-Result<CompensatedModel> model_from(const Json& file, const std::string& where) {
-  if (file.at("trammel_model").get<int>() != kFormat) {
-    return refused("{}: model format {}, this program reads {}", where, file.at("trammel_model").dump(), kFormat);
-  }
-  const Json& content = file.at("content");
-  const std::string hash = sha256_hex(content.dump());
-  if (hash != file.at("hash").get<std::string>()) {
-    return refused("{}: damaged: its hash is {}, its content has {}", where, file.at("hash").dump(), hash);
-  }
+Result<CompensatedModel> model_from(const Json& content, const Json& stamp, const std::string& where) {
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
   if (!cell) return tl::make_unexpected(cell.error());
   Result<PhysicalModel> physics = make_physical_model(std::make_shared<const Cell>(std::move(*cell)),
@@ -279,35 +333,39 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
   parts.physics.values = vector_from(content.at("values"));
   parts.covariance = matrix_from(content.at("covariance"));
   const std::vector<Parameter> known = parts.physics.parameters();
-  const Json& parameters = content.at("parameters");
+  const Json& parameters = list_from(content.at("parameters"));
   if (parameters.size() != known.size())
     return refused("{}: {} parameters, expected {}", where, parameters.size(), known.size());
   for (std::size_t i = 0; i < known.size(); ++i) {
+    const Json& one = parameters.at(i);
+    if (one.at("name").get<std::string>() != known[i].name)
+      return refused("{}: its parameter {} is not {}, as its error sources say", where, i + 1, known[i].name);
     parts.parameters.push_back(
-        {known[i], parameters[i].at("value"), parameters[i].at("stddev"), parameters[i].at("identified")});
+        {known[i], number_from(one, "value"), number_from(one, "stddev"), truth_from(one.at("identified"))});
   }
-  for (const Json& u : content.at("unidentifiable")) {
-    parts.unidentifiable.push_back({u.at("singular_value"), u.at("parameters"), u.at("sentence")});
+  for (const Json& u : list_from(content.at("unidentifiable"))) {
+    parts.unidentifiable.push_back({number_from(u, "singular_value"), u.at("parameters"), u.at("sentence")});
   }
-  parts.rank = content.at("rank");
-  parts.condition_number = content.at("condition_number");
-  parts.observability_index = content.at("observability_index");
-  for (const Json& pose : content.at("suspects")) {
-    parts.suspects.push_back({pose.at("pose_id"), pose.at("row"), pose.at("distance_m"), pose.at("sigmas")});
+  parts.rank = whole_from<int>(content, "rank");
+  parts.condition_number = number_from(content, "condition_number");
+  parts.observability_index = number_from(content, "observability_index");
+  for (const Json& pose : list_from(content.at("suspects"))) {
+    parts.suspects.push_back({pose.at("pose_id"), whole_from<int>(pose, "row"), number_from(pose, "distance_m"),
+                              number_from(pose, "sigmas")});
   }
-  content.at("cost_record").get_to(parts.cost_record);
-  parts.discrepancy = content.at("discrepancy_m");
+  parts.cost_record = numbers_from(content.at("cost_record"));
+  parts.discrepancy = number_from(content, "discrepancy_m");
   parts.q_min = vector_from(content.at("q_min"));
   parts.q_max = vector_from(content.at("q_max"));
-  parts.prior_share_limit = content.at("prior_share_limit");
+  parts.prior_share_limit = number_from(content, "prior_share_limit");
   if (content.contains("extrapolation_slope")) {
     parts.extrapolation_slope = vector_from(content.at("extrapolation_slope"));
   }
   content.at("trained_with").get_to(parts.trained_with);
   parts.training = evaluation_from(content.at("training"));
   if (content.contains("temperature_c")) {
-    parts.temperature_mean = content.at("temperature_c").at("mean").get<double>();
-    parts.temperature_stddev = content.at("temperature_c").at("stddev");
+    parts.temperature_mean = number_from(content.at("temperature_c"), "mean");
+    parts.temperature_stddev = number_from(content.at("temperature_c"), "stddev");
   }
   if (content.contains("bias_choice")) parts.bias_choice = choice_from(content.at("bias_choice"));
   if (content.contains("bias")) {
@@ -321,23 +379,25 @@ Result<CompensatedModel> model_from(const Json& file, const std::string& where) 
             "otherwise now: train it again",
             where, parts.bias->kernel);
       }
-      for (const Json& context : bias.at("poses")) parts.bias_contexts.push_back(context_from(context));
+      for (const Json& context : list_from(bias.at("poses"))) parts.bias_contexts.push_back(context_from(context));
     }
     if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
-    if (content.contains("oriented_poses")) parts.oriented_poses = content.at("oriented_poses");
+    if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");
   }
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   const Json& provenance = content.at("provenance");
   parts.provenance.level = provenance.at("level");
   parts.provenance.batch_id = provenance.at("batch_id");
   parts.provenance.batch_hash = provenance.at("batch_hash");
-  parts.provenance.training_poses = provenance.at("training_poses");
-  parts.provenance.seed = provenance.at("seed");
-  const Json& stamp = file.at("stamp");
-  parts.provenance.trained_at = stamp.at("trained_at");
+  parts.provenance.training_poses = count_from(provenance, "training_poses");
+  parts.provenance.seed = whole_from<std::uint64_t>(provenance, "seed");
+  parts.provenance.trained_at = whole_from<std::int64_t>(stamp, "trained_at");
   parts.provenance.program_version = stamp.at("program_version");
-  if (stamp.contains("measured_at")) parts.provenance.measured_at = stamp.at("measured_at").get<std::int64_t>();
-  return CompensatedModel::make(std::move(parts)).map_error([&](Error error) {
+  if (stamp.contains("measured_at")) parts.provenance.measured_at = whole_from<std::int64_t>(stamp, "measured_at");
+  const Status possible = check_parts(parts);
+  Result<CompensatedModel> model =
+      possible ? CompensatedModel::make(std::move(parts)) : tl::make_unexpected(possible.error());
+  return std::move(model).map_error([&](Error error) {
     error.message = where + ": " + error.message;
     return error;
   });
@@ -353,16 +413,66 @@ std::string serialize(const CompensatedModel& model) {
   if (provenance.measured_at) stamp["measured_at"] = *provenance.measured_at;
   const Json file = {{"trammel_model", kFormat},
                      {"hash", provenance.hash},
-                     {"stamp", std::move(stamp)},
+                     {"stamp", stamp},
+                     {"stamp_hash", sha256_hex(stamp.dump())},
                      {"content", content_of(model.parts())}};
-  return file.dump() + "\n";
+  // Its last byte closes the object: whatever is cut off is missed.
+  return file.dump();
 }
+
+namespace {
+
+using Members = std::map<std::string, std::string_view>;
+
+/// For a message: short, and nothing that a terminal would obey.
+std::string shown(std::string_view text) {
+  std::string plain(text.substr(0, 120));
+  std::replace_if(
+      plain.begin(), plain.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return plain;
+}
+
+/// The outermost keys, and no others: a damaged key is not one that is missing.
+Status check_keys(const Members& members, const std::string& where) {
+  static constexpr std::array<std::string_view, 5> kKeys = {"content", "hash", "stamp", "trammel_model", "stamp_hash"};
+  for (const auto& [key, value] : members) {
+    if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
+      return refused("{}: not a Trammel model: unknown key {}", where, shown(key));
+  }
+  // Models of before the stamp was hashed have no stamp_hash.
+  for (const std::string_view key : kKeys) {
+    if (key != "stamp_hash" && !members.contains(std::string(key)))
+      return refused("{}: not a Trammel model: no {}", where, key);
+  }
+  const std::string_view format = members.at("trammel_model");
+  if (format == std::to_string(kFormat)) return {};
+  return refused("{}: model format {}, this program reads {}", where, shown(format), kFormat);
+}
+
+/// Of the bytes as they stand in the file.
+Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
+  const std::string hash = sha256_hex(members.at(of));
+  if (members.at(by) == '"' + hash + '"') return {};
+  return refused("{}: damaged: its {} is {}, its {} has {}", where, by, shown(members.at(by)), of, hash);
+}
+
+Result<CompensatedModel> checked_model(const Members& members, const std::string& where) {
+  Status fine = check_keys(members, where);
+  if (fine) fine = check_hash(members, "content", "hash", where);
+  if (fine && members.contains("stamp_hash")) fine = check_hash(members, "stamp", "stamp_hash", where);
+  if (!fine) return tl::make_unexpected(fine.error());
+  return model_from(Json::parse(members.at("content")), Json::parse(members.at("stamp")), where);
+}
+
+}  // namespace
 
 Result<CompensatedModel> deserialize(const std::string& text, const std::string& where) {
   try {
-    return model_from(Json::parse(text), where);
+    return json_members(text, where).and_then([&](const Members& members) { return checked_model(members, where); });
   } catch (const Json::exception& error) {
-    return refused("{}: not a Trammel model: {}", where, error.what());
+    return refused("{}: not a Trammel model: {}", where, shown(error.what()));
+  } catch (const std::bad_alloc&) {
+    return failure(ErrorCode::kTooLarge, "{}: its {} bytes ask for more memory than there is", where, text.size());
   }
 }
 

@@ -95,8 +95,30 @@ Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source) {
   return first;
 }
 
+namespace {
+
+constexpr std::size_t kMostSources = 500;
+constexpr std::size_t kMostSpecBytes = 1000;
+constexpr std::size_t kMostParameters = 4000;  // their covariance has the square of it
+
+/// Before anything is made of them.
+Status check_counts(const std::vector<std::string>& specs) {
+  if (specs.size() > kMostSources)
+    return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources);
+  for (const std::string& spec : specs) {
+    if (spec.size() <= kMostSpecBytes) continue;
+    return failure(ErrorCode::kTooLarge, "error source '{}...': {} bytes, limit {}", spec.substr(0, 40), spec.size(),
+                   kMostSpecBytes);
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, const std::vector<std::string>& specs) {
+  if (const Status few = check_counts(specs); !few) return tl::make_unexpected(few.error());
   PhysicalModel model;
+  std::size_t parameters = 0;
   for (const std::string& spec : specs) {
     Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
     if (!source) return tl::make_unexpected(source.error());
@@ -106,6 +128,11 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
                        spec);
       }
       if (other->name() == (*source)->name()) return failure(ErrorCode::kUsage, "error source '{}' given twice", spec);
+    }
+    parameters += (*source)->parameters().size();
+    if (parameters > kMostParameters) {
+      return failure(ErrorCode::kTooLarge, "error source '{}': {} parameters with those before it, limit {}", spec,
+                     parameters, kMostParameters);
     }
     model.sources.push_back(std::move(*source));
   }

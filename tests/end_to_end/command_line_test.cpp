@@ -591,5 +591,19 @@ TEST_F(CommandLineWithService, WhatTheServiceRefusesEndsWith3AndItsReason) {
   EXPECT_NE(empty.err.find("empty"), std::string::npos) << empty.err;
 }
 
+TEST_F(CommandLine, NoBytesOfAModelFileEndTheProgram) {
+  const std::string deep =
+      folder_.write("deep.model", R"({"trammel_model":1,"content":)" + std::string(1'000'000, '['));
+  const std::string brackets = folder_.write("brackets.model", std::string(30'000'000, '['));
+  const std::string batch = folder_.write("b.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm\n");
+  for (const std::string& model : {deep, brackets, std::string("/dev/zero")}) {
+    expect_refused({"evaluate", "--model", model, "--batch", batch, "--json", "-"}, {model, "limit"});
+    expect_refused({"report", "--model", model, "-o", file("out")}, {model, "limit"});
+  }
+  const std::string yaml = folder_.write("deep.yaml", std::string(1'000'000, '['));
+  expect_refused({"plan", "--cell", yaml, "--count", "10", "-o", file("out")}, {yaml, "limit"});
+  expect_refused({"plan", "--cell", "/dev/zero", "--count", "10", "-o", file("out")}, {"/dev/zero", "limit"});
+}
+
 }  // namespace
 }  // namespace trammel

@@ -1,5 +1,5 @@
 /* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction
- * and prints both. Usage: cyclone_client DOMAIN CELL. The network is set by CYCLONEDDS_URI. */
+ * and prints both. Usage: cyclone_client DOMAIN CELL [LIMIT_S]. The network is set by CYCLONEDDS_URI. */
 #include <dds/dds.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,9 +8,10 @@
 #include "predict_error.h"
 #include "state.h"
 
-#define LIMIT DDS_SECS(20)
 #define PARTITION "cyclone-1"
 #define SEQUENCE_NUMBER 4711
+
+static dds_duration_t limit = DDS_SECS(20);
 
 static int fail(const char* what) {
   fprintf(stderr, "cyclone_client: %s\n", what);
@@ -38,7 +39,7 @@ static int wait_for(dds_entity_t participant, dds_entity_t entity, uint32_t mask
   const dds_entity_t waitset = dds_create_waitset(participant);
   dds_set_status_mask(entity, mask);
   dds_waitset_attach(waitset, entity, 0);
-  const dds_return_t triggered = dds_waitset_wait(waitset, NULL, 0, LIMIT);
+  const dds_return_t triggered = dds_waitset_wait(waitset, NULL, 0, limit);
   dds_delete(waitset);
   return triggered > 0;
 }
@@ -54,7 +55,8 @@ static void* take_one(dds_entity_t participant, dds_entity_t reader) {
 }
 
 int main(int argc, char** argv) {
-  if (argc != 3) return fail("usage: cyclone_client DOMAIN CELL");
+  if (argc != 3 && argc != 4) return fail("usage: cyclone_client DOMAIN CELL [LIMIT_S]");
+  if (argc == 4) limit = DDS_SECS(atoi(argv[3]));
   /* Without it Cyclone DDS would speak on every interface; with it, on the loopback profile that it holds. */
   if (getenv("CYCLONEDDS_URI") == NULL) return fail("CYCLONEDDS_URI must hold the loopback profile");
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);

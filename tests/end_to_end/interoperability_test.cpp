@@ -24,14 +24,18 @@ TEST(Interoperability, ACycloneDdsClientGetsItsPrediction) {
       "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address=\"127.0.0.1:{}\"/></Peers></Discovery></Domain>"
       "</CycloneDDS>",
       options.port);
-  const test::Finished client =
-      test::run({"/usr/bin/env", network, TRAMMEL_CYCLONE_CLIENT, std::to_string(options.domain), "cell-7"});
+  const auto in_domain = [&](std::uint32_t domain, const char* limit_s) {
+    return test::run({"/usr/bin/env", network, TRAMMEL_CYCLONE_CLIENT, std::to_string(domain), "cell-7", limit_s});
+  };
+  const test::Finished client = in_domain(options.domain, "20");
   EXPECT_EQ(client.exit_code, 0) << client.err;
   EXPECT_EQ(client.out, fmt::format("server=server-a contract=1 cells=2\n"
                                     "cell=cell-7 version=7\n"
                                     "result=0 id=4711 guid=c7 model={} version=7 items=1\n"
                                     "dx_mm=0.700000\n",
                                     served->model.provenance().hash));
+  const test::Finished stranger = in_domain(options.domain + 65, "3");
+  EXPECT_EQ(stranger.err, "cyclone_client: no ServiceStatus\n") << "it looked at the same port from another domain";
 }
 
 #endif

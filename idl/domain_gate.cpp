@@ -1,0 +1,222 @@
+#include "idl/domain_gate.h"
+
+#include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <mutex>
+#include <string_view>
+#include <utility>
+
+namespace trammel::wire {
+namespace {
+
+namespace rtps = eprosima::fastdds::rtps;
+using eprosima::fastrtps::rtps::Locator_t;
+using eprosima::fastrtps::rtps::LocatorsIterator;
+using eprosima::fastrtps::rtps::SenderResource;
+using Bytes = std::span<const unsigned char>;
+
+// RTPS 2.3: the header, submessages, parameter lists (9.4, 9.6.2.2).
+constexpr std::size_t kHeader = 20;
+constexpr std::size_t kPrefixAt = 8, kPrefix = 12;
+constexpr unsigned char kPad = 0x01, kInfoTimestamp = 0x09, kData = 0x15;
+constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04;
+constexpr std::array<unsigned char, 4> kAnnouncer = {0x00, 0x01, 0x00, 0xc2};  // ENTITYID of the writer
+constexpr std::uint16_t kSentinel = 0x0001, kDomainId = 0x000f, kUserData = 0x002c;
+constexpr std::string_view kMark = "trammel.domain=";
+
+/// Reads on from the front; says nothing where there is too little left.
+class Reader {
+ public:
+  Reader(Bytes bytes, bool little_endian) : rest_(bytes), little_endian_(little_endian) {}
+
+  std::optional<Bytes> take(std::size_t count) {
+    if (count > rest_.size()) return std::nullopt;
+    const Bytes front = rest_.first(count);
+    rest_ = rest_.subspan(count);
+    return front;
+  }
+  std::optional<std::uint16_t> u16() {
+    const auto b = take(2);
+    if (!b) return std::nullopt;
+    const auto first = static_cast<unsigned>((*b)[0]), second = static_cast<unsigned>((*b)[1]);
+    return static_cast<std::uint16_t>(little_endian_ ? first | second << 8 : first << 8 | second);
+  }
+  std::optional<std::uint32_t> u32() {
+    const auto b = take(4);
+    if (!b) return std::nullopt;
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | (*b)[little_endian_ ? 3 - i : i];
+    return value;
+  }
+  [[nodiscard]] Bytes rest() const { return rest_; }
+
+ private:
+  Bytes rest_;
+  bool little_endian_;
+};
+
+struct Parameter {
+  std::uint16_t id = 0;
+  Bytes value;
+};
+
+/// The next of a list; none at its end.
+std::optional<Parameter> next_parameter(Reader& list) {
+  const auto id = list.u16();
+  const auto length = list.u16();
+  if (!id || !length || *id == kSentinel) return std::nullopt;
+  const auto value = list.take(*length);
+  if (!value) return std::nullopt;
+  return Parameter{*id, *value};
+}
+
+std::optional<std::uint32_t> marked_domain(Bytes user_data) {
+  const std::string_view text(reinterpret_cast<const char*>(user_data.data()), user_data.size());
+  if (!text.starts_with(kMark)) return std::nullopt;
+  std::uint32_t domain = 0;
+  const auto [end, error] = std::from_chars(text.data() + kMark.size(), text.data() + text.size(), domain);
+  if (error != std::errc()) return std::nullopt;
+  return domain;
+}
+
+/// The serialized data of one submessage DATA, when a participant announces itself in it.
+std::optional<Bytes> announcement_in(Bytes data, unsigned char flags) {
+  if ((flags & kPayload) == 0) return std::nullopt;  // it leaves
+  Reader reader(data, (flags & kLittleEndian) != 0);
+  if (!reader.u16()) return std::nullopt;
+  const auto to_inline_qos = reader.u16();
+  const Bytes counted_from_here = reader.rest();
+  if (!to_inline_qos || !reader.take(4)) return std::nullopt;
+  const auto writer = reader.take(4);
+  if (!writer || !std::equal(writer->begin(), writer->end(), kAnnouncer.begin())) return std::nullopt;
+  if (*to_inline_qos > counted_from_here.size()) return std::nullopt;
+  Reader after(counted_from_here.subspan(*to_inline_qos), (flags & kLittleEndian) != 0);
+  if ((flags & kInlineQos) != 0) {
+    while (next_parameter(after)) continue;
+  }
+  return after.rest();
+}
+
+bool says_another_domain(Bytes announcement, std::uint32_t domain) {
+  if (announcement.size() < 4) return false;
+  const bool little_endian = announcement[1] == 0x03;  // PL_CDR_LE; 2 is PL_CDR_BE
+  if (announcement[0] != 0 || (!little_endian && announcement[1] != 0x02)) return false;
+  Reader list(announcement.subspan(4), little_endian);
+  while (const auto parameter = next_parameter(list)) {
+    Reader value(parameter->value, little_endian);
+    const auto number = value.u32();  // the domain, or how much user data
+    if (!number) continue;
+    if (parameter->id == kDomainId && *number != domain) return true;
+    if (parameter->id != kUserData) continue;
+    const auto user_data = value.take(*number);
+    if (user_data && marked_domain(*user_data).value_or(domain) != domain) return true;
+  }
+  return false;
+}
+
+/// Calls `found` with each announcement in the message; true as soon as it is.
+template <typename Found>
+bool any_announcement(Bytes message, const Found& found) {
+  if (message.size() < kHeader) return false;
+  Bytes rest = message.subspan(kHeader);
+  while (rest.size() >= 4) {
+    const unsigned char id = rest[0], flags = rest[1];
+    Reader length_reader(rest.subspan(2), (flags & kLittleEndian) != 0);
+    std::size_t length = length_reader.u16().value_or(0);
+    const Bytes body = length_reader.rest();
+    if (length == 0 && id != kPad && id != kInfoTimestamp) length = body.size();  // to the end of the message
+    if (length > body.size()) return false;
+    if (id == kData) {
+      const auto announcement = announcement_in(body.first(length), flags);
+      if (announcement && found(*announcement)) return true;
+    }
+    rest = body.subspan(length);
+  }
+  return false;
+}
+
+class GateDescriptor;
+
+class Gate final : public rtps::ChainingTransport {
+ public:
+  explicit Gate(const GateDescriptor& descriptor);
+
+  rtps::TransportDescriptorInterface* get_configuration() override;
+
+  bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size, LocatorsIterator* first,
+            LocatorsIterator* last, const std::chrono::steady_clock::time_point& limit) override {
+    if (heard_ && size >= kHeader && !knows_itself_) {
+      const std::lock_guard lock(mutex_);
+      std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
+      knows_itself_ = true;
+    }
+    return below->send(buffer, size, first, last, limit);
+  }
+
+  void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
+               const Locator_t& here, const Locator_t& there) override {
+    const Bytes message(buffer, size);
+    if (is_of_another_domain(message, domain_)) return;
+    next->OnDataReceived(buffer, size, here, there);
+    if (heard_ && is_own(message) && is_announcement(message)) ++heard_->announcements;
+  }
+
+ private:
+  [[nodiscard]] bool is_own(Bytes message) const {
+    if (!knows_itself_ || message.size() < kHeader) return false;
+    const std::lock_guard lock(mutex_);
+    return std::equal(own_prefix_.begin(), own_prefix_.end(), message.begin() + kPrefixAt);
+  }
+
+  std::unique_ptr<GateDescriptor> configuration_;
+  const std::uint32_t domain_;
+  const std::shared_ptr<HeardOfItself> heard_;
+  std::atomic<bool> knows_itself_{false};
+  mutable std::mutex mutex_;
+  std::array<unsigned char, kPrefix> own_prefix_{};  // guarded by mutex_
+};
+
+class GateDescriptor final : public rtps::ChainingTransportDescriptor {
+ public:
+  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t of,
+                 std::shared_ptr<HeardOfItself> counted)
+      : ChainingTransportDescriptor(std::move(below)), domain(of), heard(std::move(counted)) {}
+
+  rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
+
+  std::uint32_t domain;
+  std::shared_ptr<HeardOfItself> heard;
+};
+
+Gate::Gate(const GateDescriptor& descriptor)
+    : ChainingTransport(descriptor),
+      configuration_(std::make_unique<GateDescriptor>(descriptor)),
+      domain_(descriptor.domain),
+      heard_(descriptor.heard) {}
+
+rtps::TransportDescriptorInterface* Gate::get_configuration() { return configuration_.get(); }
+
+}  // namespace
+
+std::string domain_mark(std::uint32_t domain) { return fmt::format("{}{}", kMark, domain); }
+
+bool is_of_another_domain(Bytes message, std::uint32_t domain) {
+  return any_announcement(message, [domain](Bytes found) { return says_another_domain(found, domain); });
+}
+
+bool is_announcement(Bytes message) {
+  return any_announcement(message, [](Bytes) { return true; });
+}
+
+std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(
+    std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t domain,
+    std::shared_ptr<HeardOfItself> heard) {
+  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard));
+}
+
+}  // namespace trammel::wire
