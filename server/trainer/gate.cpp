@@ -71,6 +71,15 @@ bool not_worse(const PairedGain& gain, double accept_ratio) {
   return gain.rms_after <= accept_ratio * gain.rms_before && (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
 }
 
+/// Of orientations, beside positions that gain: beyond chance, or by half.
+bool clearly_worse(const PairedGain& turns, double accept_ratio) {
+  constexpr double kByFar = 1.5;
+  if (turns.poses == 0) return false;
+  const bool beyond_chance = std::min(turns.z_ranks, turns.z_sum) < -PairedGain::kBeyondChance;
+  return turns.rms_after > kByFar * turns.rms_before ||
+         (beyond_chance && turns.rms_after > accept_ratio * turns.rms_before);
+}
+
 /// How many different poses these rows are.
 int distinct(const std::vector<const Measurement*>& judges, const Columns& among) {
   std::vector<JointVector> poses;
@@ -233,7 +242,7 @@ class Duel {
       return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text, gain.z(),
                                PairedGain::kBeyondChance));
     }
-    if (!turns.beyond_chance() && !not_worse(turns, options_.accept_ratio))
+    if (clearly_worse(turns, options_.accept_ratio))
       return stays(fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)));
     if (const std::string better = better_before(); !better.empty()) return stays(text + ": " + better);
     return {true, fmt::format("in force: {}: {}", text, why)};
@@ -290,7 +299,7 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
     return no(fmt::format("{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)", text,
                           to_mm(arm.rms_after), to_mm(arm.rms_before)));
   }
-  if (!not_worse(turns, options.accept_ratio))
+  if (clearly_worse(turns, options.accept_ratio))
     return no(fmt::format("{}: its orientations are worse ({:.4f} deg, nominal {:.4f} deg)", text,
                           to_deg(turns.rms_after), to_deg(turns.rms_before)));
   return {true, "in force: " + text};

@@ -115,8 +115,8 @@ TEST_P(CrashMomentTest, NoAcceptedBatchIsLostAndAWholeModelIsServed) {
   });
   EXPECT_TRUE(crashed);
   EXPECT_EQ(over.stage, "done") << over.what;
-  EXPECT_EQ(over.model_version, 2);
-  EXPECT_EQ(model().version, 2);
+  EXPECT_EQ(over.model_version, 2) << over.what;
+  EXPECT_EQ(model().version, 2) << over.what;
   expect_nothing_lost(job);
 }
 
