@@ -60,11 +60,18 @@ std::string beginning_line(const ordered_json& beginning) {
                      place(beginning.at("earliest")), place(beginning.at("latest")));
 }
 
+/// What is smaller says no more: no test here is that exact.
+std::string p_text(const ordered_json& value) {
+  constexpr double kLeast = 1e-6;
+  const double p = value.get<double>();
+  return p <= kLeast ? "< 1e-6" : fmt::format("{:.2g}", p);
+}
+
 std::string finding_lines(const ordered_json& finding) {
   std::string text =
-      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10.2g}{:>10.4f}{:>10.4f}\n", cause_text(finding),
+      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding),
                   kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
-                  finding.at("p_value").get<double>(), finding.at("held_out").at("before").at("rms_mm").get<double>(),
+                  p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
   if (!finding.at("parameters").empty()) text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
   if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
@@ -111,8 +118,9 @@ std::string figures_table(const ordered_json& diagnosis) {
 
 std::string unexplained_text(const ordered_json& unexplained) {
   if (!unexplained.at("present").get<bool>()) return "";
-  return fmt::format("\nUnexplained: {} rms that depend on {} (p {:.2g})\n", micrometres(unexplained.at("rms_mm")),
-                     words_text(unexplained.at("depends_on"), ", "), unexplained.at("p_value").get<double>());
+  const auto& on = unexplained.at("depends_on");
+  return fmt::format("\nUnexplained: {} rms that depend on {} (p {})\n", micrometres(unexplained.at("rms_mm")),
+                     on.empty() ? "nothing known" : words_text(on, ", "), p_text(unexplained.at("p_value")));
 }
 
 std::string suspects_text(const ordered_json& suspects) {

@@ -112,6 +112,24 @@ ordered_json choice_json(const BiasChoice& choice) {
   return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", candidates}};
 }
 
+/// Play that came out with the sign it cannot have.
+std::string negative_play_text(const CompensatedModel::Parts& parts) {
+  std::string text;
+  std::size_t next = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const std::size_t first = next;
+    next += source->parameters().size();
+    if (!source->name().starts_with("backlash:") || next > parts.parameters.size()) continue;
+    const IdentifiedParameter& play = parts.parameters[first];
+    if (play.value + 2 * play.stddev >= 0) continue;
+    text += fmt::format(
+        "{} is {:.0f} urad (U {:.0f}), but play is positive by definition: joints read or measured before they stood "
+        "still, a servo that overshoots or lags, or a dir{} column of the wrong sign?\n",
+        play.parameter.name, 1e6 * play.value, 2e6 * play.stddev, source->joint() + 1);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string model_text(const CompensatedModel& model) {
@@ -125,7 +143,7 @@ std::string model_text(const CompensatedModel& model) {
                       std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                     [](const IdentifiedParameter& p) { return p.identified; }),
                       parts.parameters.size(), parts.rank);
-  text += rotation_text(parts);
+  text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
   for (const UnidentifiableCombination& combination : parts.unidentifiable) {

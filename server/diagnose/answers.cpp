@@ -38,12 +38,17 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   if (found.unnamed.empty()) return {};
   const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
                                                [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
-  Unexplained unexplained{true, {}, 0, strongest.p_value};
+  Unexplained unexplained{true, {}, 0, strongest.p_value, {}};
   for (const Unnamed& one : found.unnamed) {
     for (const std::string& on : one.depends_on) {
       auto& list = unexplained.depends_on;
       if (std::find(list.begin(), list.end(), on) == list.end()) list.push_back(on);
     }
+  }
+  if (!found.negative_play.empty()) {
+    const bool every = std::none_of(found.accepted.begin(), found.accepted.end(),
+                                    [](const Accepted& one) { return one.cause.cause == "backlash"; });
+    unexplained.hint = what_negative_play_may_be(found.negative_play, every);
   }
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());

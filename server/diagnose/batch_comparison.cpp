@@ -38,7 +38,48 @@ int shown_directions(const Alternative& alternative, const Eigen::MatrixXd& info
 
 }  // namespace
 
-void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Vector3& r,
+Comparison::Comparison(const CompensatedModel& model, const MeasurementBatch& batch)
+    : model_(model),
+      batch_(batch),
+      rotation_bias_B_(batch.measurements.size(), Matrix3::Identity()),
+      is_turned_(batch.measurements.size(), false) {
+  const CompensatedModel::LevelErrors errors = model.errors_B(batch);
+  bias_B_ = errors.calibrated - errors.compensated;
+  deviation_.setOnes(6, poses());
+  deviation_.topRows<3>() = errors.stddev;
+  const double expected = std::sqrt(errors.stddev.squaredNorm() / static_cast<double>(poses()));
+  if (const auto& held_out = model.parts().validation) {
+    deviation_.topRows<3>() *= std::max(1.0, held_out->compensated.rms / expected);
+  }
+  expect_rotations(errors.rotation);
+  for (const Measurement& m : batch.measurements) contexts_.push_back(as_served(m));
+}
+
+void Comparison::expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors) {
+  const auto& training = model_.parts().training.orientation;
+  const auto& held_out = model_.parts().validation ? model_.parts().validation->orientation : std::nullopt;
+  if (!training || errors.calibrated.cols() == 0) return;
+  const double shown = std::max(training->compensated, held_out ? held_out->compensated : 0);
+  Eigen::Matrix3Xd stddev = errors.stddev;
+  if (stddev.cols() == 0) stddev.setConstant(3, errors.calibrated.cols(), model_.cell().tracker.sigma_rotation);
+  stddev *= std::max(1.0, shown / std::sqrt(stddev.squaredNorm() / static_cast<double>(stddev.cols())));
+  Eigen::Index next = 0;
+  for (int i = 0; i < poses(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (!batch_.measurements[at].R_WT) continue;
+    is_turned_[at] = true;
+    deviation_.col(i).tail<3>() = stddev.col(next);
+    rotation_bias_B_[at] =
+        rotation_exp(errors.compensated.col(next)).transpose() * rotation_exp(errors.calibrated.col(next));
+    ++next;
+  }
+}
+
+double Comparison::all_rows() const {
+  return 3.0 * poses() + 3.0 * static_cast<double>(std::count(is_turned_.begin(), is_turned_.end(), true));
+}
+
+void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Eigen::VectorXd& r,
                           Eigen::MatrixXd& jacobian) const {
   Eigen::VectorXd here = values;
   const bool begun = pose >= alternative.first;
@@ -47,8 +88,17 @@ void Comparison::residual(const Alternative& alternative, const Eigen::VectorXd&
   }
   const Pose X_WT = alternative.model.pose_W(contexts_[static_cast<std::size_t>(pose)], here, &jacobian);
   const Matrix3 R_BW = alternative.model.X_WB.linear().transpose();
-  r = R_BW * (batch_.measurements[static_cast<std::size_t>(pose)].p_W - X_WT.translation()) - bias_B_.col(pose);
-  jacobian = (R_BW * jacobian.topRows<3>()).eval();
+  const Measurement& m = batch_.measurements[static_cast<std::size_t>(pose)];
+  r.resize(rows(pose));
+  r.head<3>() = R_BW * (m.p_W - X_WT.translation()) - bias_B_.col(pose);
+  jacobian.topRows<3>() = (R_BW * jacobian.topRows<3>()).eval();
+  if (rows(pose) == 6) {
+    const Matrix3 R_BT = rotation_bias_B_[static_cast<std::size_t>(pose)] * (R_BW * X_WT.linear());
+    r.tail<3>() = rotation_log(R_BW * *m.R_WT * R_BT.transpose());
+    jacobian.bottomRows<3>() = (R_BW * jacobian.bottomRows<3>()).eval();
+  } else {
+    jacobian.conservativeResize(3, Eigen::NoChange);
+  }
   for (Eigen::Index k = 0; !begun && k < here.size(); ++k) {
     if (alternative.free[static_cast<std::size_t>(k)]) jacobian.col(k).setZero();
   }
@@ -95,8 +145,8 @@ Pose Comparison::located_base(const PhysicalModel& model) const {
 struct Fitting {
   Eigen::VectorXd scale, values;      ///< of the parameters, SI
   Eigen::MatrixXd prior;              ///< precision, in units of scale
-  Eigen::Matrix3Xd residual;          ///< m
-  std::vector<Eigen::MatrixXd> rows;  ///< 3 x P a pose: derivative over expected deviation, in units of scale
+  std::vector<Eigen::VectorXd> residual;  ///< of each pose, m and rad
+  std::vector<Eigen::MatrixXd> rows;      ///< as many x P a pose: derivative over expected deviation, in units of scale
   std::vector<double> square;         ///< |residual over expected deviation|^2
   Eigen::MatrixXd information;        ///< of the poses that count
 };
@@ -110,7 +160,7 @@ Fitting Comparison::begun(const Alternative& alternative) const {
   }
   fitting.values = alternative.known;
   fitting.prior = prior_precision(alternative, fitting.scale);
-  fitting.residual.resize(3, poses());
+  fitting.residual.resize(static_cast<std::size_t>(poses()));
   fitting.rows.resize(static_cast<std::size_t>(poses()));
   fitting.square.resize(static_cast<std::size_t>(poses()));
   return fitting;
@@ -120,11 +170,11 @@ void Comparison::linearise(const Alternative& alternative, Fitting& fitting) con
   Eigen::MatrixXd jacobian;
   for (int i = 0; i < poses(); ++i) {
     const auto at = static_cast<std::size_t>(i);
-    Vector3 r;
+    Eigen::VectorXd& r = fitting.residual[at];
     residual(alternative, fitting.values, i, r, jacobian);
-    fitting.residual.col(i) = r;
-    fitting.rows[at] = deviation_.col(i).cwiseInverse().asDiagonal() * jacobian * fitting.scale.asDiagonal();
-    fitting.square[at] = r.cwiseQuotient(deviation_.col(i)).squaredNorm();
+    const Eigen::VectorXd weight = deviation_.col(i).head(rows(i)).cwiseInverse();
+    fitting.rows[at] = weight.asDiagonal() * jacobian * fitting.scale.asDiagonal();
+    fitting.square[at] = r.cwiseProduct(weight).squaredNorm();
   }
 }
 
@@ -137,7 +187,8 @@ Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest
     const auto at = static_cast<std::size_t>(i);
     if (fitting.square[at] > farthest) continue;
     fitting.information.noalias() += fitting.rows[at].transpose() * fitting.rows[at];
-    gradient.noalias() += fitting.rows[at].transpose() * fitting.residual.col(i).cwiseQuotient(deviation_.col(i));
+    gradient.noalias() += fitting.rows[at].transpose() *
+                          fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
   }
   return (fitting.information + fitting.prior).ldlt().solve(gradient);
 }
@@ -146,25 +197,33 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   const int n = poses();
   const Eigen::VectorXd off = (fitting.values - alternative.known).cwiseQuotient(fitting.scale);
   Fit fit;
-  fit.residual = fitting.residual;
+  fit.residual.resize(3, n);
+  fit.turn.setZero(3, n);
   double inside = 0;
   double all = 0;
+  double judged_rows = 0;
+  double bad = 0;
   for (int i = 0; i < n; ++i) {
-    const double cost = fitting.square[static_cast<std::size_t>(i)];
+    const auto at = static_cast<std::size_t>(i);
+    const double cost = fitting.square[at];
+    fit.residual.col(i) = fitting.residual[at].head<3>();
+    if (rows(i) == 6) fit.turn.col(i) = fitting.residual[at].tail<3>();
     all += cost;
-    if (cost > limit()) {
+    if (cost > limit(rows(i))) {
       fit.outliers.push_back(i);
+      bad += limit(rows(i));
     } else {
       inside += cost;
+      judged_rows += static_cast<double>(rows(i));
     }
   }
   const auto outliers = static_cast<double>(fit.outliers.size());
   const int k = shown_directions(alternative, fitting.information);
   const int places = alternative.first > 0 ? 2 : 0;  // where it begins was chosen
-  fit.score = inside + limit() * outliers + off.dot(fitting.prior * off) + k * std::log(3.0 * n) + places * std::log(n);
-  const double freedom = 3 * (n - outliers) - k;
+  fit.score = inside + bad + off.dot(fitting.prior * off) + k * std::log(all_rows()) + places * std::log(n);
+  const double freedom = judged_rows - k;
   fit.misfit = freedom > 0 ? inside / freedom : inside;
-  fit.misfit_all = all / std::max(3 * n - k, 1);
+  fit.misfit_all = all / std::max(all_rows() - k, 1.0);
   fit.explains =
       freedom > 0 && fit.misfit <= kGoodMisfit && outliers <= std::max<double>(kFewOutliers, kMostOutliers * n);
   return fit;
@@ -176,8 +235,9 @@ Fit Comparison::fit(const Alternative& alternative) const {
     linearise(alternative, fitting);
     // First all poses, so that what has begun is followed; then only those that are not much farther off than others.
     const auto changed = fitting.square.begin() + alternative.first;
-    const double farthest = iteration == 0 ? std::numeric_limits<double>::infinity()
-                                           : std::max(limit(), kFarthest * median({changed, fitting.square.end()}));
+    const double farthest = iteration == 0
+                                ? std::numeric_limits<double>::infinity()
+                                : std::max(limit(6), kFarthest * median({changed, fitting.square.end()}));
     const Eigen::VectorXd next = step(alternative, farthest, fitting);
     if (iteration >= kMostIterations || !(next.norm() > kDone)) return judged(alternative, fitting);
     fitting.values += next.cwiseProduct(fitting.scale);

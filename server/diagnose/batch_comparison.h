@@ -30,6 +30,7 @@ struct Fit {
   bool explains = false;
   std::vector<int> outliers;
   Eigen::Matrix3Xd residual;  ///< m
+  Eigen::Matrix3Xd turn;      ///< rad; 0 where no orientation is judged
 };
 
 struct Fitting;
@@ -37,16 +38,7 @@ struct Fitting;
 /// The batch against one model: what the alternatives share.
 class Comparison {
  public:
-  Comparison(const CompensatedModel& model, const MeasurementBatch& batch) : model_(model), batch_(batch) {
-    const CompensatedModel::LevelErrors errors = model.errors_B(batch);
-    bias_B_ = errors.calibrated - errors.compensated;
-    deviation_ = errors.stddev;
-    const double expected = std::sqrt(deviation_.squaredNorm() / static_cast<double>(poses()));
-    if (const auto& held_out = model.parts().validation) {
-      deviation_ *= std::max(1.0, held_out->compensated.rms / expected);
-    }
-    for (const Measurement& m : batch.measurements) contexts_.push_back(as_served(m));
-  }
+  Comparison(const CompensatedModel& model, const MeasurementBatch& batch);
 
   [[nodiscard]] int poses() const { return static_cast<int>(batch_.measurements.size()); }
   [[nodiscard]] const MeasurementBatch& batch() const { return batch_; }
@@ -63,20 +55,30 @@ class Comparison {
     if (!context.temperature) context.temperature = model_.parts().temperature_mean;
     return context;
   }
+  /// Deviations of the orientations that the model expects; none are judged where it was never told any.
+  void expect_rotations(const CompensatedModel::LevelErrors::Rotations& errors);
+  /// How many numbers are judged: of a pose, 6 or 3 without an orientation; of all.
+  [[nodiscard]] Eigen::Index rows(int pose) const { return is_turned_[static_cast<std::size_t>(pose)] ? 6 : 3; }
+  [[nodiscard]] double all_rows() const;
   /// What a pose may cost before it is a bad one.
-  [[nodiscard]] double limit() const { return 3 * std::log(3.0 * poses()) + 2 * std::log(poses()); }
+  [[nodiscard]] double limit(Eigen::Index rows) const {
+    return static_cast<double>(rows) * std::log(all_rows()) + 2 * std::log(poses());
+  }
   [[nodiscard]] Fitting begun(const Alternative& alternative) const;
   void linearise(const Alternative& alternative, Fitting& fitting) const;
   [[nodiscard]] Eigen::VectorXd step(const Alternative& alternative, double farthest, Fitting& fitting) const;
   [[nodiscard]] Fit judged(const Alternative& alternative, const Fitting& fitting) const;
-  /// Measured - predicted, and minus its derivative.
-  void residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Vector3& r,
+  /// Measured - predicted in B (m; rad), and minus its derivative; rows(pose) of both.
+  void residual(const Alternative& alternative, const Eigen::VectorXd& values, int pose, Eigen::VectorXd& r,
                 Eigen::MatrixXd& jacobian) const;
   [[nodiscard]] Eigen::MatrixXd prior_precision(const Alternative& alternative, const Eigen::VectorXd& scale) const;
 
   const CompensatedModel& model_;
   const MeasurementBatch& batch_;
-  Eigen::Matrix3Xd bias_B_, deviation_;  // m
+  Eigen::Matrix3Xd bias_B_;                // m
+  std::vector<Matrix3> rotation_bias_B_;   // of each pose
+  Eigen::Matrix<double, 6, -1> deviation_;  // m, rad
+  std::vector<bool> is_turned_;            // whether its orientation is judged
   std::vector<PoseContext> contexts_;
 };
 

@@ -4,8 +4,10 @@
 
 #include "server/base/hash.h"
 #include "server/calibrate/frames.h"
+#include "server/calibrate/orientation_check.h"
 #include "server/diagnose/answers.h"
 #include "server/diagnose/dependence.h"
+#include "server/diagnose/more_than_noise.h"
 #include "server/diagnose/next_poses.h"
 #include "server/diagnose/wording.h"
 #include "server/measurement/velocity.h"
@@ -39,6 +41,8 @@ bool put_in_order_of_time(MeasurementBatch& batch) {
 Result<PreparedBatch> prepare(const Cell& cell, const MeasurementBatch& batch, std::uint64_t seed) {
   Result<MeasurementBatch> checked = check_against_cell(batch, cell);
   if (!checked) return tl::make_unexpected(checked.error());
+  if (const Status oriented = check_orientations(*checked, cell); !oriented)
+    return tl::make_unexpected(oriented.error());
   PreparedBatch prepared;
   prepared.sorted = put_in_order_of_time(*checked);
   fill_velocity(*checked);
@@ -82,6 +86,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   Diagnosis diagnosis;
   tell_errors(explained, *prepared, diagnosis);
   tell_findings(explained, *prepared, recorded, diagnosis);
+  tell_noise(explained, *prepared, diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
   tell_held_out(explained, *prepared, diagnosis);
   if (!reported(options, "asking what could not have been seen", 0.72)) return tl::make_unexpected(given_up());
@@ -96,7 +101,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     tell_recovery(explained, families, options.seed + 2, diagnosis);
   }
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
-  diagnosis.leftover = dependence_of(explained.after, explained.all.project(explained.after.residual()), options.seed);
+  diagnosis.leftover = dependence_of(explained.after, explained.all,
+                                     explained.all.project(explained.after.residual()), options.seed);
   tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
   diagnosis.batch = recorded;
   diagnosis.batch_hash = batch_hash(batch);

@@ -66,6 +66,13 @@ struct Unexplained {
   std::vector<std::string> depends_on;  ///< `q4`, `time`, `torque`
   double rms = 0;                       ///< m
   double p_value = 1;
+  std::string hint = {};  ///< for people: what it may be all the same, or what would show more; may be empty
+};
+
+/// What is left after all that was found, against what is stated for one measurement; per axis, SI.
+struct LeftOver {
+  double left = 0, stated = 0;
+  double freedom = 0;  ///< degrees of it; 0 where nothing was measured
 };
 
 /// A cause that this batch could not have shown, or only from some size on.
@@ -136,6 +143,7 @@ struct Diagnosis {
   double noise = 0;       ///< m per axis: of a pose, whatever its reason: what no cause explains
   double instrument = 0;  ///< m per axis: what the measurement itself is said to be good for
   std::string noise_from;
+  LeftOver left_position, left_rotation;  ///< m; rad
   ErrorFigures before, after;  ///< of all poses used, before and after extension
   std::optional<ErrorFigures> held_out_before, held_out_after;
   /// The same without the poses held out that fit neither model; empty where there are none.

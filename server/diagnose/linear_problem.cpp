@@ -150,15 +150,20 @@ void LinearProblem::whiten() {
   const VectorXd left = residual_ - weight_.asDiagonal() * (scaled * factor.solve(right));
   const double surplus = robust_surplus(left(position), weight_(position), share);
   const double surplus_rotation = robust_surplus(left(rotation), weight_(rotation), share);
-  instrument_ = weight_(position).norm() / std::sqrt(static_cast<double>(position.size()));
-  double sum = 0;
-  for (const Index row : position) {
-    const double sigma = std::hypot(weight_(row), surplus);
-    sum += sigma * sigma;
-    weight_(row) = 1 / sigma;
-  }
-  noise_ = std::sqrt(sum / static_cast<double>(position.size()));
-  for (const Index row : rotation) weight_(row) = 1 / std::hypot(weight_(row), surplus_rotation);
+  const auto weigh = [&](const std::vector<Index>& some, double beyond) {
+    if (some.empty()) return Spread{};
+    const auto count = static_cast<double>(some.size());
+    const double stated = weight_(some).norm() / std::sqrt(count);
+    double sum = 0;
+    for (const Index row : some) {
+      const double sigma = std::hypot(weight_(row), beyond);
+      sum += sigma * sigma;
+      weight_(row) = 1 / sigma;
+    }
+    return Spread{std::sqrt(sum / count), stated, share * count};
+  };
+  position_ = weigh(position, surplus);
+  rotation_ = weigh(rotation, surplus_rotation);
 
   residual_ = residual_.cwiseProduct(weight_).eval();
   nuisance_ = (weight_.asDiagonal() * nuisance_ * scales.asDiagonal()).eval();

@@ -44,9 +44,16 @@ class LinearProblem {
   /// R: 1 / standard deviation of each row, SI.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
   /// m per axis: noise of a typical position, whatever its reason.
-  [[nodiscard]] double noise() const { return noise_; }
+  [[nodiscard]] double noise() const { return position_.noise; }
   /// m per axis: what the measurements themselves are said to be good for.
-  [[nodiscard]] double instrument() const { return instrument_; }
+  [[nodiscard]] double instrument() const { return position_.stated; }
+  /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of freedom behind them.
+  struct Spread {
+    double noise = 0, stated = 0;
+    double freedom = 0;  ///< 0 where none were measured
+  };
+  [[nodiscard]] const Spread& position_spread() const { return position_; }
+  [[nodiscard]] const Spread& rotation_spread() const { return rotation_; }
 
   /// 3 x poses, m: the positions of a whitened vector.
   [[nodiscard]] Eigen::Matrix3Xd positions(const Eigen::VectorXd& whitened) const;
@@ -64,8 +71,7 @@ class LinearProblem {
   Eigen::VectorXd residual_, weight_;
   Eigen::MatrixXd nuisance_, by_joint_;
   std::vector<Effect> effects_;
-  double noise_ = 0;
-  double instrument_ = 0;
+  Spread position_, rotation_;
 };
 
 }  // namespace trammel

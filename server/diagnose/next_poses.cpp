@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/base/check.h"
+#include "server/plan/approach.h"
 #include "server/plan/plan.h"
 
 namespace trammel {
@@ -124,9 +125,10 @@ class Measuring {
   Result<Candidates> pool() {
     const Result<MatrixXd> planned = plan_poses(cell(), {.count = kPool, .seed = seed_});
     if (!planned) return tl::make_unexpected(planned.error());
-    return seen(*planned);
+    return measurable(*planned);
   }
-  /// `chosen` with one or two joints elsewhere: anywhere in their ranges, or at an end.
+  /// `chosen` with one or two joints elsewhere: anywhere in their ranges, or as near to an end as they can be
+  /// approached.
   Candidates variants(const JointVector& chosen) {
     const Result<JointRanges> ranges = planning_ranges(cell());
     if (!ranges) return {};
@@ -136,10 +138,19 @@ class Measuring {
     for (Index i = 0; i < all.rows(); ++i) {
       for (Index moved = 0; moved <= i % 2; ++moved) {
         const Index j = joint(random_);
-        const auto [lower, upper] = (*ranges)[static_cast<std::size_t>(j)];
+        const auto& range = (*ranges)[static_cast<std::size_t>(j)];
+        const auto [lower, upper] =
+            approachable_range(cell().robot.joint(static_cast<int>(j)), range.first, range.second);
         all(i, j) = lower + std::clamp(place(random_), 0.0, 1.0) * (upper - lower);
       }
     }
+    return measurable(all);
+  }
+
+ private:
+  /// Those that a plan takes as they will be written: on the grid of programs, with a way to be approached on.
+  Candidates measurable(MatrixXd all) {
+    for (Index i = 0; i < all.rows(); ++i) all.row(i) = on_program_grid(cell().robot, all.row(i).transpose());
     const Result<std::vector<bool>> may = plannable(cell(), all);
     std::vector<Index> kept;
     for (Index i = 0; may && i < all.rows(); ++i) {
@@ -149,7 +160,6 @@ class Measuring {
     return seen(all(kept, Eigen::all));
   }
 
- private:
   const Cell& cell() const { return *found_.before.model.cell; }
 
   /// As if measured where the model has them, in the context of the batch, after it.

@@ -1,6 +1,7 @@
 #include "server/diagnose/refine.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "server/diagnose/effect.h"
 #include "server/diagnose/product.h"
@@ -24,6 +25,42 @@ VectorXd from_prior(const PriorModel& at) {
     distance(k) = (at.model.values(k) - prior.prior) / prior.prior_scale;
   }
   return distance;
+}
+
+/// The step that lowers the sum of squares most without leaving a parameter below its bound: what would go beyond stops
+/// there, and everything else is solved for anew. Cutting a step off afterwards would leave the others where they were
+/// to make up for what was cut.
+VectorXd bounded_step(const PriorModel& at, const MatrixXd& information, const VectorXd& right) {
+  VectorXd step = information.llt().solve(right);
+  const Index P = at.model.values.size();
+  std::vector<bool> held(static_cast<std::size_t>(right.size()), false);
+  const auto room = [&](Index i) {
+    const Parameter& prior = at.priors[static_cast<std::size_t>(i)];
+    return (prior.lower - at.model.values(i)) / prior.prior_scale;
+  };
+  for (bool more = true; more;) {
+    more = false;
+    for (Index i = 0; i < P; ++i) {
+      if (held[static_cast<std::size_t>(i)] || step(i) >= room(i)) continue;
+      held[static_cast<std::size_t>(i)] = more = true;
+    }
+    if (!more) break;
+    // What is held moves to its bound, at any price.
+    MatrixXd left = information;
+    VectorXd rest = right;
+    for (Index i = 0; i < P; ++i) {
+      if (!held[static_cast<std::size_t>(i)]) continue;
+      rest -= room(i) * information.col(i);
+      left.row(i).setZero();
+      left.col(i).setZero();
+      left(i, i) = 1;
+    }
+    for (Index i = 0; i < P; ++i) {
+      if (held[static_cast<std::size_t>(i)]) rest(i) = room(i);
+    }
+    step = left.llt().solve(rest);
+  }
+  return step;
 }
 
 }  // namespace
@@ -69,12 +106,12 @@ double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std:
     left = problem.residual().squaredNorm() + distance.squaredNorm();
     right.head(P) -= distance;
     information.diagonal().array() += 1;
-    const VectorXd step = information.llt().solve(right);
-    left -= right.dot(step);
+    const VectorXd step = bounded_step(prior_model, information, right);
+    left -= 2 * right.dot(step) - step.dot(information * step);
     for (Index i = 0; i < P; ++i) {
       const Parameter& prior = prior_model.priors[static_cast<std::size_t>(i)];
       double& value = prior_model.model.values(i);
-      value = std::max(value + prior.prior_scale * step(i), prior.lower);
+      value = std::max(value + prior.prior_scale * step(i), prior.lower);  // rounding
     }
     const VectorXd own = step.head(P);
     if (own.dot(information.topLeftCorner(P, P) * own) < kSettled * kSettled) break;

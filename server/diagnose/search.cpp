@@ -150,6 +150,30 @@ class Search {
     return {};
   }
 
+  /// What has the sign that play cannot have is a dependence on the side of approach that has no name.
+  void open_negative_play() {
+    for (std::size_t k = 0; k < result_.accepted.size();) {
+      const Accepted one = result_.accepted[k];
+      const std::optional<PlaySign> sign =
+          one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
+      if (!sign || !sign->negative) {
+        ++k;
+        continue;
+      }
+      const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
+      const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
+      const std::string joint = std::to_string(one.cause.joint + 1);
+      result_.unnamed.push_back({{"q" + joint, "dir" + joint},
+                                 problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
+                                 one.best.evidence - one.penalty,
+                                 one.p_value});
+      result_.negative_play.push_back(*sign);
+      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
+      remove_from(result_.after, one.in_model);
+      refine(result_.after, result_.batch, result_.unnamed);
+    }
+  }
+
   SearchResult take() {
     const bool extended = std::any_of(result_.accepted.begin(), result_.accepted.end(),
                                       [](const Accepted& one) { return !one.source.empty(); });
@@ -172,6 +196,13 @@ class Search {
   }
 
  private:
+  /// Of a joint's play, beside all the rest.
+  PlaySign sign_of(const Accepted& one) const {
+    const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
+    const Background all(background_columns(problem, result_.unnamed));
+    return sign_of_play(problem, one.in_model, one.cause.joint, all.estimate(problem.residual()), all.covariance());
+  }
+
   /// Sum of squares of the poses held out, each predicted from the others, in units of `weight`.
   double held_out_square(const PriorModel& prior_model, const VectorXd& weight) const {
     const LinearProblem problem(prior_model.model, result_.batch, prior_model.priors, {});
@@ -443,6 +474,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
     if (changed) search.reform();
   }
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
+  search.open_negative_play();
   return search.take();
 }
 

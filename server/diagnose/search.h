@@ -8,6 +8,7 @@
 
 #include "server/diagnose/candidates.h"
 #include "server/diagnose/diagnose.h"
+#include "server/diagnose/play_sign.h"
 #include "server/diagnose/refine.h"
 #include "server/diagnose/scan.h"
 
@@ -34,6 +35,8 @@ struct SearchResult {
   MeasurementBatch batch;  ///< without outliers
   std::vector<Accepted> accepted;
   std::vector<Unnamed> unnamed;
+  /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not among the accepted.
+  std::vector<PlaySign> negative_play;
   Chance chance;
   /// The form of the model's own compliance that gave way to another beside what was found; empty where none did.
   std::string reformed_from, reformed_to;

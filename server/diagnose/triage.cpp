@@ -1,17 +1,19 @@
-// Batch triage. The model: a measured position differs from what the model in force predicts by
+// Batch triage. The model: a measured pose, six numbers or three of a position alone, differs from what the model in
+// force predicts by
 //
 //   r_i = J_i delta + A_i theta + e_i,    delta ~ N(0, C),    e_i ~ N(0, S_i),
 //
 // with delta what calibration left uncertain of the model's own parameters (C is its posterior covariance), S_i the
 // variance that the model expects of this very pose (measurement, learned bias, discrepancy; not below what its own
-// held-out poses showed), and theta what one alternative sets free: six numbers of the base, six of the tool, four of
+// held-out poses showed, of positions and of orientations), and theta what one alternative sets free: six numbers of the base, six of the tool, four of
 // the payload, one zero of a joint, or all that the model knows of the arm. Every alternative is fitted in full (the
 // sources' exact derivatives, Gauss-Newton) and scored by
 //
-//   sum_i min(|S_i^-1/2 r_i|^2, c) + delta' C^-1 delta + k log(3 n),    c = 3 log(3 n) + 2 log n:
+//   sum_i min(|S_i^-1/2 r_i|^2, c_i) + delta' C^-1 delta + k log m,    c_i = m_i log m + 2 log n,
 //
+// m_i numbers of pose i and m of all:
 // minus twice the log likelihood with Schwarz's price for the k directions of theta that the poses show. A pose that
-// costs more than c is cheaper as one with three free numbers of its own: a single bad pose, chosen among n.
+// costs more than c_i is cheaper as one with m_i free numbers of its own: a single bad pose, chosen among n.
 //
 // Whether an alternative *explains* the batch is asked of its inliers' chi^2, not of its rank among alternatives; among
 // those that explain it the lowest score wins, and whatever comes within kDoubt of it could be it as well. Simple
@@ -19,14 +21,15 @@
 // again; then one cause that begins in the middle of the batch.
 //
 // What is identifiable: a turned base is a slipped joint 1 (both turn about its axis), a shifted tool is the last link;
-// the payload shows through compliance only and is no alternative where the model has none. Only positions are used:
-// orientations would tell a tool that is turned about its own point, which does not matter to positions.
+// the payload shows through compliance only and is no alternative where the model has none. A tool that is turned about
+// its own point shows in the orientations alone; a model that never saw one says nothing of them.
 #include "server/diagnose/triage.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/calibrate/orientation_check.h"
 #include "server/diagnose/batch_alternatives.h"
 
 namespace trammel {
@@ -126,6 +129,7 @@ Triage Judge::told(const Tried& none) const {
     triage.learn = false;
     triage.misfit_after = triage.misfit;
     triage.effect_rms = std::sqrt(none.fit.residual.squaredNorm() / comparison_.poses());
+    triage.effect_rotation_rms = std::sqrt(none.fit.turn.squaredNorm() / comparison_.poses());
   } else {
     const Tried& best = tried_.front();
     for (const int pose : best.fit.outliers) triage.outliers.push_back(pose_id(pose));
@@ -134,6 +138,7 @@ Triage Judge::told(const Tried& none) const {
     triage.tracker_elsewhere = best.alternative.tracker_elsewhere;
     triage.learn = !best.alternative.harmful;
     triage.effect_rms = std::sqrt((none.fit.residual - best.fit.residual).squaredNorm() / comparison_.poses());
+    triage.effect_rotation_rms = std::sqrt((none.fit.turn - best.fit.turn).squaredNorm() / comparison_.poses());
     for (std::size_t k = 1; k < tried_.size(); ++k) {
       if (tried_[k].fit.score > best.fit.score + kDoubt || tried_[k].alternative.cause.cause.empty()) continue;
       triage.could_also_be.push_back(tried_[k].alternative.cause);
@@ -156,6 +161,13 @@ std::string in_words(const Cause& cause) {
   return "the arm itself has changed";
 }
 
+/// Of positions and, where they were judged, of orientations.
+std::string how_much(const Triage& triage) {
+  const std::string mm = fmt::format("{:.3g} mm", to_mm(triage.effect_rms));
+  if (triage.effect_rotation_rms == 0) return mm + " rms";
+  return fmt::format("{} and {:.2g} deg rms", mm, to_deg(triage.effect_rotation_rms));
+}
+
 std::string Judge::sentence(const Triage& triage) const {
   const std::string bad =
       triage.outliers.empty() ? "" : fmt::format("; bad poses: {}", fmt::join(triage.outliers, ", "));
@@ -164,9 +176,8 @@ std::string Judge::sentence(const Triage& triage) const {
       return fmt::format("as the model in force expects it ({:.2f} of the expected deviation)", triage.misfit);
     case TriageVerdict::kPoisoned:
       return fmt::format(
-          "{:.3g} mm rms off the model in force ({:.3g} times the expected deviation), and nothing known "
-          "explains it",
-          to_mm(triage.effect_rms), triage.misfit);
+          "{} off the model in force ({:.3g} times the expected deviation), and nothing known explains it",
+          how_much(triage), triage.misfit);
     case TriageVerdict::kExplained:
       break;
   }
@@ -174,7 +185,7 @@ std::string Judge::sentence(const Triage& triage) const {
     return fmt::format("as the model in force expects it but for single poses: {}", fmt::join(triage.outliers, ", "));
   }
   std::string text = triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
-  text += fmt::format("{} ({:.3g} mm rms)", in_words(triage.cause), to_mm(triage.effect_rms));
+  text += fmt::format("{} ({})", in_words(triage.cause), how_much(triage));
   if (triage.tracker_elsewhere) text += ", and the tracker stands elsewhere";
   for (const Cause& other : triage.could_also_be) {
     text += "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + in_words(other);
@@ -197,6 +208,13 @@ std::string_view to_string(TriageVerdict verdict) {
 }
 
 Triage triage(const CompensatedModel& model, const MeasurementBatch& batch) {
+  if (const auto doubt = orientation_doubt(batch, model.cell())) {
+    Triage poisoned;
+    poisoned.verdict = TriageVerdict::kPoisoned;
+    poisoned.learn = false;
+    poisoned.sentence = *doubt;
+    return poisoned;
+  }
   if (batch.measurements.size() < kFewestPoses) {
     Triage too_few;
     too_few.sentence =

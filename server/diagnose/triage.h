@@ -29,12 +29,15 @@ struct Triage {
   double misfit = 0, misfit_after = 0;  ///< rms residual over its expected deviation: of all poses; explained, without
                                         ///< the outliers
   double effect_rms = 0;                ///< m, Euclidean, of what the cause does to the poses
+  double effect_rotation_rms = 0;       ///< rad, of the orientations likewise; 0 where none are judged
   std::string sentence;                 ///< for people
 };
 
 /// Holds `batch` (checked against the model's cell) against `model` and tells apart: a tracker or base that stands
 /// elsewhere, another tool, another payload, a joint that lost its zero, single bad poses, an arm that has changed,
-/// each from the beginning of the batch or from one of its poses on. With fewer than 8 poses nothing is said: clean.
+/// each from the beginning of the batch or from one of its poses on. Orientations are judged like positions where the
+/// model was trained on some; those that do not follow the joints at all (orientation_doubt()) are poison whatever the
+/// positions say. With fewer than 8 poses nothing else is said: clean.
 [[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -11,7 +11,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
-constexpr double kMuchMore = 1.5;         // than what is stated for the measurement: what the model lacks is in it
+constexpr double kMuchMore = 1.3;         // than what is stated for the measurement: what the model lacks is in it
 
 struct Words {
   const char* cause;
@@ -138,10 +138,12 @@ std::string sentence_for(const Diagnosis& d) {
     add(bad.front() + " is an outlier: single pose, cause not separable; repeat it and its neighbours");
   if (bad.size() > 1)
     add(listed(bad) + " are outliers: single poses, cause not separable; repeat them and their neighbours");
-  if (d.unexplained.present) {
+  const bool known_of = !d.unexplained.depends_on.empty();
+  if (d.unexplained.present && known_of) {
     add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it",
                     text.empty() ? "" : " else", listed(d.unexplained.depends_on), 1e6 * d.unexplained.rms));
   }
+  if (!d.unexplained.hint.empty()) add(d.unexplained.hint);
   std::vector<std::string> held_out;
   for (const SuspectedPose& pose : d.suspects) {
     if (pose.held_out) held_out.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
@@ -153,12 +155,6 @@ std::string sentence_for(const Diagnosis& d) {
   if (sure.empty() && doubtful.empty() && !d.unexplained.present) {
     add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", bad.empty() ? "was" : "else was", d.poses,
                     1e6 * d.after.rms));
-  }
-  if (d.noise > kMuchMore * d.instrument) {
-    add(fmt::format(
-        "{}, {:.0f} um an axis, is {:.1f} times what is stated for the measurement ({:.0f} um), and depends "
-        "on nothing I know",
-        noise_name(d.noise, d.instrument), 1e6 * d.noise, d.noise / d.instrument, 1e6 * d.instrument));
   }
   return text;
 }

@@ -29,6 +29,15 @@ std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, i
   return bump;
 }
 
+std::pair<double, double> approachable_range(const Joint& joint, double lower, double upper) {
+  const bool revolute = joint.type == JointType::kRevolute;
+  const double grid = revolute ? from_deg(kGrid) : from_mm(kGrid);
+  const double least = kLeastShare * (revolute ? kBumpAngle : kBumpLength) + grid;
+  const double from = std::max(lower + grid, joint.lower + least);
+  const double to = std::min(upper - grid, joint.upper - least);
+  return from < to ? std::pair(from, to) : std::pair(lower, upper);
+}
+
 JointVector on_program_grid(const Chain& robot, JointVector q) {
   for (int j = 0; j < robot.size(); ++j) {
     const Joint& joint = robot.joint(j);

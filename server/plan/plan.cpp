@@ -274,8 +274,12 @@ Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options)
 }
 
 Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) {
-  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {});
-  if (!filter) return tl::make_unexpected(filter.error());
+  std::vector<Filter> either;
+  for (const int direction : {-1, 1}) {
+    Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {direction});
+    if (!filter) return tl::make_unexpected(filter.error());
+    either.push_back(std::move(*filter));
+  }
   const Result<JointRanges> ranges = planning_ranges(cell);
   if (!ranges) return tl::make_unexpected(ranges.error());
   DrawCount count;
@@ -287,7 +291,8 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
       const double at = one(static_cast<Eigen::Index>(j));
       inside = inside && at >= (*ranges)[j].first && at <= (*ranges)[j].second;
     }
-    may[static_cast<std::size_t>(i)] = inside && filter->keeps(one, count);
+    may[static_cast<std::size_t>(i)] =
+        inside && std::any_of(either.begin(), either.end(), [&](const Filter& side) { return side.keeps(one, count); });
   }
   return may;
 }

@@ -48,8 +48,8 @@ struct PlanOptions {
 /// when fewer than 1 in 1000 candidates fits, and what Visibility::of() refuses. Only count and seed matter.
 [[nodiscard]] Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options);
 
-/// Which of the joint vectors in the rows of `q` (rad) plan_poses() could have given. Refuses what it refuses of the
-/// cell.
+/// Which of the joint vectors in the rows of `q` (rad) plan_poses() could have given and, as a plan needs, can be
+/// approached from one side at least. Refuses what plan_poses() refuses of the cell.
 [[nodiscard]] Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q);
 
 /// What became of the candidates that were drawn; each is counted at the first thing that spoke against it.

@@ -75,7 +75,8 @@ ordered_json unexplained_json(const Unexplained& unexplained) {
   return {{"present", unexplained.present},
           {"depends_on", unexplained.depends_on},
           {"rms_mm", to_mm(unexplained.rms)},
-          {"p_value", unexplained.p_value}};
+          {"p_value", unexplained.p_value},
+          {"hint", unexplained.hint}};
 }
 
 ordered_json not_separable_json(const std::vector<Inseparable>& groups) {

@@ -59,7 +59,7 @@ std::string unit_shown(const std::string& unit) {
 /// What is smaller says no more: no test here is that exact.
 std::string p_value_shown(double p) {
   constexpr double kLeast = 1e-6;
-  return p < kLeast ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
+  return p <= kLeast ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
 }
 
 std::string estimates_of(const Finding& finding) {
@@ -144,9 +144,10 @@ std::string figures_table(const Diagnosis& diagnosis) {
 std::string unexplained_text(const Diagnosis& diagnosis) {
   const Unexplained& left = diagnosis.unexplained;
   if (!left.present) return "";
+  const std::string on =
+      left.depends_on.empty() ? "nothing known" : fmt::format("{}", fmt::join(left.depends_on, ", "));
   return fmt::format("<p class=\"left\">Unexplained: {} rms that depend on {} (p = {:.2g}). No known cause fits.</p>\n",
-                     micrometres(left.rms), html_text(fmt::format("{}", fmt::join(left.depends_on, ", "))),
-                     left.p_value);
+                     micrometres(left.rms), html_text(on), left.p_value);
 }
 
 std::string leftover_text(const Diagnosis& diagnosis) {

@@ -6,6 +6,7 @@
 #include "server/base/units.h"
 #include "server/bias/kernel_spelling.h"
 #include "server/calibrate/frames.h"
+#include "server/calibrate/orientation_check.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/velocity.h"
 #include "server/trainer/extrapolation.h"
@@ -257,6 +258,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   };
   const Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
   if (!checked) return tl::make_unexpected(checked.error());
+  if (const Status oriented = check_orientations(*checked, *cell); !oriented)
+    return tl::make_unexpected(oriented.error());
   const BatchSplit split = prepared(*checked, cell->tracker.sigma, options);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 
@@ -294,6 +297,8 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Me
   const Result<MeasurementBatch> checked = check_against_cell(batch, cell);
   if (!checked) return tl::make_unexpected(checked.error());
   if (checked->measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
+  if (const Status oriented = check_orientations(*checked, cell); !oriented)
+    return tl::make_unexpected(oriented.error());
   CompensatedModel::Parts parts = calibrated.parts();
   if (calibrated.provenance().batch_hash != batch_hash(batch)) parts.suspects.clear();  // of other poses
   CalibrationResult as_it_is;

@@ -59,7 +59,10 @@ TEST_F(TriageTest, ATrackerSetUpElsewhereIsHarmlessHoweverFar) {
     MeasurementBatch batch = batch_of(robot_as_it_was());
     // Trackers are levelled: gravity stays where it was.
     const Pose X = Eigen::Translation3d(metres, -metres, 0.3 * metres) * Eigen::AngleAxisd(metres, Vector3::UnitZ());
-    for (Measurement& m : batch.measurements) m.p_W = X * m.p_W;
+    for (Measurement& m : batch.measurements) {
+      m.p_W = X * m.p_W;
+      m.R_WT = X.linear() * *m.R_WT;
+    }
     const Triage moved = triaged(batch);
     EXPECT_EQ(moved.cause.cause, "tracker_moved") << moved.sentence;
     EXPECT_TRUE(moved.cause.pose_id.empty());
@@ -156,6 +159,56 @@ TEST_F(TriageTest, ABatchOfWhichNoPoseFitsIsAsManyDeviationsOffAsItIs) {
   EXPECT_NEAR(poisoned.effect_rms, 2e-3, 2e-4);
   EXPECT_GT(poisoned.misfit, 20) << poisoned.sentence;
   EXPECT_EQ(poisoned.sentence.find("(0 times"), std::string::npos) << poisoned.sentence;
+}
+
+/// What is read where the file has (x, y, z, w) under `qw, qx, qy, qz`.
+void put_in_xyzw_order(Measurement& m) {
+  const Eigen::Quaterniond q(*m.R_WT);
+  m.R_WT = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+}
+
+TEST_F(TriageTest, OrientationsInXyzwOrderAreKeptApartWithTheQuestion) {
+  for (const std::size_t every : {1u, 3u}) {
+    MeasurementBatch batch = batch_of(robot_as_it_was());
+    for (std::size_t i = 0; i < batch.measurements.size(); i += every) put_in_xyzw_order(batch.measurements[i]);
+    const Triage poisoned = triaged(batch);
+    EXPECT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
+    EXPECT_FALSE(poisoned.learn);
+    EXPECT_NE(poisoned.sentence.find("read as xyzw they would fit to 0."), std::string::npos) << poisoned.sentence;
+    EXPECT_NE(poisoned.sentence.find("xyzw order?"), std::string::npos) << poisoned.sentence;
+  }
+}
+
+TEST_F(TriageTest, AToolTurnedAboutItsOwnPointShowsInTheOrientations) {
+  for (const double angle : {5e-4, 0.02}) {
+    MeasurementBatch batch = batch_of(robot_as_it_was());
+    for (Measurement& m : batch.measurements) m.R_WT = *m.R_WT * rotation_exp({0, angle, 0});
+    const Triage turned = triaged(batch);
+    EXPECT_EQ(turned.cause.cause, "tool_changed") << turned.sentence;
+    EXPECT_FALSE(turned.learn);
+    EXPECT_NEAR(turned.effect_rotation_rms, angle, 0.1 * angle) << turned.sentence;
+    EXPECT_LT(turned.effect_rms, 2e-4);
+  }
+}
+
+TEST_F(TriageTest, OrientationsThatScatterFarMoreThanTheModelExpectsArePoison) {
+  MeasurementBatch batch = batch_of(robot_as_it_was());
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> noise(0, 1e-3);
+  for (Measurement& m : batch.measurements)
+    m.R_WT = rotation_exp({noise(random), noise(random), noise(random)}) * *m.R_WT;
+  const Triage poisoned = triaged(batch);
+  EXPECT_EQ(poisoned.verdict, TriageVerdict::kPoisoned) << poisoned.sentence;
+  EXPECT_NE(poisoned.sentence.find("deg rms off the model"), std::string::npos) << poisoned.sentence;
+}
+
+TEST_F(TriageTest, OneBadOrientationIsNamedAndTheBatchLearnedFrom) {
+  MeasurementBatch batch = batch_of(robot_as_it_was());
+  batch.measurements[40].R_WT = *batch.measurements[40].R_WT * rotation_exp({0.01, 0, 0});
+  const Triage bad = triaged(batch);
+  EXPECT_EQ(bad.cause.cause, "outlier") << bad.sentence;
+  EXPECT_EQ(bad.outliers, std::vector<std::string>{batch.measurements[40].pose_id});
+  EXPECT_TRUE(bad.learn);
 }
 
 TEST_F(TriageTest, TooFewPosesAreNotJudged) {

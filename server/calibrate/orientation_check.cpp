@@ -1,0 +1,418 @@
+#include "server/calibrate/orientation_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "server/base/units.h"
+#include "server/calibrate/localisation.h"
+#include "server/robot/rigid_fit.h"
+
+namespace trammel {
+
+namespace {
+
+using Quaternion = Eigen::Quaterniond;
+using Quaternions = std::vector<Quaternion>;
+
+constexpr std::size_t kFewestPoses = 3;
+constexpr double kMostOff = from_deg(5);        // rms, of one pose, and of a tool: no nominal arm is farther off
+constexpr double kFarRow = 5;                   // times the median of all poses
+constexpr double kWorthAsking = from_deg(0.2);  // rms, below which no reading can be told from another
+constexpr double kMuchBetter = 0.25;            // of the rms as given, that another reading leaves at most
+constexpr double kCap = from_deg(30);           // off is off
+constexpr double kNoModelError = 0.025;         // m rms: what no model of a robot leaves,
+constexpr double kNoModelShare = 0.05;          // and of how far the positions spread
+constexpr double kLeastLever = 20;              // times the residual: spread of positions that tells where the base points
+constexpr double kBadPosition = 6;              // times the median residual: a pose that is out as a whole
+constexpr double kMostBadPositions = 0.1;
+constexpr std::size_t kMostTries = 40;       // poses whose own R_FT is tried
+constexpr std::size_t kMostPositions = 300;  // evenly drawn beyond
+
+/// What was measured of one tool.
+struct Oriented {
+  std::string tool;
+  std::vector<const Measurement*> rows;
+  std::vector<Pose> X_BF;
+};
+
+/// How the numbers may have been meant.
+struct Reading {
+  std::string name;      ///< after "read "
+  Quaternions q_FT;      ///< R_BF' R_WB' R_WT of each pose
+  bool by_order = true;  ///< of the same numbers: may be judged by a few tenths of a degree, and row by row
+};
+
+double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+/// The numbers (x, y, z, w) where (w, x, y, z) was understood, and the other way round.
+Quaternion from_xyzw(const Quaternion& q) { return {q.z(), q.w(), q.x(), q.y()}; }
+Quaternion from_wxyz(const Quaternion& q) { return {q.x(), q.y(), q.z(), q.w()}; }
+
+std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about) {
+  std::vector<double> all;
+  for (const Quaternion& q : q_FT) all.push_back(angle(q, about));
+  return all;
+}
+
+/// Every pose by the reading that brings it nearer.
+std::vector<double> nearer(const Reading& one, const Reading& other, const Quaternion& about) {
+  std::vector<double> all = angles(one.q_FT, about);
+  const std::vector<double> others = angles(other.q_FT, about);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = std::min(all[i], others[i]);
+  return all;
+}
+
+/// The rotation that most poses have in common, each by the nearer of two readings: the best of those that single poses
+/// say, then the mean of the poses near it.
+Quaternion common(const Reading& one, const Reading& other) {
+  const std::size_t n = one.q_FT.size();
+  const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
+  Quaternion best = one.q_FT.front();
+  double least = -1;
+  for (std::size_t i = 0; i < n; i += step) {
+    for (const Quaternion& tried : {one.q_FT[i], other.q_FT[i]}) {
+      double sum = 0;
+      for (const double off : nearer(one, other, tried)) sum += std::min(off, kCap);
+      if (least < 0 || sum < least) least = sum, best = tried;
+    }
+  }
+  for (int round = 0; round < 2; ++round) {
+    const std::vector<double> off = nearer(one, other, best);
+    const double near = 3 * median(off) + 1e-9;
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (off[i] > near) continue;
+      const bool by_other = angle(other.q_FT[i], best) < angle(one.q_FT[i], best);
+      const Eigen::Vector4d q = (by_other ? other : one).q_FT[i].coeffs();
+      sum += q.dot(best.coeffs()) < 0 ? Eigen::Vector4d(-q) : q;
+    }
+    best = Quaternion(Eigen::Vector4d(sum.normalized()));
+  }
+  return best;
+}
+
+/// Of every `step`-th pose, positions as measured and as the nominal arm has them.
+struct Positions {
+  Eigen::Matrix3Xd p_W;
+  std::vector<Pose> X_BF;
+};
+
+/// Where the base points.
+struct Turned {
+  Quaternion q_WB;
+  std::vector<bool> bad;  ///< rows whose position is out, too
+};
+
+double spread_across(const Eigen::Matrix3Xd& p) {
+  const Eigen::Matrix3Xd centred = p.colwise() - p.rowwise().mean();
+  const Vector3 singular = Eigen::JacobiSVD<Matrix3>(centred * centred.transpose()).singularValues();
+  return std::sqrt(singular(1) / static_cast<double>(p.cols()));
+}
+
+double spread(const Eigen::Matrix3Xd& p) {
+  return std::sqrt((p.colwise() - p.rowwise().mean()).squaredNorm() / static_cast<double>(p.cols()));
+}
+
+Positions positions_of(const Oriented& group) {
+  const std::size_t n = group.rows.size();
+  const std::size_t count = std::min(n, kMostPositions);
+  Positions some{Eigen::Matrix3Xd(3, static_cast<Eigen::Index>(count)), {}};
+  for (std::size_t k = 0; k < count; ++k) {
+    some.p_W.col(static_cast<Eigen::Index>(k)) = group.rows[k * n / count]->p_W;
+    some.X_BF.push_back(group.X_BF[k * n / count]);
+  }
+  return some;
+}
+
+/// Base and tool point by the positions alone.
+Result<BaseAndTool> located(const Positions& positions, const std::optional<Pose>& X_FT) {
+  if (!X_FT) return locate_base_and_tool_point(positions.p_W, positions.X_BF);
+  Eigen::Matrix3Xd p_B(3, positions.p_W.cols());
+  for (std::size_t i = 0; i < positions.X_BF.size(); ++i)
+    p_B.col(static_cast<Eigen::Index>(i)) = positions.X_BF[i] * X_FT->translation();
+  const Result<Pose> X_WB = fit_transform(positions.p_W, p_B);
+  if (!X_WB) return tl::make_unexpected(X_WB.error());
+  return BaseAndTool{*X_WB, *X_FT};
+}
+
+/// What the positions say of the base; `belong` false where they are not of these joints.
+struct Located {
+  std::optional<Turned> turned;
+  bool belong = true;
+};
+Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
+  const Positions positions = positions_of(group);
+  const Result<BaseAndTool> found = located(positions, X_FT);
+  if (!found) return {};
+  std::vector<double> off;
+  for (std::size_t i = 0; i < group.rows.size(); ++i)
+    off.push_back((found->X_WB * (group.X_BF[i] * found->X_FT.translation()) - group.rows[i]->p_W).norm());
+  const double typical = median(off);
+  if (typical > std::max(kNoModelError, kNoModelShare * spread(positions.p_W))) return {std::nullopt, false};
+  if (typical * kLeastLever > spread_across(positions.p_W)) return {};
+  Turned turned{Quaternion(found->X_WB.linear()), std::vector<bool>(off.size(), false)};
+  const double limit = std::max(kNoModelError, kBadPosition * typical);
+  for (std::size_t i = 0; i < off.size(); ++i) turned.bad[i] = off[i] > limit;
+  const auto bad = static_cast<double>(std::count(turned.bad.begin(), turned.bad.end(), true));
+  if (bad > kMostBadPositions * static_cast<double>(off.size())) turned.bad.assign(off.size(), false);
+  return {turned, true};
+}
+
+/// The numbers as `reread` has them, with the base turned by q_WB.
+template <typename Reread>
+Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB, const Reread& reread) {
+  Reading one{std::move(name), {}};
+  for (std::size_t i = 0; i < group.rows.size(); ++i) {
+    const Quaternion q_BF(group.X_BF[i].linear());
+    one.q_FT.push_back(q_BF.conjugate() * (q_WB.conjugate() * reread(Quaternion(*group.rows[i]->R_WT))));
+  }
+  return one;
+}
+
+Quaternion as_it_is(const Quaternion& q) { return q; }
+
+/// As given first, then all others.
+std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, const Chain& robot) {
+  const auto inverse = [](const Quaternion& q) { return q.conjugate(); };
+  std::vector<Reading> all = {
+      reading("as given", group, q_WB, as_it_is),
+      reading("as xyzw", group, q_WB, from_xyzw),
+      reading("as the inverse", group, q_WB, inverse),
+      reading("as xyzw and the inverse", group, q_WB,
+              [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
+      reading("as wxyz under an xyzw header", group, q_WB, from_wxyz),
+      reading("as wxyz under an xyzw header and the inverse", group, q_WB,
+              [](const Quaternion& q) { return from_wxyz(q).conjugate(); }),
+  };
+  const auto add = [&](Reading one) {
+    one.by_order = false;
+    all.push_back(std::move(one));
+  };
+  add(reading("against the robot's base instead of the tracker", group, Quaternion::Identity(), as_it_is));
+  add(reading("as the inverse, against the robot's base", group, Quaternion::Identity(), inverse));
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type != JointType::kRevolute) continue;
+    Oriented reversed = group;
+    for (std::size_t i = 0; i < group.rows.size(); ++i) {
+      JointVector q = group.rows[i]->context.q;
+      q(j) = -q(j);
+      reversed.X_BF[i] = robot.flange_pose(q);
+    }
+    add(reading(fmt::format("with joint {} reversed", j + 1), reversed, q_WB, as_it_is));
+  }
+  for (const bool next : {true, false}) {
+    Oriented shifted = group;
+    std::rotate(shifted.X_BF.begin(), next ? shifted.X_BF.begin() + 1 : shifted.X_BF.end() - 1, shifted.X_BF.end());
+    add(reading(next ? "as those of the next row" : "as those of the row before", shifted, q_WB, as_it_is));
+  }
+  return all;
+}
+
+/// How well a reading does, alone and beside the numbers as given.
+struct Judged {
+  Quaternion q_FT = Quaternion::Identity();  ///< what the poses have in common
+  std::vector<double> off;                   ///< rad, of each pose: from the cell's tool, or from q_FT
+  double scatter = 0;                        ///< rad rms about q_FT
+  double offset = 0;                         ///< rad, of q_FT from the cell's tool; 0 where that is unknown
+  double fit = 0;                            ///< rad rms of both
+};
+
+Judged judged(const Reading& one, const Reading& other, const std::optional<Pose>& X_FT) {
+  Judged result;
+  result.q_FT = common(one, other);
+  result.scatter = rms(nearer(one, other, result.q_FT));
+  const Quaternion about = X_FT ? Quaternion(X_FT->linear()) : result.q_FT;
+  result.offset = angle(about, result.q_FT);
+  result.off = nearer(one, other, about);
+  result.fit = rms(result.off);
+  return result;
+}
+
+std::string deg(double radians) { return fmt::format("{:.{}f} deg", to_deg(radians), radians < from_deg(10) ? 2 : 0); }
+
+/// One tool's poses against one way of turning the base.
+class Question {
+ public:
+  Question(const Oriented& group, const Quaternion& q_WB, const Cell& cell)
+      : group_(group), X_FT_(cell.tools.at(group.tool)), all_(readings(group, q_WB, cell.robot)) {
+    given_ = judged(all_.front(), all_.front(), X_FT_);
+    if (follow()) return;
+    for (std::size_t k = 1; k < all_.size(); ++k) {
+      const Judged other = judged(all_[k], all_[k], X_FT_);
+      if (best_ == 0 || other.fit < of_best_.fit) best_ = k, of_best_ = other;
+    }
+    look_for_two_orders();
+  }
+  double fit() const { return given_.fit; }
+
+  std::optional<std::string> doubt() const {
+    if (follow()) return std::nullopt;
+    const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
+    if (two_orders_ > 0 && !better) return of_two_orders();
+    const std::vector<std::size_t> far = far_rows();
+    if (given_.scatter <= kMostOff && given_.offset <= kMostOff && far.empty() && !better) return std::nullopt;
+    if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();
+    if (!better && !far.empty() && 2 * far.size() < group_.rows.size() && given_.offset <= kMostOff && !reads_better())
+      return of_rows(far);
+    return fmt::format("orientations do not follow the joints: {} rms; {}: xyzw order? another tool frame?",
+                       deg(given_.fit), otherwise());
+  }
+
+ private:
+  /// So well that nothing else needs to be asked.
+  bool follow() const { return given_.fit <= kWorthAsking && far_rows().empty(); }
+  bool by_order() const { return all_[best_].by_order; }
+  bool reads_better() const { return of_best_.fit < std::min(kMostOff, 0.5 * given_.fit); }
+
+  void look_for_two_orders() {
+    for (std::size_t k = 1; k < all_.size() && all_[k].by_order; ++k) {
+      const Judged both = judged(all_.front(), all_[k], X_FT_);
+      if (both.fit > std::min(kMostOff, kMuchBetter * given_.fit)) continue;
+      if (two_orders_ == 0 || both.fit < of_both_.fit) two_orders_ = k, of_both_ = both;
+    }
+  }
+  /// Rows that lie far off what the others have in common.
+  std::vector<std::size_t> far_rows() const {
+    const std::vector<double> off = angles(all_.front().q_FT, given_.q_FT);
+    const double limit = std::max(kMostOff, kFarRow * median(off));
+    std::vector<std::size_t> far;
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      if (off[i] > limit) far.push_back(i);
+    }
+    return far;
+  }
+  std::string otherwise() const {
+    if (reads_better()) return fmt::format("read {} they would fit to {}", all_[best_].name, deg(of_best_.fit));
+    return fmt::format("no other reading fits either (best: {}, {})", all_[best_].name, deg(of_best_.fit));
+  }
+  std::string of_two_orders() const {
+    const Quaternion about = X_FT_ ? Quaternion(X_FT_->linear()) : of_both_.q_FT;
+    std::vector<double> off;
+    int first = 0;
+    for (std::size_t i = 0; i < group_.rows.size(); ++i) {
+      const double as_given = angle(all_.front().q_FT[i], about);
+      if (as_given <= angle(all_[two_orders_].q_FT[i], about) + of_both_.fit) continue;
+      if (off.empty()) first = group_.rows[i]->row;
+      off.push_back(as_given);
+    }
+    return fmt::format(
+        "{} of {} orientations (the first in row {}) do not follow the joints: {} rms; read {} they would fit to {}, "
+        "as the others do: two files of different order in one? xyzw order? another tool frame?",
+        off.size(), group_.rows.size(), first, deg(off.empty() ? given_.fit : rms(off)), all_[two_orders_].name,
+        deg(of_both_.fit));
+  }
+  std::string of_tool() const {
+    const Quaternion q = given_.q_FT.w() < 0 ? Quaternion(-given_.q_FT.coeffs()) : given_.q_FT;
+    return fmt::format(
+        "orientations follow the joints to {}, but turned by {} against tool '{}' of the cell file: another tool "
+        "frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]; {}",
+        deg(given_.scatter), deg(given_.offset), group_.tool, q.w(), q.x(), q.y(), q.z(), otherwise());
+  }
+  std::string of_rows(const std::vector<std::size_t>& far) const {
+    std::vector<double> off;
+    for (const std::size_t i : far) off.push_back(angle(all_.front().q_FT[i], given_.q_FT));
+    const Measurement& first = *group_.rows[far.front()];
+    return fmt::format(
+        "{} of {} orientations (the first in row {}, pose {}) do not follow the joints: {} rms, the others {}: xyzw "
+        "order? another tool frame? the joints of another pose?",
+        far.size(), group_.rows.size(), first.row, first.pose_id, deg(rms(off)),
+        deg(median(angles(all_.front().q_FT, given_.q_FT))));
+  }
+
+  const Oriented& group_;
+  const std::optional<Pose>& X_FT_;
+  std::vector<Reading> all_;
+  Judged given_, of_best_, of_both_;
+  std::size_t best_ = 0;
+  std::size_t two_orders_ = 0;  // a reading of some rows only; 0: none
+};
+
+/// The poses of each tool that have an orientation.
+std::vector<Oriented> by_tool(const MeasurementBatch& batch, const Chain& robot) {
+  std::map<std::string, Oriented> groups;
+  for (const Measurement& m : batch.measurements) {
+    if (!m.R_WT) continue;
+    Oriented& group = groups[m.context.tool];
+    group.tool = m.context.tool;
+    group.rows.push_back(&m);
+    group.X_BF.push_back(robot.flange_pose(m.context.q));
+  }
+  std::vector<Oriented> all;
+  for (auto& [tool, group] : groups) {
+    if (group.rows.size() >= kFewestPoses) all.push_back(std::move(group));
+  }
+  return all;
+}
+
+Oriented without(const Oriented& group, const std::vector<bool>& bad) {
+  Oriented kept{group.tool, {}, {}};
+  for (std::size_t i = 0; i < group.rows.size(); ++i) {
+    if (bad[i]) continue;
+    kept.rows.push_back(group.rows[i]);
+    kept.X_BF.push_back(group.X_BF[i]);
+  }
+  return kept;
+}
+
+/// Base and tool by the orientations themselves, where nothing else says how the base is turned.
+std::optional<Quaternion> by_orientations(const Oriented& group) {
+  std::vector<Pose> X_WT;
+  for (const Measurement* m : group.rows) X_WT.push_back(make_pose(*m->R_WT, m->p_W));
+  const Result<BaseAndTool> found = locate_base_and_tool(X_WT, group.X_BF);
+  if (!found) return std::nullopt;
+  return Quaternion(found->X_WB.linear());
+}
+
+std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
+  const Located located = by_positions(group, cell.tools.at(group.tool));
+  if (!located.belong) return std::nullopt;  // the joints themselves are in question
+  std::vector<Quaternion> turned;
+  if (located.turned) {
+    turned.push_back(located.turned->q_WB);
+    group = without(group, located.turned->bad);
+  }
+  // The cell's base is the finer of the two, unless the tracker stands elsewhere.
+  const auto base = cell.X_WB ? std::optional<Quaternion>(cell.X_WB->linear()) : std::nullopt;
+  if (base && (turned.empty() || angle(*base, turned.front()) < kMostOff)) turned.push_back(*base);
+  if (turned.empty()) {
+    if (const auto q_WB = by_orientations(group)) turned.push_back(*q_WB);
+  }
+  // The base that suits the numbers as given is theirs.
+  std::optional<Question> best;
+  for (const Quaternion& q_WB : turned) {
+    Question question(group, q_WB, cell);
+    if (!best || question.fit() < best->fit()) best.emplace(std::move(question));
+  }
+  return best ? best->doubt() : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
+  for (const Oriented& group : by_tool(batch, cell.robot)) {
+    if (auto doubt = doubt_of(group, cell)) return doubt;
+  }
+  return std::nullopt;
+}
+
+Status check_orientations(const MeasurementBatch& batch, const Cell& cell) {
+  const std::optional<std::string> doubt = orientation_doubt(batch, cell);
+  if (!doubt) return {};
+  return refused("batch {}: {}", batch.id, *doubt);
+}
+
+}  // namespace trammel

@@ -1,0 +1,95 @@
+#include "server/diagnose/more_than_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/diagnose/diagnose.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+/// cell-7's virtual robot, whose errors are those of the cell's error sources, with noise so many times as stated.
+MeasurementBatch with_noise(double times, double times_rotation, std::uint64_t seed, int poses = 120) {
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Vector3(normal(random), normal(random), normal(random)); };
+  const Tracker& tracker = test::cell_7()->tracker;
+  for (Measurement& m : batch.measurements) {
+    m.p_W += tracker.sigma * std::sqrt(times * times - 1) * vector();
+    m.R_WT = rotation_exp(tracker.sigma_rotation * std::sqrt(times_rotation * times_rotation - 1) * vector()) * *m.R_WT;
+  }
+  return batch;
+}
+
+Diagnosis diagnosed(const MeasurementBatch& batch) {
+  DiagnoseOptions options;
+  options.recovery = false;
+  return test::demand(diagnose(test::cell_7(), batch, options));
+}
+
+TEST(MoreThanNoise, NoiseAsStatedIsNothing) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Diagnosis clean = diagnosed(with_noise(1, 1, seed));
+    EXPECT_EQ(clean.verdict, Verdict::kNothing) << clean.sentence;
+    EXPECT_FALSE(clean.unexplained.present);
+  }
+}
+
+TEST(MoreThanNoise, NoiseFarBeyondWhatWasStatedIsUnknownWithBothFigures) {
+  for (const double times : {1.6, 3.0, 30.0}) {
+    const Diagnosis noisy = diagnosed(with_noise(times, 1, 4));
+    EXPECT_EQ(noisy.verdict, Verdict::kUnknown) << noisy.sentence;
+    EXPECT_TRUE(noisy.unexplained.present);
+    EXPECT_TRUE(noisy.unexplained.depends_on.empty());
+    EXPECT_LT(noisy.unexplained.p_value, 1e-3);
+    EXPECT_NEAR(noisy.left_position.left / noisy.left_position.stated, times, 0.1 * times);
+    EXPECT_NE(noisy.sentence.find("More than noise"), std::string::npos) << noisy.sentence;
+    EXPECT_NE(noisy.sentence.find("where 13 um are stated"), std::string::npos) << noisy.sentence;
+    EXPECT_NE(noisy.sentence.find("measure some poses repeatedly"), std::string::npos) << noisy.sentence;
+    EXPECT_EQ(noisy.sentence.find("Nothing"), std::string::npos) << noisy.sentence;
+  }
+}
+
+TEST(MoreThanNoise, OrientationsAreJudgedLikePositions) {
+  const Diagnosis noisy = diagnosed(with_noise(1, 2.5, 5));
+  EXPECT_EQ(noisy.verdict, Verdict::kUnknown) << noisy.sentence;
+  EXPECT_NE(noisy.sentence.find("of the orientations where 0.0035 deg are stated"), std::string::npos)
+      << noisy.sentence;
+}
+
+TEST(MoreThanNoise, ALittleMoreIsANote) {
+  const Diagnosis note = diagnosed(with_noise(1.22, 1, 6, 250));
+  EXPECT_EQ(note.verdict, Verdict::kNothing) << note.sentence;
+  EXPECT_TRUE(std::any_of(note.limits.begin(), note.limits.end(), [](const std::string& limit) {
+    return limit.starts_with("a little more than noise");
+  }));
+}
+
+TEST(MoreThanNoise, FewPosesMayScatterMoreByChance) {
+  const LeftOver many{1.35 * 13e-6, 13e-6, 600};
+  const LeftOver few{1.35 * 13e-6, 13e-6, 20};
+  EXPECT_EQ(judge_noise(many), NoiseVerdict::kMoreThanNoise);
+  EXPECT_EQ(judge_noise(few), NoiseVerdict::kAsStated);
+  EXPECT_LT(chance_of_noise(many), 1e-4);
+  EXPECT_GT(chance_of_noise(few), 1e-3);
+  EXPECT_EQ(judge_noise({}), NoiseVerdict::kAsStated);
+}
+
+TEST(MoreThanNoise, OrientationsInXyzwOrderAreRefused) {
+  MeasurementBatch batch = with_noise(1, 1, 7);
+  for (Measurement& m : batch.measurements) {
+    const Eigen::Quaterniond q(*m.R_WT);
+    m.R_WT = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+  }
+  const auto refused = diagnose(test::cell_7(), batch, {});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("read as xyzw they would fit to 0."), std::string::npos)
+      << refused.error().message;
+}
+
+}  // namespace
+}  // namespace trammel
