@@ -13,12 +13,13 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernel_spelling.h"
+#include "server/compensate/model_notes.h"
+#include "server/compensate/paired_gain.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
 #include "server/measurement/velocity.h"
 #include "server/trainer/extend.h"
-#include "server/trainer/paired_gain.h"
 
 namespace trammel {
 namespace {
@@ -612,6 +613,7 @@ Status Trainer::keep(const CompensatedModel& model, const MeasurementBatch& batc
     }
     verdict.message += judged_without(judges.left_out);
     if (!note.empty()) verdict.message += "; " + note;
+    for (const std::string& one : warnings_of(model, model.parts().validation)) verdict.message += "; " + one;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict.put_in_force, verdict.message);
     if (!version) return tl::make_unexpected(version.error());
     const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});
