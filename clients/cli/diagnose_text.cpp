@@ -92,7 +92,7 @@ std::string findings_table(const ordered_json& findings) {
       fmt::format("\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
                   "strength", "p", "held out", "", "cause", "um rms", "lambda", "", "before mm", "after mm");
   for (const ordered_json& finding : findings) text += finding_lines(finding);
-  return text + "  (± is half of the 95 % interval)\n";
+  return text + "  (± is U(k=2): two standard uncertainties)\n";
 }
 
 std::string figures_line(const char* name, const ordered_json& figures) {

@@ -1,6 +1,8 @@
 #include "clients/cli/evaluation_text.h"
 
+#include "server/base/coverage.h"
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
 #include "server/report/figures_json.h"
 
 namespace trammel::cli {
@@ -18,6 +20,11 @@ std::string nlpd_line(const Evaluation& evaluation) {
   if (!evaluation.nlpd) return "";
   return fmt::format("  {:.3f} nat: mean negative log predictive density of a coordinate, mm, compensated\n",
                      nlpd_in_mm(*evaluation.nlpd));
+}
+
+std::string doubt_line(const Evaluation& evaluation) {
+  const std::optional<std::string> doubt = doubt_of_bias(evaluation);
+  return doubt ? "  " + *doubt + "\n" : "";
 }
 
 std::string orientation_lines(const std::optional<OrientationFigures>& orientation) {
@@ -48,7 +55,7 @@ std::string evaluation_table(const Evaluation& evaluation) {
          figures_line("compensated", evaluation.compensated) +
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
                      evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
-         nlpd_line(evaluation) + orientation_lines(evaluation.orientation);
+         nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + doubt_line(evaluation);
 }
 
 ordered_json evaluation_json(const Evaluation& evaluation) {
@@ -61,6 +68,7 @@ ordered_json evaluation_json(const Evaluation& evaluation) {
   json["in_domain"] = evaluation.in_domain;
   if (evaluation.nlpd) json["nlpd"] = nlpd_in_mm(*evaluation.nlpd);
   if (evaluation.orientation) json["orientation"] = orientation_json(*evaluation.orientation);
+  if (const auto doubt = doubt_of_bias(evaluation)) json["doubt_of_bias"] = *doubt;
   return json;
 }
 
@@ -143,6 +151,11 @@ std::string model_text(const CompensatedModel& model) {
                       std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                     [](const IdentifiedParameter& p) { return p.identified; }),
                       parts.parameters.size(), parts.rank);
+  for (const RefitRecord& refit : provenance.refits) {
+    text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
+                        fmt::join(refit.sources, ", "), refit.poses, refit.batch_id, refit.model);
+  }
+  for (const std::string& note : notes_of(model)) text += "note: " + note + "\n";
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
@@ -188,7 +201,7 @@ ordered_json model_json(const CompensatedModel& model) {
     parameters.push_back({{"name", parameter.name},
                           {"unit", parameter.unit},
                           {"value", parameter.scale * identified.value},
-                          {"u95", 2 * parameter.scale * identified.stddev},
+                          {"u95", kExpanded * parameter.scale * identified.stddev},
                           {"identified", identified.identified}});
   }
   ordered_json combinations = ordered_json::array();
@@ -223,6 +236,14 @@ ordered_json model_json(const CompensatedModel& model) {
       {"parameters", parameters},
       {"not_identifiable", combinations},
       {"training", evaluation_json(parts.training)}};
+  if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
+  for (const RefitRecord& refit : provenance.refits) {
+    json["refits"].push_back({{"sources", refit.sources},
+                              {"batch", refit.batch_id},
+                              {"batch_hash", refit.batch_hash},
+                              {"poses", refit.poses},
+                              {"model", refit.model}});
+  }
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
   if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);

@@ -42,9 +42,12 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   const Triage seen = triage(from, *checked);
   const std::map<std::string, std::string> same = {
       {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
+  const auto named = [&](const std::string& source) {
+    return std::find(refit.begin(), refit.end(), source) != refit.end();
+  };
   const auto source = same.find(seen.cause.cause);
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
-                        source != same.end() && std::find(refit.begin(), refit.end(), source->second) != refit.end();
+                        source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
   if (seen.learn || refitted) return {};
   return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id, seen.sentence,
                  fmt::join(refit, ","));
@@ -84,7 +87,8 @@ Status train_model(const TrainArguments& arguments) {
   tell(model_text(*model) +
            (parts.validation
                 ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
-                : fmt::format("on the {} poses it was trained on (none were held out):\n", parts.training.poses) +
+                : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
+                              parts.training.poses, parts.provenance.figures_batch_id()) +
                       evaluation_table(parts.training)),
        {arguments.output, arguments.json});
   return write_json(arguments.json, model_json(*model));

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "clients/cli/evaluation_text.h"
+#include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/report/figures_json.h"
 
@@ -187,7 +188,7 @@ ordered_json parameter_json(const StudyParameter& parameter) {
   for (const auto& [level, identified] : parameter.identified) {
     const double scale = identified.parameter.scale;
     levels[level] = {{"value", scale * identified.value},
-                     {"u95", 2 * scale * identified.stddev},
+                     {"u95", kExpanded * scale * identified.stddev},
                      {"identified", identified.identified}};
     if (const auto printed = printed_parameter(parameter.name, level)) levels[level]["thesis"] = *printed;
   }

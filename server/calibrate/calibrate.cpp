@@ -1,6 +1,5 @@
 #include "server/calibrate/calibrate.h"
 
-#include <algorithm>
 #include <map>
 
 #include "server/calibrate/check_needs.h"
@@ -11,10 +10,6 @@
 namespace trammel {
 
 namespace {
-
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
@@ -40,29 +35,6 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   return {};
 }
 
-/// The source that `name` means in the model (a cause stands for the form that is there), set back to its prior; added
-/// where the model has none of it. Returns its full name.
-Result<std::string> free_source(PhysicalModel& model, const std::string& name) {
-  std::vector<std::string> names = alternatives(name, *model.cell);
-  names.insert(names.begin(), name);
-  Eigen::Index first = 0;
-  for (const ErrorSourcePtr& source : model.sources) {
-    const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    if (contains(names, source->name())) {
-      for (Eigen::Index k = 0; k < count; ++k) {
-        model.values(first + k) = source->parameters()[static_cast<std::size_t>(k)].prior;
-      }
-      return source->name();
-    }
-    first += count;
-  }
-  Result<ErrorSourcePtr> added = make_error_source(name, *model.cell);
-  if (!added) return tl::make_unexpected(added.error());
-  std::string full_name = (*added)->name();
-  add_source(model, std::move(*added));
-  return full_name;
-}
-
 }  // namespace
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
@@ -79,32 +51,6 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   localise_base(complete.model, complete.batch);
   if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
   return identify(complete, options);
-}
-
-Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
-                                const std::vector<std::string>& only, CalibrateOptions options) {
-  if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
-  CalibrationProblem problem{model, batch};
-  for (const std::string& name : only) {
-    Result<std::string> source = free_source(problem.model, name);
-    if (!source) return tl::make_unexpected(source.error());
-    options.only.push_back(std::move(*source));
-  }
-  if (Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
-  if (Status located = locate_unknown_frames(problem.model, batch); !located)
-    return tl::make_unexpected(located.error());
-  Result<CalibrationResult> result = identify(problem, options);
-  if (!result) return result;
-  // What is held is known: nothing is to be said of it.
-  std::erase_if(result->unidentifiable, [&](const UnidentifiableCombination& combination) {
-    return std::none_of(problem.model.sources.begin(), problem.model.sources.end(), [&](const ErrorSourcePtr& source) {
-      const std::vector<Parameter>& own = source->parameters();
-      return contains(options.only, source->name()) && std::any_of(own.begin(), own.end(), [&](const Parameter& p) {
-               return p.name == combination.parameters.front();
-             });
-    });
-  });
-  return result;
 }
 
 Eigen::MatrixXd CalibrationResult::correlation() const {

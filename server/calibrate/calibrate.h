@@ -19,8 +19,8 @@ struct CalibrationProblem {
 
 struct CalibrateOptions {
   int max_iterations = 100;
-  std::vector<std::string> only;  ///< names of the sources that may change; empty: all
-  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
+  std::vector<bool> held;  ///< parameters that stay as the model has them, one flag each; empty: none
+  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
 };
 
 /// A pose that the identified model misses by far more than its sigma.
@@ -73,11 +73,5 @@ struct CalibrationResult {
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);
-
-/// Identifies the sources in `only` anew on `batch` (the tracker was set up again, the tool was changed), and leaves
-/// all others at what `model` says. Unknown frames are found anew; the sources in `only` start at
-/// their priors and are added where the model has none.
-[[nodiscard]] Result<CalibrationResult> refit(const PhysicalModel& model, const MeasurementBatch& batch,
-                                              const std::vector<std::string>& only, CalibrateOptions options = {});
 
 }  // namespace trammel

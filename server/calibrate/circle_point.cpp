@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/calibrate/axis_fit.h"
 #include "server/calibrate/links_from_axes.h"
@@ -13,7 +14,6 @@ namespace {
 
 constexpr double kLengthDeviation = 0.1;  // m, beyond it is another robot
 constexpr double kAngleDeviation = from_deg(10);
-constexpr double kCoverage = 2;  // k of U
 
 struct NamedMember {
   int joint;
@@ -100,7 +100,7 @@ Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointAr
 
 /// Worst direction's U(k=2) of a symmetric covariance.
 double worst_u(const Eigen::MatrixXd& covariance) {
-  return kCoverage *
+  return kExpanded *
          std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().maxCoeff()));
 }
 
@@ -200,7 +200,7 @@ Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcLis
     parameter.measured = parameter.note.empty();
     if (parameter.measured) {
       parameter.deviation = deviation(at);
-      parameter.u = kCoverage * std::sqrt(std::max(0.0, (*covariance)(at, at)));
+      parameter.u = kExpanded * std::sqrt(std::max(0.0, (*covariance)(at, at)));
       const double limit = member.length ? kLengthDeviation : kAngleDeviation;
       if (!(std::abs(deviation(at)) < limit)) {
         return refused("{}: {} is {:.3f} {} from that of robot {}, limit {:.0f}; another robot, joint or posture?",

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "server/base/coverage.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/csv_table.h"
@@ -15,7 +16,6 @@ namespace {
 
 constexpr double kSignificant = 0.01;
 constexpr double kSameLoad = 1e-6;  // N
-constexpr double kCoverage = 2;     // k of U
 
 }  // namespace
 
@@ -169,7 +169,7 @@ struct Solved {
   [[nodiscard]] int freedom() const { return equations - layout.size; }
   [[nodiscard]] double factor() const { return cost / std::max(1, freedom()); }
   [[nodiscard]] double u(int column) const {
-    return kCoverage * std::sqrt(unscaled(column, column) * std::max(1.0, factor()));
+    return kExpanded * std::sqrt(unscaled(column, column) * std::max(1.0, factor()));
   }
 };
 

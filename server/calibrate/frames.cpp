@@ -78,6 +78,17 @@ Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch
   return {};
 }
 
+Vector6 motion_values(const Pose& X) {
+  const Vector3 zyx = X.linear().eulerAngles(2, 1, 0);
+  const bool flipped = std::abs(zyx(1)) > kPi / 2;  // the other triple of the same rotation
+  Vector6 values;
+  values.head<3>() = X.translation();
+  values.tail<3>() = flipped ? Vector3(zyx(0) - std::copysign(kPi, zyx(0)), std::copysign(kPi, zyx(1)) - zyx(1),
+                                       zyx(2) - std::copysign(kPi, zyx(2)))
+                             : zyx;
+  return values;
+}
+
 void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
@@ -95,13 +106,7 @@ void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
   }
   const Result<Pose> X_BB = fit_transform(measured, nominal);
   if (!X_BB) return;  // too few points to localise: the nominal base is the start
-  const Vector3 zyx = X_BB->linear().eulerAngles(2, 1, 0);
-  const bool flipped = std::abs(zyx(1)) > kPi / 2;  // the other triple of the same rotation
-  model.values.segment<3>(first) = X_BB->translation();
-  model.values.segment<3>(first + 3) =
-      flipped ? Vector3(zyx(0) - std::copysign(kPi, zyx(0)), std::copysign(kPi, zyx(1)) - zyx(1),
-                        zyx(2) - std::copysign(kPi, zyx(2)))
-              : zyx;
+  model.values.segment<6>(first) = motion_values(*X_BB);
 }
 
 }  // namespace trammel

@@ -47,7 +47,7 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
     filled = 0;
   };
   for (const Measurement& m : problem.batch.measurements) {
-    const WeightedPose pose(problem.model, s.scale, m, weights);
+    const WeightedPose pose(problem.model, s, m, weights);
     const bool finite = pose.evaluate(x.data(), residuals.data() + filled, jacobians.col(filled).data());
     auto r = residuals.segment(filled, pose.size());
     const double norm = finite ? r.norm() : std::numeric_limits<double>::infinity();

@@ -44,17 +44,25 @@ Status check_belongs(const MeasurementBatch& batch, double rms) {
       batch.id, to_mm(rms), to_mm(spread));
 }
 
-/// Covariance, rank and what remains hidden, from what `poses` poses say of the parameters.
+/// Covariance, rank and what remains hidden, from what `poses` poses say of the parameters that are not held.
 void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s, std::size_t poses,
                    CalibrationResult& result) {
   const auto P = s.scale.size();
-  const Information seen = decomposed(information);
+  std::vector<Eigen::Index> free;
+  std::vector<Parameter> parameters;
+  for (Eigen::Index i = 0; i < P; ++i) {
+    if (!s.held.empty() && s.held[static_cast<std::size_t>(i)]) continue;
+    free.push_back(i);
+    parameters.push_back(s.parameters[static_cast<std::size_t>(i)]);
+  }
+  const Information seen = decomposed(information(free, free));
   const Eigen::VectorXd variance = (seen.singular_values.array().square() + 1).inverse();
   const Eigen::MatrixXd scaled_covariance = seen.directions * variance.asDiagonal() * seen.directions.transpose();
-  result.covariance = s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
+  const Eigen::VectorXd scale = s.scale(free);
+  result.covariance(free, free) = scale.asDiagonal() * scaled_covariance * scale.asDiagonal();
   double least = std::numeric_limits<double>::infinity();
   double log_sum = 0;
-  for (Eigen::Index k = 0; k < P; ++k) {
+  for (Eigen::Index k = 0; k < scale.size(); ++k) {
     const double value = seen.singular_values(k);
     if (value < 1) continue;
     ++result.rank;
@@ -64,8 +72,8 @@ void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s
   if (result.rank > 0) {
     result.observability_index = std::exp(log_sum / result.rank) / std::sqrt(static_cast<double>(poses));
   }
-  result.unidentifiable = unidentifiable_combinations(seen, s.parameters, s.scale.cwiseQuotient(s.typical));
-  result.condition_number = result.rank > 0 ? seen.singular_values(P - 1) / least : 0;
+  result.unidentifiable = unidentifiable_combinations(seen, parameters, scale.cwiseQuotient(s.typical(free)));
+  result.condition_number = result.rank > 0 ? seen.singular_values(scale.size() - 1) / least : 0;
   for (Eigen::Index i = 0; i < P; ++i) {
     const Parameter& parameter = s.parameters[static_cast<std::size_t>(i)];
     const double stddev = std::sqrt(result.covariance(i, i));
@@ -78,7 +86,7 @@ void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const PhysicalModel& model = problem.model;
   const Tracker& tracker = model.cell->tracker;
-  const ScaledParameters s = scaled_parameters(model, options.only);
+  const ScaledParameters s = scaled_parameters(model, options.held);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = model;

@@ -50,7 +50,7 @@ Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledPar
   const bool robust = is_robust(calibrate_options, weights);
   ceres::Problem ceres_problem;
   for (const Measurement& m : problem.batch.measurements) {
-    const WeightedPose pose(problem.model, s.scale, m, weights);
+    const WeightedPose pose(problem.model, s, m, weights);
     ceres_problem.AddResidualBlock(new PoseCost(pose, s.scale.size()),
                                    robust ? new ceres::HuberLoss(pose.huber_limit()) : nullptr, x.data());
   }

@@ -1,14 +1,11 @@
 #include "server/calibrate/scaled_parameters.h"
 
-#include <algorithm>
-
 #include "server/calibrate/frames.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kHeld = 1e-6;            // of the priors of sources that are not to change
 constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
 
 }  // namespace
@@ -19,20 +16,18 @@ Eigen::VectorXd ScaledParameters::lower() const {
   return bounds;
 }
 
-ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<std::string>& only) {
+ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held) {
   const Eigen::Index P = model.parameter_count();
-  ScaledParameters s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P)};
+  ScaledParameters s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P), held};
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    const bool unknown =
-        (source->name() == "base" && !model.cell->X_WB) || (source->name() == "tool" && has_unknown_tool(*model.cell));
-    const bool held = !only.empty() && std::find(only.begin(), only.end(), source->name()) == only.end();
+    const bool unknown = (source->name() == "base" && (!model.cell->X_WB || !held.empty())) ||
+                         (source->name() == "tool" && has_unknown_tool(*model.cell));
     for (std::size_t i = 0; i < source->parameters().size(); ++i, ++k) {
       Parameter& parameter = s.parameters[static_cast<std::size_t>(k)];
       s.typical(k) = parameter.prior_scale;
       parameter.prior = model.values(k);
       parameter.prior_scale *= unknown ? kUnknownWidening : 1;
-      if (held) parameter.prior_scale *= kHeld;
       s.scale(k) = parameter.prior_scale;
       s.prior(k) = parameter.prior / parameter.prior_scale;
     }

@@ -14,14 +14,15 @@ struct ScaledParameters {
   Eigen::VectorXd scale;    ///< P, SI: standard deviations of the priors
   Eigen::VectorXd typical;  ///< P, SI: the same where nothing was widened
   Eigen::VectorXd prior;    ///< P, in units of scale
+  std::vector<bool> held;   ///< those that stay as they are; empty: none
 
   /// Bounds in units of scale; -infinity where there is none.
   [[nodiscard]] Eigen::VectorXd lower() const;
 };
 
 /// The priors stand around the model's values. Those of a frame that the cell calls unknown are wide: it was found with
-/// a chain that was still wrong. Those of sources that are not in `only` are so narrow that nothing changes; empty: all
-/// may change.
-[[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<std::string>& only);
+/// a chain that was still wrong; so are those of a base beside `held` parameters, which was just localised. `held`: one
+/// flag a parameter, or none.
+[[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held);
 
 }  // namespace trammel

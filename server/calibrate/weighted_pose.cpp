@@ -19,10 +19,11 @@ Matrix3 right_jacobian_inverse(const Vector3& w) {
 
 }  // namespace
 
-WeightedPose::WeightedPose(const PhysicalModel& model, const Eigen::VectorXd& scale, const Measurement& measurement,
+WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
                            const Weights& weights)
     : model_(model),
-      scale_(scale),
+      scale_(s.scale),
+      held_(s.held),
       measurement_(measurement),
       weight_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
       rotation_weight_(1 / std::hypot(model.cell->tracker.sigma_rotation, weights.discrepancy_rotation)) {}
@@ -44,6 +45,10 @@ bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian
     // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
     const Matrix3 by_turn = -rotation_weight_ * right_jacobian_inverse(turn);
     for (Eigen::Index k = 0; k < scale_.size(); ++k) {
+      if (!held_.empty() && held_[static_cast<std::size_t>(k)]) {
+        out.col(k).setZero();
+        continue;
+      }
       out.col(k).head<3>() = -weight_ * scale_(k) * J.col(k).head<3>();
       if (measurement_.R_WT) out.col(k).tail<3>() = scale_(k) * (by_turn * J.col(k).tail<3>());
     }

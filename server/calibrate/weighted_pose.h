@@ -2,14 +2,16 @@
 
 #include <Eigen/Dense>
 
+#include "server/calibrate/scaled_parameters.h"
 #include "server/calibrate/weighting.h"
 
 namespace trammel {
 
-/// One measurement's residual in units of its sigma, by parameters in units of `scale`. Refers to what it is made of.
+/// One measurement's residual in units of its sigma, by parameters in units of their scale; those that are held move
+/// nothing. Refers to what it is made of.
 class WeightedPose {
  public:
-  WeightedPose(const PhysicalModel& model, const Eigen::VectorXd& scale, const Measurement& measurement,
+  WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
                const Weights& weights);
 
   /// How many equations: 6, or 3 without an orientation.
@@ -22,6 +24,7 @@ class WeightedPose {
  private:
   const PhysicalModel& model_;
   const Eigen::VectorXd& scale_;
+  const std::vector<bool>& held_;
   const Measurement& measurement_;
   double weight_;
   double rotation_weight_;

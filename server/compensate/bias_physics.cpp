@@ -17,6 +17,14 @@ bool has_source(const PhysicalModel& physics, const std::string& name) {
   });
 }
 
+ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
+  PoseContext anywhere;
+  anywhere.q = JointVector::Zero(physics.cell->robot.size());
+  anywhere.tool = tool;
+  anywhere.served = true;
+  return physics.state(anywhere);
+}
+
 PhysicalModel with_standard_sources(PhysicalModel physics) {
   for (const std::string& name : with_unknown_tool({"base", "geometry", "compliance"}, *physics.cell)) {
     if (has_source(physics, name)) continue;
@@ -40,11 +48,35 @@ BiasFeatures turned(const BiasFeatures& features) {
   return {swapped(features.by_joint), swapped(features.by_parameter)};
 }
 
-BiasPhysics::BiasPhysics(const PhysicalModel& physics) : whole_(with_standard_sources(physics)) {
+BiasPhysics::BiasPhysics(const PhysicalModel& physics) : BiasPhysics(with_standard_sources(physics), AsItIs{}) {}
+
+BiasPhysics::BiasPhysics(PhysicalModel whole, AsItIs) : whole_(std::move(whole)) {
   const std::vector<Parameter> parameters = whole_.parameters();
   prior_stddev_.resize(static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t k = 0; k < parameters.size(); ++k)
     prior_stddev_(static_cast<Eigen::Index>(k)) = parameters[k].prior_scale;
+}
+
+Pose served_base(const PhysicalModel& physics) { return served_arm(physics, physics.tools.begin()->first).X_WB; }
+
+Pose served_tool(const PhysicalModel& physics, const std::string& tool) { return served_arm(physics, tool).X_FT; }
+
+Matrix3 BiasPhysics::turn_to(const PhysicalModel& now) const {
+  const auto turned_in_B = [](const PhysicalModel& physics) -> Matrix3 {
+    return physics.X_WB.linear().transpose() * served_base(physics).linear();
+  };
+  return turned_in_B(now) * turned_in_B(whole_).transpose();
+}
+
+BiasPhysics BiasPhysics::with_tools_of(const PhysicalModel& now) const {
+  PhysicalModel moved = whole_;
+  for (auto& [name, X_FT] : moved.tools) {
+    const Pose X_FT_now = served_tool(now, name);
+    const Pose X_FT_then = served_tool(whole_, name);
+    if (X_FT_now.matrix() == X_FT_then.matrix()) continue;
+    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // a motion in F stands before the nominal tool
+  }
+  return BiasPhysics(std::move(moved), {});
 }
 
 Vector3 BiasPhysics::beyond_first_order(const PoseContext& context, const Eigen::VectorXd& shift) const {

@@ -5,15 +5,16 @@
 #include <numbers>
 
 #include "server/base/check.h"
+#include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/bias/kernel_spelling.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/paired_gain.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kInterval95 = 1.959963984540;  // standard deviations
 
 /// Mean over the coordinates of minus the log density of errors in normal distributions of these stddevs, nat.
 std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
@@ -102,6 +103,21 @@ Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& par
   return features;
 }
 
+BiasPhysics physics_of_bias(const CompensatedModel::Parts& parts) {
+  return parts.bias_origin ? BiasPhysics::learned_at(parts.bias_origin->physics) : BiasPhysics(parts.physics);
+}
+
+Status check_origin(const CompensatedModel::Parts& parts) {
+  if (!parts.bias_origin) return {};
+  const CompensatedModel::Parts::BiasOrigin& origin = *parts.bias_origin;
+  const auto P = parts.covariance.rows();
+  if (origin.covariance.rows() != P || origin.covariance.cols() != P || !origin.covariance.allFinite() ||
+      origin.physics.values.size() != origin.physics.parameter_count() || !origin.physics.values.allFinite()) {
+    return refused("model: where its bias was learned does not fit its {} parameters", P);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<CompensatedModel> CompensatedModel::make(Parts parts) {
@@ -118,22 +134,28 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
     return refused("model: a parameter is not finite");
   }
-  auto inside = std::make_shared<Inside>(parts.physics);
+  if (const Status fits = check_origin(parts); !fits) return tl::make_unexpected(fits.error());
+  const BiasPhysics then = physics_of_bias(parts);
+  auto inside = std::make_shared<Inside>(parts.bias_origin ? then.with_tools_of(parts.physics) : then);
   if (parts.bias) {
     if (parts.bias->q.cols() != n)
       return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
     BiasState state = *parts.bias;
     const Result<SpelledBias> spelled = spelled_bias(state.kernel);
     if (spelled && !spelled->blocks.empty()) {
-      Result<std::vector<BiasFeatures>> features = features_of(parts, inside->bias_physics);
+      Result<std::vector<BiasFeatures>> features = features_of(parts, then);
       if (!features) return tl::make_unexpected(features.error());
       state.features = std::move(*features);
       inside->bias_has_parameters = spelled->has("parameters");
     }
+    if (parts.bias_origin) inside->bias_turn = then.turn_to(parts.physics);
+    const auto turned_rms = [&](const Eigen::MatrixXd& residual_B) {
+      return column_rms(inside->bias_turn ? residual_B * inside->bias_turn->transpose() : residual_B);
+    };
     Result<BiasModel> bias = BiasModel::restore(state);
     if (!bias) return tl::make_unexpected(bias.error());
     inside->bias = std::move(*bias);
-    if (!inside->bias->needs_features()) inside->bias_size_B = column_rms(state.residual_B);
+    if (!inside->bias->needs_features()) inside->bias_size_B = turned_rms(state.residual_B);
     if (parts.rotation_bias) {
       BiasState rotation = *parts.rotation_bias;
       if (rotation.kernel != state.kernel || rotation.q != state.q)
@@ -142,7 +164,7 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
       for (const BiasFeatures& features : state.features) rotation.features.push_back(turned(features));
       Result<BiasModel> turning = BiasModel::restore(rotation);
       if (!turning) return tl::make_unexpected(turning.error());
-      if (!inside->bias_has_parameters) inside->rotation_bias_size_B = column_rms(rotation.residual_B);
+      if (!inside->bias_has_parameters) inside->rotation_bias_size_B = turned_rms(rotation.residual_B);
       inside->rotation_bias = std::move(*turning);
     }
   }
@@ -151,6 +173,8 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   inside->parts = std::move(parts);
   return CompensatedModel(std::move(inside));
 }
+
+BiasPhysics CompensatedModel::learned_physics() const { return physics_of_bias(parts()); }
 
 Status CompensatedModel::check_trained_with(const std::string& tool, const std::string& payload) const {
   if (parts().trained_with.contains({tool, payload})) return {};
@@ -228,6 +252,7 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   evaluation.coverage_95 = coverage_95(errors.compensated, errors.stddev);
   evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
+  if (inside_->bias) evaluation.bias_gain_z = paired_gain(errors.calibrated, errors.compensated).z();
   const LevelErrors::Rotations& rotation = errors.rotation;
   if (rotation.nominal.cols() > 0) {
     const auto rms = [](const Eigen::Matrix3Xd& turns) {

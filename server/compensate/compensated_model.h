@@ -44,6 +44,8 @@ struct Evaluation {
   /// of before it was kept.
   std::optional<double> nlpd;
   std::optional<OrientationFigures> orientation;  ///< where orientations were measured
+  /// Of a model with a bias, PairedGain::z() of compensated over calibrated, pose by pose; empty in models of before.
+  std::optional<double> bias_gain_z;
 };
 [[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
 
@@ -98,7 +100,16 @@ struct CorrectOptions {
   int max_iterations = 10;
 };
 
-/// Where a model comes from.
+/// A batch on which some sources of a finished model were identified anew.
+struct RefitRecord {
+  std::string model;                 ///< id of the model that it started from
+  std::vector<std::string> sources;  ///< as they were named
+  std::string batch_id;
+  std::string batch_hash;
+  int poses = 0;
+};
+
+/// Where a model comes from. What was identified anew since then is told by `refits`, the last one last.
 struct ModelProvenance {
   std::string id;     ///< first 12 characters of the hash
   std::string hash;   ///< SHA-256 of the model's content
@@ -111,6 +122,12 @@ struct ModelProvenance {
   int training_poses = 0;
   std::uint64_t seed = 0;
   std::string program_version;
+  std::vector<RefitRecord> refits;
+
+  /// The batch that the model's figures are of: the last one.
+  [[nodiscard]] const std::string& figures_batch_id() const {
+    return refits.empty() ? batch_id : refits.back().batch_id;
+  }
 };
 
 /// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap
@@ -131,6 +148,14 @@ class CompensatedModel {
     std::optional<BiasChoice> bias_choice;   ///< of `auto`: what was asked and what it is worth
     std::optional<BiasState> bias;           ///< without features: they follow from the physics and bias_contexts
     std::optional<BiasState> rotation_bias;  ///< of the same poses: residual rotation vectors in B and sigma, rad
+    /// Of a bias that was kept while sources were identified anew: the physics that it was learned beside, with all the
+    /// parameters that a block of it knew, and P x P, SI, what is uncertain of the model's parameters beyond what the
+    /// bias knows: what was identified since.
+    struct BiasOrigin {
+      PhysicalModel physics;
+      Eigen::MatrixXd covariance;
+    };
+    std::optional<BiasOrigin> bias_origin;
     int oriented_poses = 0;                  ///< where only some poses of a bias had an orientation: none is learned
     std::vector<PoseContext> bias_contexts;  ///< of the bias' observations, in their order; empty without blocks
     std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
@@ -157,6 +182,8 @@ class CompensatedModel {
                                         const std::string& payload) const;
   /// The same at many poses: in less time where the bias has blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
+  /// What the bias was told of the arm while it was learned.
+  [[nodiscard]] BiasPhysics learned_physics() const;
   /// The learned bias, if any, and what it is told of a pose where it asks for features.
   [[nodiscard]] const std::optional<BiasModel>& bias() const { return inside_->bias; }
   [[nodiscard]] BiasFeatures features(const PoseContext& context) const { return inside_->bias_physics.at(context); }
@@ -183,12 +210,13 @@ class CompensatedModel {
 
  private:
   struct Inside {
-    explicit Inside(const PhysicalModel& physics) : bias_physics(physics) {}
+    explicit Inside(BiasPhysics physics) : bias_physics(std::move(physics)) {}
     Parts parts;
     BiasPhysics bias_physics;
     std::optional<BiasModel> bias;
     std::optional<BiasModel> rotation_bias;
     bool bias_has_parameters = false;
+    std::optional<Matrix3> bias_turn;                // of a bias with an origin, BiasPhysics::turn_to()
     Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses; 0 with blocks
     Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise; 0 with the block `parameters`
   };
@@ -204,6 +232,8 @@ class CompensatedModel {
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned,
                                         std::optional<double> bias_weight) const;
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
+  /// As it was learned, in B of today.
+  [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
   /// X_BT as predict() expects it, and nothing else.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
   /// Covariance of the position, in B, from what nobody said and a source wants to know: from which side a joint is

@@ -145,6 +145,7 @@ Json to_json(const Evaluation& e) {
                {"coverage_95", e.coverage_95},
                {"in_domain", e.in_domain}};
   if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
+  if (e.bias_gain_z) json["bias_gain_z"] = *e.bias_gain_z;
   if (e.orientation) {
     json["orientation"] = {{"poses", e.orientation->poses},
                            {"nominal_rad", e.orientation->nominal},
@@ -164,6 +165,7 @@ Evaluation evaluation_from(const Json& json) {
   e.coverage_95 = number_from(json, "coverage_95");
   e.in_domain = count_from(json, "in_domain");
   if (json.contains("nlpd_of_m")) e.nlpd = number_from(json, "nlpd_of_m");
+  if (json.contains("bias_gain_z")) e.bias_gain_z = number_from(json, "bias_gain_z");
   if (json.contains("orientation")) {
     const Json& o = json.at("orientation");
     e.orientation = {count_from(o, "poses"),
@@ -254,13 +256,58 @@ BiasChoice choice_from(const Json& json) {
   return choice;
 }
 
+Json to_json(const RefitRecord& refit) {
+  return {{"model", refit.model},
+          {"sources", refit.sources},
+          {"batch_id", refit.batch_id},
+          {"batch_hash", refit.batch_hash},
+          {"poses", refit.poses}};
+}
+
+RefitRecord refit_from(const Json& json) {
+  return {json.at("model"), json.at("sources").get<std::vector<std::string>>(), json.at("batch_id"),
+          json.at("batch_hash"), count_from(json, "poses")};
+}
+
+Json frames_of(const PhysicalModel& physics) {
+  Json tools = Json::object();
+  for (const auto& [name, X_FT] : physics.tools) tools[name] = to_json(X_FT);
+  return tools;
+}
+
+Json names_of(const PhysicalModel& physics) {
+  Json sources = Json::array();
+  for (const ErrorSourcePtr& source : physics.sources) sources.push_back(source->name());
+  return sources;
+}
+
+Json to_json(const CompensatedModel::Parts::BiasOrigin& origin) {
+  return {{"X_WB", to_json(origin.physics.X_WB)},
+          {"tools", frames_of(origin.physics)},
+          {"error_sources", names_of(origin.physics)},
+          {"values", to_json(Eigen::MatrixXd(origin.physics.values))},
+          {"covariance", to_json(origin.covariance)}};
+}
+
+/// The physics of this cell with the frames and values that a file gives.
+Result<PhysicalModel> physics_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
+  Result<PhysicalModel> physics = make_physical_model(cell, json.at("error_sources").get<std::vector<std::string>>());
+  if (!physics) return physics;
+  physics->X_WB = pose_from(json.at("X_WB"));
+  for (auto& [name, X_FT] : physics->tools) X_FT = pose_from(json.at("tools").at(name));
+  physics->values = vector_from(json.at("values"));
+  return physics;
+}
+
+Result<CompensatedModel::Parts::BiasOrigin> origin_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
+  return physics_from(json, cell).map([&](PhysicalModel physics) {
+    return CompensatedModel::Parts::BiasOrigin{std::move(physics), matrix_from(json.at("covariance"))};
+  });
+}
+
 /// All but the stamp.
 Json content_of(const CompensatedModel::Parts& parts) {
   const PhysicalModel& physics = parts.physics;
-  Json tools = Json::object();
-  for (const auto& [name, X_FT] : physics.tools) tools[name] = to_json(X_FT);
-  Json sources = Json::array();
-  for (const ErrorSourcePtr& source : physics.sources) sources.push_back(source->name());
   Json parameters = Json::array();
   for (const IdentifiedParameter& p : parts.parameters) {
     parameters.push_back(
@@ -279,8 +326,8 @@ Json content_of(const CompensatedModel::Parts& parts) {
   Json content = {{"cell_yaml", physics.cell->cell_yaml},
                   {"robot_yaml", physics.cell->robot_yaml},
                   {"X_WB", to_json(physics.X_WB)},
-                  {"tools", std::move(tools)},
-                  {"error_sources", std::move(sources)},
+                  {"tools", frames_of(physics)},
+                  {"error_sources", names_of(physics)},
                   {"values", to_json(Eigen::MatrixXd(physics.values))},
                   {"covariance", to_json(parts.covariance)},
                   {"parameters", std::move(parameters)},
@@ -315,22 +362,20 @@ Json content_of(const CompensatedModel::Parts& parts) {
     if (!parts.bias_contexts.empty()) content["bias"]["fades"] = kFades;
     if (parts.rotation_bias) content["rotation_bias"] = to_json(*parts.rotation_bias);
     if (parts.oriented_poses > 0) content["oriented_poses"] = parts.oriented_poses;
+    if (parts.bias_origin) content["bias_origin"] = to_json(*parts.bias_origin);
   }
   if (parts.validation) content["validation"] = to_json(*parts.validation);
+  for (const RefitRecord& refit : parts.provenance.refits) content["provenance"]["refits"].push_back(to_json(refit));
   return content;
 }
 
 Result<CompensatedModel> model_from(const Json& content, const Json& stamp, const std::string& where) {
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
   if (!cell) return tl::make_unexpected(cell.error());
-  Result<PhysicalModel> physics = make_physical_model(std::make_shared<const Cell>(std::move(*cell)),
-                                                      content.at("error_sources").get<std::vector<std::string>>());
+  Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
   if (!physics) return refused("{}: {}", where, physics.error().message);
   CompensatedModel::Parts parts;
   parts.physics = std::move(*physics);
-  parts.physics.X_WB = pose_from(content.at("X_WB"));
-  for (auto& [name, X_FT] : parts.physics.tools) X_FT = pose_from(content.at("tools").at(name));
-  parts.physics.values = vector_from(content.at("values"));
   parts.covariance = matrix_from(content.at("covariance"));
   const std::vector<Parameter> known = parts.physics.parameters();
   const Json& parameters = list_from(content.at("parameters"));
@@ -382,6 +427,11 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
       for (const Json& context : list_from(bias.at("poses"))) parts.bias_contexts.push_back(context_from(context));
     }
     if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
+    if (content.contains("bias_origin")) {
+      Result<CompensatedModel::Parts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);
+      if (!origin) return refused("{}: {}", where, origin.error().message);
+      parts.bias_origin = std::move(*origin);
+    }
     if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");
   }
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
@@ -394,6 +444,9 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
   parts.provenance.trained_at = whole_from<std::int64_t>(stamp, "trained_at");
   parts.provenance.program_version = stamp.at("program_version");
   if (stamp.contains("measured_at")) parts.provenance.measured_at = whole_from<std::int64_t>(stamp, "measured_at");
+  if (provenance.contains("refits")) {
+    for (const Json& refit : provenance.at("refits")) parts.provenance.refits.push_back(refit_from(refit));
+  }
   const Status possible = check_parts(parts);
   Result<CompensatedModel> model =
       possible ? CompensatedModel::make(std::move(parts)) : tl::make_unexpected(possible.error());

@@ -5,6 +5,22 @@
 
 namespace trammel {
 
+namespace {
+
+/// The same seen from axes that R turns it to; noise stays independent from axis to axis.
+BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
+  const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();
+  BiasPrediction now = bias;
+  now.mean_B = R * bias.mean_B;
+  now.nearby_B = R * bias.nearby_B;
+  now.covariance_B = R * bias.covariance_B * R.transpose();
+  now.stddev_B = now.covariance_B.diagonal().cwiseSqrt();
+  now.measured_stddev_B = (now.covariance_B.diagonal() + R.cwiseAbs2() * noise).cwiseSqrt();
+  return now;
+}
+
+}  // namespace
+
 PoseContext CompensatedModel::completed(PoseContext asked) const {
   if (!asked.temperature) asked.temperature = parts().temperature_mean;
   return asked;
@@ -25,6 +41,15 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optiona
   return predict(asked, &learned({asked}).front(), bias_weight);
 }
 
+std::vector<CompensatedModel::Learned> CompensatedModel::turn(std::vector<Learned> all) const {
+  if (!inside_->bias_turn) return all;
+  for (Learned& one : all) {
+    one.position = turned_by(*inside_->bias_turn, one.position);
+    if (one.rotation) one.rotation = turned_by(*inside_->bias_turn, *one.rotation);
+  }
+  return all;
+}
+
 std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vector<PoseContext>& poses) const {
   const BiasModel& bias = *inside_->bias;
   Eigen::MatrixXd q(static_cast<Eigen::Index>(poses.size()), cell().robot.size());
@@ -37,10 +62,10 @@ std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vect
   }
   std::vector<Learned> all;
   for (BiasPrediction& position : bias.predict_all(q, of_position)) all.push_back({std::move(position), std::nullopt});
-  if (!inside_->rotation_bias) return all;
+  if (!inside_->rotation_bias) return turn(std::move(all));
   std::vector<BiasPrediction> rotations = inside_->rotation_bias->predict_all(q, of_rotation);
   for (std::size_t i = 0; i < all.size(); ++i) all[i].rotation = std::move(rotations[i]);
-  return all;
+  return turn(std::move(all));
 }
 
 std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<PoseContext>& poses) const {
@@ -72,10 +97,11 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
   if (!inside_->bias) return X_BT;
   const std::optional<BiasModel>& rotation = inside_->rotation_bias;
   const BiasFeatures of_position = inside_->bias->needs_features() ? features(context) : BiasFeatures{};
-  X_BT.translation() += taken(*inside_->bias, context.q, of_position, bias_weight);
+  const Matrix3 turn = inside_->bias_turn.value_or(Matrix3::Identity());
+  X_BT.translation() += turn * taken(*inside_->bias, context.q, of_position, bias_weight);
   if (!rotation) return X_BT;
   const BiasFeatures of_rotation = rotation->needs_features() ? turned(of_position) : of_position;
-  X_BT.linear() = (rotation_exp(taken(*rotation, context.q, of_rotation, bias_weight)) * X_BT.linear()).eval();
+  X_BT.linear() = (rotation_exp(turn * taken(*rotation, context.q, of_rotation, bias_weight)) * X_BT.linear()).eval();
   return X_BT;
 }
 
@@ -110,7 +136,8 @@ namespace {
 
 /// How far what is left after a bias is to be trusted: figures of one kind, m or rad.
 struct Uncertainty {
-  Matrix3 identified;  ///< what the parameters leave uncertain
+  Matrix3 identified;  ///< what the parameters leave uncertain,
+  Matrix3 since;       ///< and of it what was identified after the bias was learned
   double metrology;    ///< variances of one axis: of the instrument,
   double unlearned;    ///< of what the physics leaves over where no bias is taken,
   double growth;       ///< and of what is missed the farther out
@@ -119,15 +146,16 @@ struct Uncertainty {
 
 /// Covariance of one measurement. Noise is never less than the tracker's: a fit to few poses takes some of it for
 /// signal. What the parameters leave uncertain is part of a bias that has them (`has_parameters`); any other corrects
-/// it as far as it knows anything; where the bias does not count it counts in full. What of the bias is not taken may
-/// be missing: as much as it is there, and as it was at the training poses. The covariance of all that the bias knows
-/// stays: far from its poses a kernel has that of before any data, blocks what the data left them.
+/// it as far as it knows anything; where the bias does not count it counts in full. What was identified after the bias
+/// was learned no bias corrects. What of the bias is not taken may be missing: as much as it is there, and as it was at
+/// the training poses. The covariance of all that the bias knows stays: far from its poses a kernel has that of before
+/// any data, blocks what the data left them.
 Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters, const Uncertainty& of) {
   const Vector3 known = bias.stddev_B.cwiseAbs2();
   const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(of.metrology);
   const Vector3 untaken = bias.nearby_B.cwiseAbs2().cwiseMax(of.bias_size.cwiseAbs2());
   const double left_of_identified = has_parameters ? 0 : weight * bias.prior_share + (1 - weight);
-  Matrix3 covariance = bias.covariance_B + left_of_identified * of.identified;
+  Matrix3 covariance = bias.covariance_B + left_of_identified * of.identified + (1 - left_of_identified) * of.since;
   covariance.diagonal() += weight * noise + (1 - weight) * noise.cwiseMax(of.unlearned) +
                            (1 - weight) * (1 - weight) * untaken + Vector3::Constant((1 - weight) * of.growth);
   return covariance;
@@ -146,6 +174,10 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   prediction.X_BT_predicted = X_BW * physics.pose_W(context, physics.values, &J_W);
   const Eigen::MatrixXd J_B = X_BW.linear() * J_W.topRows<3>();
   const Matrix3 identified = J_B * parts().covariance * J_B.transpose();
+  const auto identified_since = [&](const Eigen::MatrixXd& by_parameters) -> Matrix3 {
+    if (!parts().bias_origin) return Matrix3::Zero();
+    return by_parameters * parts().bias_origin->covariance * by_parameters.transpose();
+  };
   const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
 
   const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
@@ -165,9 +197,10 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
     prediction.X_BT_predicted.translation() += taken(bias.mean_B, bias.nearby_B, weight);
     const bool has_parameters = inside_->bias_has_parameters;
     // The slope of a bias with blocks is that of what it misses beyond its own covariance; the others' of the physics.
-    const Uncertainty of = inside_->bias->needs_features()
-                               ? Uncertainty{identified, metrology, metrology, growth, inside_->bias_size_B}
-                               : Uncertainty{identified, metrology, unlearned, 0, inside_->bias_size_B};
+    const Uncertainty of =
+        inside_->bias->needs_features()
+            ? Uncertainty{identified, identified_since(J_B), metrology, metrology, growth, inside_->bias_size_B}
+            : Uncertainty{identified, identified_since(J_B), metrology, unlearned, 0, inside_->bias_size_B};
     covariance = with_bias(bias, weight, has_parameters, of) + unsaid;
     if (has_parameters && weight < 1) {
       // Near its poses the bias has learned it; part of it went into the weights, so its direction is not known.
@@ -181,11 +214,12 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
       const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
       prediction.X_BT_predicted.linear() =
           (rotation_exp(taken(turn.mean_B, turn.nearby_B, weight)) * prediction.X_BT_predicted.linear()).eval();
-      prediction.rotation_stddev_B = with_bias(turn, weight, has_parameters,
-                                               {turned_B * parts().covariance * turned_B.transpose(), instrument,
-                                                instrument, 0, inside_->rotation_bias_size_B})
-                                         .diagonal()
-                                         .cwiseSqrt();
+      prediction.rotation_stddev_B =
+          with_bias(turn, weight, has_parameters,
+                    {turned_B * parts().covariance * turned_B.transpose(), identified_since(turned_B), instrument,
+                     instrument, 0, inside_->rotation_bias_size_B})
+              .diagonal()
+              .cwiseSqrt();
     }
   }
   prediction.covariance_B = covariance;

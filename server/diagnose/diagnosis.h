@@ -28,7 +28,7 @@ struct Estimate {
   std::string name;
   std::string unit;
   double value = 0;
-  double u95 = 0;  ///< half width of the 95 % interval (1.96 standard deviations), everything else free
+  double u95 = 0;  ///< U(k=2): two standard uncertainties, everything else free
 };
 
 /// A pose at which something may have begun.

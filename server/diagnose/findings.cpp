@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/diagnose/beginning.h"
 #include "server/diagnose/effect.h"
@@ -17,7 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kInterval95 = 1.959963984540;
 constexpr double kDwarfed = 0.25;   // of the size of what is unknown
 constexpr double kOthersSpeak = 5;  // nat
 
@@ -28,14 +28,14 @@ struct Estimated {
 };
 
 Estimate in_units(const Parameter& parameter, double value, double stddev) {
-  return {parameter.name, parameter.unit, parameter.scale * value, parameter.scale * kInterval95 * stddev};
+  return {parameter.name, parameter.unit, parameter.scale * value, parameter.scale * kExpanded * stddev};
 }
 
 /// Of a sine and a cosine: their common amplitude and what it is uncertain by.
 Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, const Eigen::Matrix2d& covariance) {
   const double amplitude = value.norm();
   const Eigen::Vector2d slope = amplitude > 0 ? Eigen::Vector2d(value / amplitude) : Eigen::Vector2d::UnitX();
-  return {name, "urad", 1e6 * amplitude, 1e6 * kInterval95 * std::sqrt(slope.dot(covariance * slope))};
+  return {name, "urad", 1e6 * amplitude, 1e6 * kExpanded * std::sqrt(slope.dot(covariance * slope))};
 }
 
 /// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a
@@ -58,7 +58,7 @@ Estimate peak_to_peak_of(const MeasurementBatch& batch, int joint, const VectorX
   }
   const VectorXd across = highest - lowest;
   return {"peak_to_peak", "urad", 1e6 * values.dot(across),
-          1e6 * kInterval95 * std::sqrt(across.dot(covariance * across))};
+          1e6 * kExpanded * std::sqrt(across.dot(covariance * across))};
 }
 
 std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::string& source, const Cause& cause,
@@ -78,7 +78,7 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
     }
   }
   if (cause.cause == "gear_transmission") {
-    estimates.push_back({"order", "", values(0), kInterval95 * std::sqrt(covariance(0, 0))});
+    estimates.push_back({"order", "", values(0), kExpanded * std::sqrt(covariance(0, 0))});
     estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
   } else if (cause.cause == "encoder_eccentricity") {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
@@ -154,7 +154,7 @@ std::vector<PossibleBeginning> beginnings_of(const LinearProblem& problem, const
 Finding outlier(const Accepted& one, double noise, const ErrorFigures& held_out) {
   Finding finding;
   finding.cause = one.cause;
-  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kInterval95 * noise)}};
+  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * noise)}};
   finding.effect_rms = one.pose.distance;
   finding.strength = one.best.strength;
   finding.p_value = one.p_value;

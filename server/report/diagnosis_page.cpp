@@ -103,8 +103,8 @@ std::string findings_text(const Diagnosis& diagnosis) {
   std::string rows;
   for (const Finding& finding : diagnosis.findings) rows += finding_rows(finding);
   return table("findings",
-               {"cause", "joint", "parameter ± half its 95 % interval", "effect, µm rms", "held-out rms, mm",
-                "strength λ", "p", "could also be"},
+               {"cause", "joint", "parameter ± U (k = 2)", "effect, µm rms", "held-out rms, mm", "strength λ", "p",
+                "could also be"},
                rows);
 }
 

@@ -6,7 +6,9 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "server/base/coverage.h"
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
@@ -33,12 +35,12 @@ Compared compared_with(const CompensatedModel& model, const std::optional<Measur
   }
   if (parts.validation) {
     return {*parts.validation, fmt::format("On {} poses of batch {} that were held out from training.",
-                                           parts.validation->poses, parts.provenance.batch_id)};
+                                           parts.validation->poses, parts.provenance.figures_batch_id())};
   }
   return {parts.training,
           fmt::format("On the {} poses of batch {} that the model was trained on: the compensated error "
                       "is smaller here than on new poses.",
-                      parts.training.poses, parts.provenance.batch_id)};
+                      parts.training.poses, parts.provenance.figures_batch_id())};
 }
 
 std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evaluation& evaluation) {
@@ -47,12 +49,23 @@ std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evalu
            {"compensated", &evaluation.compensated}}};
 }
 
+/// What is no gain is not shown as one.
+bool is_doubtful(const Evaluation& evaluation) { return doubt_of_bias(evaluation).has_value(); }
+
 std::string tiles(const Evaluation& evaluation) {
   std::string html;
   for (const auto& [level, figures] : levels_of(evaluation)) {
-    html += fmt::format(R"(<div class="tile {0}"><b>{1:.3f} mm</b><span>{0}, rms</span></div>)", level,
-                        to_mm(figures->rms));
+    const bool doubtful = figures == &evaluation.compensated && is_doubtful(evaluation);
+    html += fmt::format(R"(<div class="tile {0}"><b>{2:.3f} mm</b><span>{1}, rms</span></div>)",
+                        doubtful ? "doubtful" : level, level, to_mm(figures->rms));
   }
+  return html;
+}
+
+std::string warnings(const CompensatedModel& model, const Evaluation& evaluation) {
+  std::string html;
+  for (const std::string& one : warnings_of(model, evaluation))
+    html += "<p class=\"warning\">" + html_text(one) + ".</p>\n";
   return html;
 }
 
@@ -116,6 +129,16 @@ std::string trained_ranges(const CompensatedModel& model) {
   return text;
 }
 
+std::string refits(const ModelProvenance& provenance) {
+  std::string rows;
+  for (const RefitRecord& refit : provenance.refits) {
+    rows += html_row({"identified anew",
+                      html_text(fmt::format("{} on {} poses of batch {}; all else is that of model {}",
+                                            fmt::join(refit.sources, ","), refit.poses, refit.batch_id, refit.model))});
+  }
+  return rows;
+}
+
 std::string provenance_table(const CompensatedModel& model, const Evaluation& evaluation) {
   const CompensatedModel::Parts& parts = model.parts();
   const ModelProvenance& provenance = parts.provenance;
@@ -130,7 +153,7 @@ std::string provenance_table(const CompensatedModel& model, const Evaluation& ev
          line("newest measurement", provenance.measured_at ? date_of(*provenance.measured_at) : "not recorded") +
          line("trained", fmt::format("{}, {} poses, seed {}, trammel {}", date_of(provenance.trained_at),
                                      provenance.training_poses, provenance.seed, provenance.program_version)) +
-         line("joints of the training", trained_ranges(model)) +
+         refits(provenance) + line("joints of the training", trained_ranges(model)) +
          line("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses)) +
          line("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95)) +
          line("negative log predictive density",
@@ -142,7 +165,7 @@ std::string provenance_table(const CompensatedModel& model, const Evaluation& ev
 std::string parameter_row(const IdentifiedParameter& identified) {
   const Parameter& parameter = identified.parameter;
   const ShownValue shown =
-      show_with_uncertainty(parameter.scale * identified.value, 2 * parameter.scale * identified.stddev);
+      show_with_uncertainty(parameter.scale * identified.value, kExpanded * parameter.scale * identified.stddev);
   const std::string row = html_row({html_text(parameter.name), shown.value, shown.expanded, html_text(parameter.unit),
                                     identified.identified ? "" : "not identified by itself"});
   return identified.identified ? row : "<tr class=\"unknown\">" + row.substr(4);
@@ -251,6 +274,7 @@ ordered_json histogram_json(const PoseErrors& errors) {
 std::string chart_data(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
                        const Evaluation& evaluation) {
   ordered_json data;
+  if (is_doubtful(evaluation)) data["doubtful"] = true;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     data["levels"][level] = {to_mm(figures->rms), to_mm(figures->mean), to_mm(figures->p997), to_mm(figures->max)};
   }
@@ -276,6 +300,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
                                                      date_of(model.provenance().trained_at)))},
                   {"tiles", tiles(compared.evaluation)},
+                  {"warnings", warnings(model, compared.evaluation)},
                   {"compared", html_text(compared.text)},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},

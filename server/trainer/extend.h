@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnosis.h"
-#include "server/trainer/paired_gain.h"
 #include "server/trainer/supported.h"
 #include "server/trainer/train.h"
 

@@ -6,7 +6,7 @@
 
 #include "server/registry/model_registry.h"
 #include "server/trainer/judging.h"
-#include "server/trainer/paired_gain.h"
+#include "server/compensate/paired_gain.h"
 
 /// Whether a new model takes the place of the one in force by itself.
 ///

@@ -4,8 +4,8 @@
 
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames.h"
+#include "server/compensate/paired_gain.h"
 #include "server/measurement/repeats.h"
-#include "server/trainer/paired_gain.h"
 
 namespace trammel {
 

@@ -11,6 +11,7 @@
 #include "server/measurement/velocity.h"
 #include "server/trainer/extrapolation.h"
 #include "server/trainer/left_out.h"
+#include "server/trainer/refitted.h"
 
 namespace trammel {
 
@@ -39,24 +40,9 @@ Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions
   return with_unknown_tool(std::move(*names), cell);
 }
 
-/// The physics: anew, or that of another model with the named sources refitted.
+/// The physics, identified anew.
 Result<CalibrationResult> identify(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
                                    const TrainOptions& options) {
-  if (options.from) {
-    PhysicalModel model = options.from->parts().physics;
-    if (model.cell->robot_yaml != cell->robot_yaml) {
-      return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell->name);
-    }
-    model.cell = cell;
-    model.X_WB = cell->X_WB.value_or(model.X_WB);
-    for (auto& [name, X_FT] : model.tools) {
-      const auto known = cell->tools.find(name);
-      if (known == cell->tools.end())
-        return refused("cell {}: the model to start from knows tool '{}'", cell->name, name);
-      X_FT = known->second.value_or(X_FT);
-    }
-    return refit(model, batch, options.refit);
-  }
   const Result<std::vector<std::string>> sources = sources_of(*cell, options);
   if (!sources) return tl::make_unexpected(sources.error());
   return calibrate(cell, *sources, batch, {});
@@ -136,6 +122,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   parts.rotation_bias.reset();
   parts.oriented_poses = 0;
   parts.bias_choice.reset();
+  parts.bias_origin.reset();
   parts.bias_contexts.clear();
   parts.prior_share_limit = 0;
   if (kernel == "none") return {};
@@ -200,15 +187,27 @@ void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& 
   parts.temperature_stddev = std::sqrt((t - t.mean()).square().mean());
 }
 
-/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
-void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const MeasurementBatch& trained,
-                     const TrainOptions& options) {
+/// The joints' ranges where the model was trained.
+void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
   parts.q_min = parts.q_max = trained.measurements.front().context.q;
   for (const Measurement& m : trained.measurements) {
     parts.q_min = parts.q_min.cwiseMin(m.context.q);
     parts.q_max = parts.q_max.cwiseMax(m.context.q);
-    parts.trained_with.emplace(m.context.tool, m.context.payload);
   }
+}
+
+/// When it was trained, and from how new measurements: those of the model that it starts from count, too.
+void record_stamp(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const TrainOptions& options) {
+  parts.provenance.trained_at = options.trained_at;
+  parts.provenance.measured_at = std::max(parts.provenance.measured_at, batch.measured_at);
+  parts.provenance.program_version = kProgramVersion;
+}
+
+/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
+void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& batch, const MeasurementBatch& trained,
+                     const TrainOptions& options) {
+  record_domain(parts, trained);
+  for (const Measurement& m : trained.measurements) parts.trained_with.emplace(m.context.tool, m.context.payload);
   record_temperature(parts, trained);
   parts.provenance.level.clear();
   for (const ErrorSourcePtr& source : parts.physics.sources) {
@@ -218,12 +217,7 @@ void record_training(CompensatedModel::Parts& parts, const MeasurementBatch& bat
   parts.provenance.batch_hash = batch_hash(batch);
   parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
   parts.provenance.seed = options.seed;
-  parts.provenance.trained_at = options.trained_at;
-  // What it starts from is made of measurements too.
-  const std::optional<std::int64_t> before =
-      options.from ? options.from->provenance().measured_at : parts.provenance.measured_at;
-  parts.provenance.measured_at = std::max(before, batch.measured_at);
-  parts.provenance.program_version = kProgramVersion;
+  record_stamp(parts, batch, options);
 }
 
 /// The model with its figures on the poses it was trained on and on those held out.
@@ -234,6 +228,43 @@ Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSpl
   parts.validation.reset();
   if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
   return CompensatedModel::make(std::move(parts));
+}
+
+/// Says what is being done; false: give up.
+using Report = std::function<bool(const std::string& stage, double share)>;
+
+/// A bias learned anew for a model whose named sources were, too: its poses become the domain. Where there is none to
+/// take, the domain of the physics stays.
+Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainOptions& options, const Report& report) {
+  CompensatedModel::Parts& parts = refitted.parts;
+  const LeftOut left_out(refitted.found, refitted.poses);
+  const JointVector slope = extrapolation_slope(left_out, parts.physics.cell->robot);
+  const JointVector slope_before = parts.extrapolation_slope;
+  parts.extrapolation_slope = slope;
+  const Status learned = add_bias(parts, refitted.poses, kernel, left_out, options.seed,
+                                  [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
+  if (!learned) return learned;
+  if (parts.bias) {
+    record_domain(parts, refitted.poses);
+  } else if (slope_before.size() > 0) {
+    parts.extrapolation_slope = slope.cwiseMax(slope_before);
+  }
+  return {};
+}
+
+/// train() from another model.
+Result<CompensatedModel> train_from(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
+                                    const MeasurementBatch& batch, const BatchSplit& split, const TrainOptions& options,
+                                    const Report& report) {
+  Result<Refitted> refit = refitted(from, cell, batch, split.train, options.refit);
+  if (!refit) return tl::make_unexpected(refit.error());
+  if (options.bias) {
+    if (const Status learned = add_bias_anew(*refit, *options.bias, options, report); !learned)
+      return tl::make_unexpected(learned.error());
+  }
+  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  record_stamp(refit->parts, options);
+  return validated(std::move(refit->parts), split);
 }
 
 }  // namespace
@@ -253,7 +284,7 @@ BiasProblem leftover(const PhysicalModel& physics, const MeasurementBatch& batch
 
 Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const MeasurementBatch& batch,
                                const TrainOptions& options) {
-  const auto report = [&](const std::string& stage, double share) {
+  const Report report = [&](const std::string& stage, double share) {
     return !options.progress || options.progress(stage, share);
   };
   const Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
@@ -264,6 +295,11 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 
   if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
+  if (options.from) {
+    Result<CompensatedModel> model = train_from(*options.from, cell, batch, split, options, report);
+    if (model && !report("done", 1.0)) return tl::make_unexpected(given_up());
+    return model;
+  }
   Result<CalibrationResult> calibration = identify(cell, split.train, options);
   if (!calibration) return tl::make_unexpected(calibration.error());
   CompensatedModel::Parts parts;

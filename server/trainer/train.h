@@ -11,9 +11,10 @@
 namespace trammel {
 
 struct TrainOptions {
-  std::optional<std::string> level;      ///< instead of the cell's error sources
-  std::optional<std::string> bias;       ///< instead of the cell's: `none`, a kernel or `auto` (choose_bias())
-  std::optional<CompensatedModel> from;  ///< a model of this cell to start from: only `refit` is identified anew
+  std::optional<std::string> level;  ///< instead of the cell's error sources
+  std::optional<std::string> bias;   ///< instead of the cell's: `none`, a kernel or `auto` (choose_bias())
+  /// A model of this robot to start from: only `refit` is identified anew, and a bias only where `bias` names one.
+  std::optional<CompensatedModel> from;
   std::vector<std::string> refit = {"base", "tool"};
   double validation_share = 0;  ///< of the rows, drawn, when the batch has no `set` column; 0 = train on all
   std::uint64_t seed = 1;

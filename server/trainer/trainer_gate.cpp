@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/batch_file.h"
 #include "server/trainer/extend.h"
 #include "server/trainer/gate.h"
@@ -175,6 +176,7 @@ Status Trainer::keep(const CompensatedModel& model, JobProgress progress, Bar ba
   auto sessions = judging_sessions(*job);
   if (!sessions) return tl::make_unexpected(sessions.error());
   std::string judged = note.empty() ? "" : "; " + note;
+  for (const std::string& one : warnings_of(model, model.parts().validation)) judged += "; " + one;
   if (diagnosis != nullptr) {
     auto own = session_of_diagnosis(*job, *sessions);
     if (!own) return tl::make_unexpected(own.error());

@@ -315,7 +315,7 @@ void print_orders(const Results& results) {
       if (!number.name.ends_with(" order")) continue;
       const double error = std::abs(number.value - number.truth);
       errors.push_back(error);
-      square += std::pow(1.96 * error / number.u95, 2);
+      square += std::pow(2 * error / number.u95, 2);
       ++near.all;
       near.yes += error <= 0.1 ? 1 : 0;
     }
@@ -340,7 +340,7 @@ void print_numbers(const Results& results) {
       }
     }
   }
-  print("numbers inside their 95 % interval", all, "93 to 97");
+  print("numbers inside U(k=2)", all, "93 to 98");
   for (const auto& [name, one] : inside) print("  " + name, one, "");
   print_orders(results);
 }

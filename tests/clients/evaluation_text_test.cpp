@@ -77,6 +77,17 @@ TEST(EvaluationTable, HasALineForEachLevel) {
   EXPECT_FALSE(evaluation_json(old).contains("nlpd"));
 }
 
+TEST(EvaluationTable, SaysWhereABiasDoesNotHelp) {
+  EXPECT_EQ(evaluation_table(evaluation()).find("the bias"), std::string::npos);
+  Evaluation worse = evaluation();
+  worse.compensated.rms = 4.1e-4;
+  worse.bias_gain_z = -3;
+  EXPECT_NE(
+      evaluation_table(worse).find("the bias does not help here: 0.4100 mm with it, 0.4000 mm without on 7 poses"),
+      std::string::npos);
+  EXPECT_TRUE(evaluation_json(worse).contains("doubt_of_bias"));
+}
+
 TEST(ModelText, SaysWhatCouldNotBeIdentified) {
   CompensatedModel::Parts parts = test::nominal_model(test::small_cell("cell-3"), 12).parts();
   parts.unidentifiable.push_back({0.1, {"q1", "gamma0"}, "q1 and gamma0 turn the same way"});

@@ -24,6 +24,7 @@ class Compensated : public testing::Test {
     robot_ = new VirtualRobot(test::chapter_5_robot(cell));
     TrainOptions options;
     options.level = "M2";
+    options.bias = "se";
     model_ = new CompensatedModel(test::demand(train(cell, test::measured(*robot_, 200, 31), options)));
   }
   static void TearDownTestSuite() {

@@ -138,6 +138,60 @@ TEST_F(CommandLine, ALevelThatDoesNotExistIsWrongUsage) {
   EXPECT_NE(finished.err.find("M9"), std::string::npos) << finished.err;
 }
 
+TEST_F(CommandLine, RefittingTheBaseOnThreePositionsKeepsAToolThatTheCellDoesNotKnowAndAllElse) {
+  std::string cell = test::read_file(cell_);
+  const auto replace = [&](const std::string& what, const std::string& by) {
+    ASSERT_NE(cell.find(what), std::string::npos) << what;
+    cell.replace(cell.find(what), what.size(), by);
+  };
+  replace("../models", TRAMMEL_SOURCE_DIR "/models");
+  replace("base: {xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}", "base: null");
+  replace("spindle: {xyz_mm: [100, 0, 150], q_wxyz: [0.923879532511287, 0, -0.382683432365090, 0]}", "spindle: null");
+  const std::string unlocated = folder_.write("unlocated.yaml", cell);
+  must({"train", "--cell", unlocated, "--batch", measure("b", 80, 3), "--bias", "se", "-o", file("first.model")});
+  // Positions alone, the wrist never turned.
+  const std::string joints = folder_.write("few-plan.csv",
+                                           "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n"
+                                           "-40,10,10,0,20,0\n35,10,10,0,20,0\n0,30,-10,0,20,0\n");
+  must({"simulate", "--cell", cell_, "--truth", kTruth, "--plan", joints, "--seed", "9", "-o", file("full.csv")});
+  const CsvTable full = CsvTable::parse(test::read_file(file("full.csv")), "full.csv").value();
+  std::string few = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm\n";
+  for (std::size_t row = 0; row < full.size(); ++row) {
+    std::vector<std::string> fields;
+    for (const char* name : {"q1_deg", "q2_deg", "q3_deg", "q4_deg", "q5_deg", "q6_deg", "x_mm", "y_mm", "z_mm"})
+      fields.push_back(full.field(row, full.require(name).value()));
+    few += fmt::format("{}\n", fmt::join(fields, ","));
+  }
+  const Finished refit = must({"train", "--cell", unlocated, "--batch", folder_.write("few.csv", few), "--from",
+                               file("first.model"), "--refit", "base", "-o", file("second.model")});
+  EXPECT_NE(refit.out.find("base identified anew on 3 poses of batch few"), std::string::npos) << refit.out;
+  const json first = json::parse(test::read_file(file("first.model")))["content"];
+  const json second = json::parse(test::read_file(file("second.model")))["content"];
+  for (const char* kept : {"tools", "bias", "rotation_bias", "q_min", "q_max", "prior_share_limit", "trained_with",
+                           "extrapolation_slope", "error_sources"}) {
+    EXPECT_EQ(second.value(kept, json()), first.value(kept, json())) << kept;
+  }
+  std::size_t same = 0;
+  for (std::size_t k = 0; k < first["parameters"].size(); ++k)
+    same += first["parameters"][k] == second["parameters"][k] ? 1 : 0;
+  EXPECT_EQ(same, first["parameters"].size() - 6);
+  EXPECT_NE(second["X_WB"], first["X_WB"]);
+}
+
+TEST_F(CommandLine, TrainSaysWhereComplianceHasNothingToActOn) {
+  std::string cell = test::read_file(cell_);
+  cell.replace(cell.find("../models"), 9, TRAMMEL_SOURCE_DIR "/models");
+  const std::size_t payloads = cell.find("payloads:");
+  cell.erase(payloads, cell.find("tracker:") - payloads);
+  const std::string unloaded = folder_.write("unloaded.yaml", cell);
+  const std::string batch = changed(measure("b", 60, 4), "payload_id", [](auto, const auto&) { return ""; });
+  const Finished said = must({"train", "--cell", unloaded, "--batch", batch, "--level", "M3", "--bias", "none", "-o",
+                              file("m3.model"), "--json", file("m3.json")});
+  EXPECT_NE(said.out.find("compliance does nothing here"), std::string::npos) << said.out;
+  EXPECT_NE(said.out.find("so M3 is M2; give payloads"), std::string::npos) << said.out;
+  EXPECT_EQ(json::parse(test::read_file(file("m3.json")))["notes"].size(), 1U);
+}
+
 TEST_F(CommandLine, FromPlanToEvaluationOnFilesAlone) {
   const std::string model = train(measure("b", 60, 1), "M3");
   const Finished evaluated = must({"evaluate", "--model", model, "--batch", measure("v", 50, 2), "--json", "-"});

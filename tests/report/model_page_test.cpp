@@ -55,6 +55,31 @@ TEST_F(ModelPage, ShowsWhatIsLeftOfTheOrientationsWhereTheyWereMeasured) {
   EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "orientation, deg"));
 }
 
+TEST_F(ModelPage, ABiasThatDoesNotHelpIsSaidNotToAndIsNotGreen) {
+  CompensatedModel::Parts parts = trained("se", 0.3).parts();
+  parts.validation->calibrated.rms = 22.9e-6;
+  parts.validation->compensated.rms = 23.3e-6;
+  parts.validation->bias_gain_z = -2;
+  const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
+  EXPECT_TRUE(has(page, "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 9 poses."));
+  EXPECT_TRUE(has(page, "<div class=\"tile doubtful\"><b>0.023 mm</b><span>compensated, rms</span>"));
+  EXPECT_EQ(chart_data(page).at("doubtful"), true);
+  parts.validation->compensated.rms = 10e-6;
+  parts.validation->bias_gain_z = 5;
+  const std::string helped = model_page(CompensatedModel::make(parts).value(), std::nullopt);
+  EXPECT_FALSE(has(helped, "the bias does not help"));
+  EXPECT_TRUE(has(helped, "<div class=\"tile compensated\">"));
+}
+
+TEST_F(ModelPage, SaysThatComplianceWithoutALoadDoesNothing) {
+  TrainOptions options;
+  options.level = "M3";
+  options.bias = "none";
+  const CompensatedModel model = train(cell_, batch_, options).value();
+  EXPECT_TRUE(has(model_page(model, std::nullopt), "compliance does nothing here: neither link masses nor a payload"));
+  EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "does nothing here"));
+}
+
 TEST_F(ModelPage, OpensWithoutANetwork) {
   const std::string page = model_page(trained("none"), std::nullopt);
   EXPECT_TRUE(has(page, "Chart.js v"));

@@ -36,7 +36,7 @@ TEST(CellFile, ABiasMayBeSpelledAsASum) {
   const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
   const Result<Cell> cell =
-      parse_cell(with(text, "bias: se", "bias: matern52 + joint_map + parameters"), robot, "c.yaml");
+      parse_cell(with(text, "bias: auto", "bias: matern52 + joint_map + parameters"), robot, "c.yaml");
   ASSERT_TRUE(cell) << cell.error().message;
   EXPECT_EQ(cell->model.bias, "matern52 + joint_map + parameters");
 }

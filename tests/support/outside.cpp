@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include "server/base/coverage.h"
 #include "tests/support/demand.h"
 
 namespace trammel::test {
 
 namespace {
 
-constexpr double kInterval95 = 1.959963984540;
 constexpr double kBeyondKnown = 3;
 constexpr int kAsked = 300;  // at each widening
 constexpr std::array kWidenings = {1.0, 1.2, 1.6, 2.4, 4.0, 100.0};

@@ -1,4 +1,4 @@
-#include "server/trainer/paired_gain.h"
+#include "server/compensate/paired_gain.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,144 @@
+#include "server/compensate/model_notes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/compensate/paired_gain.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kNothing = 1e-9;    // m and rad that one prior standard deviation of a parameter moves the tool by
+constexpr double kElsewhere = 1e-3;  // m: a tool's point that moved by more
+constexpr int kAskedPoses = 5;       // along the diagonal of the joints' ranges
+constexpr const char* kAsWithout = "so the model is what it would be without it";
+constexpr int kAfterEverything = 1 << 20;  // index of a pose after all that began during a batch
+
+/// Everything recorded that any source could ask for.
+PoseContext eventful(const CompensatedModel::Parts& parts, int k) {
+  PoseContext context;
+  const auto joints = parts.q_min.size();
+  context.q = parts.q_min;
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    // A different place of its range for every joint: no posture in which axes are parallel by chance.
+    const double share = 0.37 + 0.61 * static_cast<double>(k) + 0.29 * static_cast<double>(j);
+    context.q(j) += (share - std::floor(share)) * (parts.q_max(j) - parts.q_min(j));
+  }
+  context.time = 1;
+  context.temperature = 50;
+  context.velocity = JointVector::Ones(joints);
+  context.direction.assign(static_cast<std::size_t>(joints), 1);
+  context.index = kAfterEverything;
+  return context;
+}
+
+/// For each parameter how far one standard deviation of its prior moves the tool, m or rad, at the most.
+Eigen::VectorXd effects(const CompensatedModel::Parts& parts) {
+  const std::vector<Parameter> parameters = parts.physics.parameters();
+  Eigen::VectorXd most = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+  for (const auto& [tool, payload] : parts.trained_with) {
+    for (int k = 0; k < kAskedPoses; ++k) {
+      PoseContext context = eventful(parts, k);
+      context.tool = tool;
+      context.payload = payload;
+      Eigen::MatrixXd J;
+      parts.physics.pose_W(context, parts.physics.values, &J);
+      most = most.cwiseMax(J.colwise().lpNorm<Eigen::Infinity>().transpose());
+    }
+  }
+  for (std::size_t i = 0; i < parameters.size(); ++i) most(static_cast<Eigen::Index>(i)) *= parameters[i].prior_scale;
+  return most;
+}
+
+bool is_compliance(const std::string& source) { return source.starts_with("compliance"); }
+
+bool carries_nothing(const CompensatedModel::Parts& parts) {
+  const Cell& cell = *parts.physics.cell;
+  const bool loaded = std::any_of(parts.trained_with.begin(), parts.trained_with.end(), [&](const auto& used) {
+    const auto payload = cell.payloads.find(used.second);
+    return payload != cell.payloads.end() && payload->second.mass > 0;
+  });
+  return !loaded && !cell.robot.has_link_masses();
+}
+
+/// What the level is without the compliance, for people.
+std::string so_it_is(const CompensatedModel::Parts& parts) {
+  std::string others;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    if (!is_compliance(source->name())) others += (others.empty() ? "" : ",") + source->name();
+  }
+  return others == "base,geometry" ? "so M3 is M2" : kAsWithout;
+}
+
+std::string idle_sentence(const CompensatedModel::Parts& parts, const std::string& source) {
+  const std::string name = is_compliance(source) ? "compliance" : source;
+  const std::string without = is_compliance(source) ? so_it_is(parts) : kAsWithout;
+  if (name == "payload" || name.starts_with("payload_changed")) {
+    return fmt::format("{} does nothing here: nothing gives way under a load (no compliance, no link_bending)", name);
+  }
+  if ((is_compliance(source) || name.starts_with("link_bending")) && carries_nothing(parts)) {
+    return fmt::format(
+        "{} does nothing here: neither link masses nor a payload with a mass are given, {}; give payloads: {{NAME: "
+        "{{mass_kg: ..., cog_mm: [x, y, z]}}}} in the cell file",
+        name, without);
+  }
+  return fmt::format("{} does nothing here: at these poses it has nothing to act on", name);
+}
+
+void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  if (parts.physics.parameter_count() == 0 || parts.trained_with.empty()) return;
+  const Eigen::VectorXd effect = effects(parts);
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    if (count > 0 && effect.segment(first, count).maxCoeff() < kNothing)
+      notes.push_back(idle_sentence(parts, source->name()));
+    first += count;
+  }
+}
+
+void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& notes) {
+  const CompensatedModel::Parts& parts = model.parts();
+  if (!parts.bias_origin) return;
+  const PhysicalModel& then = parts.bias_origin->physics;
+  for (const auto& [name, X_FT] : parts.physics.tools) {
+    const double moved =
+        (served_tool(parts.physics, name).translation() - served_tool(then, name).translation()).norm();
+    if (moved < kElsewhere) continue;
+    notes.push_back(fmt::format(
+        "the bias was learned with tool '{}' {:.1f} mm from where it is now: its kernel does not follow what turns the "
+        "flange to the new point; learn it anew (--bias) where that matters",
+        name, to_mm(moved)));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> notes_of(const CompensatedModel& model) {
+  std::vector<std::string> notes;
+  add_idle_sources(model.parts(), notes);
+  add_moved_tools(model, notes);
+  return notes;
+}
+
+std::vector<std::string> warnings_of(const CompensatedModel& model, const std::optional<Evaluation>& evaluation) {
+  std::vector<std::string> all = notes_of(model);
+  const std::optional<std::string> doubt = evaluation ? doubt_of_bias(*evaluation) : std::nullopt;
+  if (doubt) all.push_back(*doubt);
+  return all;
+}
+
+std::optional<std::string> doubt_of_bias(const Evaluation& evaluation) {
+  const double with = evaluation.compensated.rms;
+  const double without = evaluation.calibrated.rms;
+  const bool worse = with > without || (evaluation.bias_gain_z && with == without);
+  const bool by_chance = evaluation.bias_gain_z && *evaluation.bias_gain_z <= PairedGain::kBeyondChance;
+  if (!worse && !by_chance) return std::nullopt;
+  return fmt::format("the bias {} here: {:.4f} mm with it, {:.4f} mm without on {} poses{}",
+                     worse ? "does not help" : "is not shown to help", to_mm(with), to_mm(without), evaluation.poses,
+                     worse ? "" : ", no more than chance would make of it");
+}
+
+}  // namespace trammel

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "server/calibrate/refit.h"
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// A model whose named sources were identified anew, before a bias is learned anew for it.
+struct Refitted {
+  CompensatedModel::Parts parts;  ///< without figures of the new poses
+  MeasurementBatch poses;         ///< as they were met: what began at a pose of another batch has happened
+  CalibrationResult found;        ///< of `poses`; its covariance is of what was identified anew alone
+};
+
+/// `from` with the sources in `only` identified anew on `trained`, the rows of `batch` that are not held out; the bias,
+/// which lives in B, explains its share of them first. All else stays bit for bit: values and their covariance, frames,
+/// bias, domain, temperature and the record of the training. `cell` may have more tools and payloads. Refuses what
+/// refit() refuses; a robot that is another one; a frame in `cell` that is not the model's and is not named; a tool
+/// that nobody knows.
+[[nodiscard]] Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
+                                        const MeasurementBatch& batch, const MeasurementBatch& trained,
+                                        const std::vector<std::string>& only);
+
+}  // namespace trammel

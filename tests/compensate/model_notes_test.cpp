@@ -1,0 +1,100 @@
+#include "server/compensate/model_notes.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+/// cell-7 with another payload, or none; a model of it with these sources, nothing identified.
+CompensatedModel model_of(const std::vector<std::string>& sources, const std::map<std::string, Payload>& payloads) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  cell->payloads = payloads;
+  CompensatedModel::Parts parts;
+  parts.physics = test::demand(make_physical_model(cell, sources));
+  parts.q_min = JointVector::Constant(6, -1);
+  parts.q_max = JointVector::Constant(6, 1);
+  for (const Parameter& parameter : parts.physics.parameters()) parts.parameters.push_back({parameter, 0, 0, true});
+  const auto P = parts.physics.parameter_count();
+  parts.covariance = Eigen::MatrixXd::Zero(P, P);
+  parts.trained_with = {{"spindle", payloads.empty() ? "" : payloads.begin()->first}};
+  return test::demand(CompensatedModel::make(std::move(parts)));
+}
+
+const std::map<std::string, Payload> kHeavy = {{"spindle", {100, Vector3(0, 0, 0.1)}}};
+const std::map<std::string, Payload> kWeightless = {{"spindle", {0, Vector3(0, 0, 0.1)}}};
+
+TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
+  for (const auto& payloads : {std::map<std::string, Payload>{}, kWeightless}) {
+    for (const char* form : {"compliance_linear", "compliance_first_order", "compliance_equilibrium"}) {
+      const std::vector<std::string> notes = notes_of(model_of({"base", "geometry", form}, payloads));
+      ASSERT_EQ(notes.size(), 1U) << form;
+      EXPECT_EQ(
+          notes.front(),
+          "compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 is M2; give "
+          "payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
+    }
+  }
+  EXPECT_TRUE(notes_of(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());
+}
+
+TEST(ModelNotes, EverySourceThatHasNothingToActOnIsNamed) {
+  const std::vector<std::string> idle = notes_of(model_of({"base", "link_bending:2"}, kWeightless));
+  ASSERT_EQ(idle.size(), 1U);
+  EXPECT_TRUE(idle.front().starts_with("link_bending:2 does nothing here: neither link masses nor a payload"))
+      << idle[0];
+  const std::vector<std::string> stiff = notes_of(model_of({"base", "geometry", "payload"}, kHeavy));
+  ASSERT_EQ(stiff.size(), 1U);
+  EXPECT_TRUE(stiff.front().starts_with("payload does nothing here: nothing gives way under a load")) << stiff[0];
+}
+
+TEST(ModelNotes, ASourceThatActsIsNot) {
+  const std::vector<std::string> all = {"base",
+                                        "geometry",
+                                        "tool",
+                                        "joint_map:3@2",
+                                        "backlash:2",
+                                        "thermal_growth",
+                                        "wrist_coupling",
+                                        "gear_transmission:1@48",
+                                        "time_lag",
+                                        "joint_slip:1@40",
+                                        "tracker_drift",
+                                        "encoder_eccentricity:2",
+                                        "tracker_moved@9",
+                                        "link_bending:2",
+                                        "compliance_linear"};
+  const std::vector<std::string> notes = notes_of(model_of(all, kHeavy));
+  EXPECT_TRUE(notes.empty()) << notes.front();
+}
+
+Evaluation compared(double without, double with, std::optional<double> z) {
+  Evaluation evaluation;
+  evaluation.poses = 1000;
+  evaluation.calibrated.rms = without;
+  evaluation.compensated.rms = with;
+  evaluation.bias_gain_z = z;
+  return evaluation;
+}
+
+TEST(DoubtOfBias, SaysThatABiasThatMakesItWorseDoesNotHelp) {
+  EXPECT_EQ(doubt_of_bias(compared(22.9e-6, 23.3e-6, -4.0)).value(),
+            "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 1000 poses");
+  // Of a model of before the pairs were kept.
+  EXPECT_EQ(doubt_of_bias(compared(22.9e-6, 23.3e-6, {})).value(),
+            "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 1000 poses");
+}
+
+TEST(DoubtOfBias, SaysWhatIsNoMoreThanChance) {
+  EXPECT_EQ(
+      doubt_of_bias(compared(23.3e-6, 22.9e-6, 1.1)).value(),
+      "the bias is not shown to help here: 0.0229 mm with it, 0.0233 mm without on 1000 poses, no more than chance "
+      "would make of it");
+  EXPECT_FALSE(doubt_of_bias(compared(0.48e-3, 0.2e-3, 20)));
+  EXPECT_FALSE(doubt_of_bias(compared(22.9e-6, 22.9e-6, {})));  // no bias
+}
+
+}  // namespace
+}  // namespace trammel
