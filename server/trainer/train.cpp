@@ -263,7 +263,7 @@ Result<CompensatedModel> train_from(const CompensatedModel& from, const std::sha
       return tl::make_unexpected(learned.error());
   }
   if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
-  record_stamp(refit->parts, options);
+  record_stamp(refit->parts, batch, options);
   return validated(std::move(refit->parts), split);
 }
 

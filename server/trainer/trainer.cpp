@@ -13,7 +13,6 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernel_spelling.h"
-#include "server/compensate/model_notes.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/batch_file.h"
 #include "server/measurement/measurement.h"
