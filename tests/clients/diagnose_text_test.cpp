@@ -11,11 +11,11 @@ namespace {
 
 TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
   const std::string text = diagnosis_text(diagnosis_json(test::made_up_diagnosis(test::cell_7())));
-  for (const char* part :
-       {"ambiguous: The gear of joint 3", "gear_transmission of joint 3", "order = 48.503 ± 0.040",
-        "half of the 95 % interval", "could also be: geometry d6", "Have the gear of joint 3 looked at",
-        "9 um rms that depend on q4", "pose p28 (row 29)",
-        "would not have shown: backlash: needs both approach directions (joints 2)", "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
+  for (const char* part : {"ambiguous: The gear of joint 3", "gear_transmission of joint 3", "order = 48.503 ± 0.040",
+                           "± is U(k=2): two standard uncertainties", "could also be: geometry d6",
+                           "Have the gear of joint 3 looked at", "9 um rms that depend on q4", "pose p28 (row 29)",
+                           "would not have shown: backlash: needs both approach directions (joints 2)",
+                           "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }
