@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -65,7 +66,7 @@ class DdsService::Running {
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
-    const ThreadName library("dds");
+    auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
     auto events = std::make_unique<ServiceEvents>();
@@ -80,6 +81,7 @@ class DdsService::Running {
     if (!topics) return tl::make_unexpected(topics.error());
     auto echo = StatusEcho::open(**participant, *subscriber, topics->status_writer(), *heard);
     if (!echo) return tl::make_unexpected(echo.error());
+    library.reset();
 
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));

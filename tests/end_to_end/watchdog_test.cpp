@@ -16,10 +16,14 @@ namespace {
 
 constexpr std::chrono::seconds kLimit{30};
 
-/// The daemon's own threads have names; the others, but the first, are the library's and the workers'.
-std::vector<test::ThreadOf> named(pid_t process, const std::string& name) {
-  auto threads = test::threads_of(process);
-  std::erase_if(threads, [&](const test::ThreadOf& thread) { return thread.name != name; });
+/// Threads of this name, once there are `least` of them: a thread names itself as it begins.
+std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::size_t least = 1) {
+  const auto deadline = std::chrono::steady_clock::now() + kLimit;
+  std::vector<test::ThreadOf> threads;
+  do {
+    threads = test::threads_of(process);
+    std::erase_if(threads, [&](const test::ThreadOf& thread) { return thread.name != name; });
+  } while (threads.size() < least && std::chrono::steady_clock::now() < deadline);
   return threads;
 }
 
@@ -59,11 +63,11 @@ TEST(WatchdogTest, AStatusThreadThatHangsEndsTheDaemonAndIsNamed) {
 TEST(WatchdogTest, AnyThreadOfTheLibraryThatHangsEndsTheDaemon) {
   test::Daemon daemon;
   daemon.start();
-  const std::size_t count = named(daemon.process().pid(), "dds").size();
+  const std::size_t count = named(daemon.process().pid(), "dds", 3).size();
   ASSERT_GE(count, 3u) << "events, discovery and data at least";
   for (std::size_t i = 0; i < count; ++i) {
     if (i > 0) daemon.start();
-    const auto threads = named(daemon.process().pid(), "dds");
+    const auto threads = named(daemon.process().pid(), "dds", 3);
     ASSERT_EQ(threads.size(), count);
     EXPECT_EQ(end_without(daemon.process(), threads[i].id, kLimit), kExitHung) << "thread " << i << " of " << count;
   }
@@ -75,7 +79,7 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirOperationIsNamed) 
   test::Daemon daemon;
   daemon.start();
   std::vector<std::unique_ptr<test::StoppedThread>> stopped;
-  for (const test::ThreadOf& thread : named(daemon.process().pid(), "requests")) {
+  for (const test::ThreadOf& thread : named(daemon.process().pid(), "requests", 8)) {
     stopped.push_back(std::make_unique<test::StoppedThread>(thread.id));
     ASSERT_TRUE(stopped.back()->is_stopped());
   }
