@@ -1,3 +1,5 @@
 include(GNUInstallDirs)
 install(TARGETS trammeld trammel RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel)
+install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel)
+install(FILES deploy/trammeld.service DESTINATION lib/systemd/system)

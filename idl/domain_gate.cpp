@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <mutex>
 #include <string_view>
 #include <utility>
@@ -25,7 +26,8 @@ constexpr std::size_t kHeader = 20;
 constexpr std::size_t kPrefixAt = 8, kPrefix = 12;
 constexpr unsigned char kPad = 0x01, kInfoTimestamp = 0x09, kData = 0x15;
 constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04;
-constexpr std::array<unsigned char, 4> kAnnouncer = {0x00, 0x01, 0x00, 0xc2};  // ENTITYID of the writer
+constexpr std::uint32_t kAnnouncer = 0x000100c2;  // entity id of the writer
+constexpr std::chrono::milliseconds kBetweenLosses{500};
 constexpr std::uint16_t kSentinel = 0x0001, kDomainId = 0x000f, kUserData = 0x002c;
 constexpr std::string_view kMark = "trammel.domain=";
 
@@ -84,22 +86,33 @@ std::optional<std::uint32_t> marked_domain(Bytes user_data) {
   return domain;
 }
 
-/// The serialized data of one submessage DATA, when a participant announces itself in it.
-std::optional<Bytes> announcement_in(Bytes data, unsigned char flags) {
-  if ((flags & kPayload) == 0) return std::nullopt;  // it leaves
-  Reader reader(data, (flags & kLittleEndian) != 0);
+/// A submessage DATA.
+struct Data {
+  std::uint32_t writer = 0;  // entity id, its first octet the highest
+  std::uint64_t sequence_number = 0;
+  Bytes payload;  // empty: a participant or an instance leaves
+};
+
+std::optional<Data> data_of(Bytes body, unsigned char flags) {
+  const bool little_endian = (flags & kLittleEndian) != 0;
+  Reader reader(body, little_endian);
   if (!reader.u16()) return std::nullopt;
   const auto to_inline_qos = reader.u16();
   const Bytes counted_from_here = reader.rest();
   if (!to_inline_qos || !reader.take(4)) return std::nullopt;
   const auto writer = reader.take(4);
-  if (!writer || !std::equal(writer->begin(), writer->end(), kAnnouncer.begin())) return std::nullopt;
-  if (*to_inline_qos > counted_from_here.size()) return std::nullopt;
-  Reader after(counted_from_here.subspan(*to_inline_qos), (flags & kLittleEndian) != 0);
+  const auto high = reader.u32(), low = reader.u32();
+  if (!writer || !high || !low || *to_inline_qos > counted_from_here.size()) return std::nullopt;
+  Data data;
+  data.writer = Reader(*writer, false).u32().value_or(0);
+  data.sequence_number = std::uint64_t{*high} << 32 | *low;
+  if ((flags & kPayload) == 0) return data;
+  Reader after(counted_from_here.subspan(*to_inline_qos), little_endian);
   if ((flags & kInlineQos) != 0) {
     while (next_parameter(after)) continue;
   }
-  return after.rest();
+  data.payload = after.rest();
+  return data;
 }
 
 bool says_another_domain(Bytes announcement, std::uint32_t domain) {
@@ -119,9 +132,9 @@ bool says_another_domain(Bytes announcement, std::uint32_t domain) {
   return false;
 }
 
-/// Calls `found` with each announcement in the message; true as soon as it is.
+/// Calls `found` with each DATA in the message; true as soon as it is.
 template <typename Found>
-bool any_announcement(Bytes message, const Found& found) {
+bool any_data(Bytes message, const Found& found) {
   if (message.size() < kHeader) return false;
   Bytes rest = message.subspan(kHeader);
   while (rest.size() >= 4) {
@@ -132,8 +145,8 @@ bool any_announcement(Bytes message, const Found& found) {
     if (length == 0 && id != kPad && id != kInfoTimestamp) length = body.size();  // to the end of the message
     if (length > body.size()) return false;
     if (id == kData) {
-      const auto announcement = announcement_in(body.first(length), flags);
-      if (announcement && found(*announcement)) return true;
+      const auto data = data_of(body.first(length), flags);
+      if (data && found(*data)) return true;
     }
     rest = body.subspan(length);
   }
@@ -152,7 +165,7 @@ class Gate final : public rtps::ChainingTransport {
             LocatorsIterator* last, const std::chrono::steady_clock::time_point& limit) override {
     if (heard_ && size >= kHeader && !knows_itself_) {
       const std::lock_guard lock(mutex_);
-      std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
+      if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
       knows_itself_ = true;
     }
     return below->send(buffer, size, first, last, limit);
@@ -162,23 +175,40 @@ class Gate final : public rtps::ChainingTransport {
                const Locator_t& here, const Locator_t& there) override {
     const Bytes message(buffer, size);
     if (is_of_another_domain(message, domain_)) return;
+    const bool own = heard_ && is_own(message);
+    if (own && is_to_be_lost(message)) return;
     next->OnDataReceived(buffer, size, here, there);
-    if (heard_ && is_own(message) && is_announcement(message)) ++heard_->announcements;
+    if (own && is_announcement(message)) ++heard_->announcements;
   }
 
  private:
   [[nodiscard]] bool is_own(Bytes message) const {
     if (!knows_itself_ || message.size() < kHeader) return false;
-    const std::lock_guard lock(mutex_);
     return std::equal(own_prefix_.begin(), own_prefix_.end(), message.begin() + kPrefixAt);
+  }
+
+  bool is_to_be_lost(Bytes message) {
+    const std::uint32_t writer = heard_->first_lost_of;
+    if (writer == 0) return false;
+    return any_data(message, [&](const Data& data) {
+      if (data.writer != writer) return false;
+      const std::lock_guard lock(mutex_);
+      const auto now = std::chrono::steady_clock::now();
+      if (data.sequence_number <= last_lost_ || now - lost_at_ < kBetweenLosses) return false;
+      last_lost_ = data.sequence_number;
+      lost_at_ = now;
+      return true;
+    });
   }
 
   std::unique_ptr<GateDescriptor> configuration_;
   const std::uint32_t domain_;
   const std::shared_ptr<HeardOfItself> heard_;
   std::atomic<bool> knows_itself_{false};
-  mutable std::mutex mutex_;
-  std::array<unsigned char, kPrefix> own_prefix_{};  // guarded by mutex_
+  std::mutex mutex_;
+  std::array<unsigned char, kPrefix> own_prefix_{};  // written once, before knows_itself_
+  std::uint64_t last_lost_ = 0;                      // guarded by mutex_; sequence number
+  std::chrono::steady_clock::time_point lost_at_;    // guarded by mutex_
 };
 
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {
@@ -206,11 +236,13 @@ rtps::TransportDescriptorInterface* Gate::get_configuration() { return configura
 std::string domain_mark(std::uint32_t domain) { return fmt::format("{}{}", kMark, domain); }
 
 bool is_of_another_domain(Bytes message, std::uint32_t domain) {
-  return any_announcement(message, [domain](Bytes found) { return says_another_domain(found, domain); });
+  return any_data(message, [domain](const Data& data) {
+    return data.writer == kAnnouncer && says_another_domain(data.payload, domain);
+  });
 }
 
 bool is_announcement(Bytes message) {
-  return any_announcement(message, [](Bytes) { return true; });
+  return any_data(message, [](const Data& data) { return data.writer == kAnnouncer && !data.payload.empty(); });
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(

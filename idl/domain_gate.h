@@ -26,9 +26,12 @@ namespace trammel::wire {
 /// Whether it holds a participant's announcement at all.
 [[nodiscard]] bool is_announcement(std::span<const unsigned char> message);
 
-/// Counts what a participant hears of itself, where it is among its own peers.
+/// What a participant hears of itself, where it is among its own peers: a proof that the library's threads move.
 struct HeardOfItself {
   std::atomic<std::uint64_t> announcements{0};  ///< dealt with by the thread that receives them
+  /// Entity id of a reliable writer of its own, its first octet the highest; 0 for none. What it writes is lost on its
+  /// first way back to the participant itself, at most twice a second: so that it comes only if what sends again moves.
+  std::atomic<std::uint32_t> first_lost_of{0};
 };
 
 /// `below`, with the gate in front of it. `heard` may be null.

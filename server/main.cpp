@@ -5,12 +5,19 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <mutex>
 #include <optional>
+#include <sstream>
 #include <string>
+#include <thread>
 
 #include "server/config/server_config.h"
+#include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
+#include "server/dds/watchdog.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -42,9 +49,20 @@ int exit_code(const Error& error) {
   }
 }
 
+/// Each line of the message is a problem of its own.
 int refuse(const Error& error) {
-  fmt::print(stderr, "trammeld: {}\n", error.message);
+  std::istringstream lines(error.message);
+  for (std::string line; std::getline(lines, line);) fmt::print(stderr, "trammeld: {}\n", line);
   return exit_code(error);
+}
+
+/// What a start would find.
+int check(const ServerReading& server, const std::string& path) {
+  const StartCheck found = check_start(server, path);
+  for (const std::string& note : found.notes) fmt::print("{}\n", note);
+  if (!found.problems.empty()) return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(found.problems, "\n"))});
+  fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
+  return 0;
 }
 
 Status start_log(const LogOptions& options) {
@@ -85,7 +103,8 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-/// The signals that end the service, blocked in every thread from here on; wait() takes the first that comes.
+/// The signals that end the service, blocked in every thread from here on and taken by one of its own: whoever hangs, a
+/// signal ends the process, at the latest kOrderlyStop after it.
 class StopSignals {
  public:
   StopSignals() {
@@ -93,20 +112,55 @@ class StopSignals {
     ::sigaddset(&signals_, SIGTERM);
     ::sigaddset(&signals_, SIGINT);
     ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    thread_ = std::jthread([this](const std::stop_token& over) { take(over); });
   }
-  [[nodiscard]] const char* wait() const {
-    int number = 0;
-    while (::sigwait(&signals_, &number) != 0) continue;
-    return ::strsignal(number);
+  ~StopSignals() {
+    thread_.request_stop();
+    ::pthread_kill(thread_.native_handle(), SIGTERM);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  /// Until the first comes.
+  [[nodiscard]] const char* wait() {
+    std::unique_lock lock(mutex_);
+    came_.wait(lock, [this] { return number_ != 0; });
+    return ::strsignal(number_);
   }
 
  private:
+  static constexpr std::chrono::milliseconds kOrderlyStop{10'000};
+  static constexpr std::chrono::milliseconds kTick{250};
+
+  void take(const std::stop_token& over) {
+    ::pthread_setname_np(::pthread_self(), "signals");
+    int number = 0;
+    while (::sigwait(&signals_, &number) != 0) continue;
+    if (over.stop_requested()) return;
+    {
+      const std::lock_guard lock(mutex_);
+      number_ = number;
+    }
+    came_.notify_all();
+    // Counted in ticks that were lived through: a process that is stopped meanwhile does not hang.
+    const timespec tick{0, std::chrono::nanoseconds(kTick).count()};
+    for (auto waited = kTick; waited <= kOrderlyStop; waited += kTick) {
+      ::sigtimedwait(&signals_, nullptr, &tick);
+      if (over.stop_requested()) return;
+    }
+    end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n");
+  }
+
   sigset_t signals_;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  int number_ = 0;  // guarded by mutex_
+  std::jthread thread_;
 };
 
 /// Serves until a signal says otherwise.
 Status serve(const ServerConfig& config) {
-  const StopSignals signals;  // before any thread starts
+  StopSignals signals;  // before any thread starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
   ModelRegistry registry;
@@ -139,19 +193,18 @@ Status serve(const ServerConfig& config) {
 }
 
 int run(const Arguments& arguments) {
-  auto config = read_server_config(arguments.config);
-  if (!config) return refuse(config.error());
-  if (arguments.store) config->store = *arguments.store;
-  if (arguments.port) config->dds.port = *arguments.port;
-  if (arguments.domain) config->dds.domain = *arguments.domain;
-  if (arguments.check) {
-    fmt::print("{}: good, {} cells\n", arguments.config, config->cells.size());
-    return 0;
-  }
-  if (auto log = start_log(config->log); !log) return refuse(log.error());
-  const Status served = serve(*config);
+  ServerReading server = read_server(arguments.config);
+  ServerConfig& config = server.config;
+  if (arguments.store) config.store = *arguments.store;
+  if (arguments.port) config.dds.port = *arguments.port;
+  if (arguments.domain) config.dds.domain = *arguments.domain;
+  if (arguments.check) return check(server, arguments.config);
+  if (!server.problems.empty())
+    return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(server.problems, "\n"))});
+  if (auto log = start_log(config.log); !log) return refuse(log.error());
+  const Status served = serve(config);
   if (served) return 0;
-  if (!config->log.file.empty()) spdlog::error("{}", served.error().message);
+  if (!config.log.file.empty()) spdlog::error("{}", served.error().message);
   return refuse(served.error());
 }
 
@@ -162,7 +215,7 @@ int main(int argc, char** argv) {
   CLI::App app("Serves compensated robot models over DDS.", "trammeld");
   trammel::Arguments arguments;
   app.add_option("--config", arguments.config, "server file, see config/server.yaml")->required();
-  app.add_flag("--check", arguments.check, "only read the server file and its cells");
+  app.add_flag("--check", arguments.check, "only say what a start or a first training would refuse; changes nothing");
   app.add_option("--store", arguments.store, "database instead of the server file's");
   app.add_option("--port", arguments.port, "UDP port instead of the server file's")->check(CLI::Range(1024, 65535));
   app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));

@@ -3,13 +3,16 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <filesystem>
 #include <limits>
 
+#include "server/base/near_miss.h"
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
+#include "server/bias/kernel_spelling.h"
+#include "server/error_sources/error_source.h"
+#include "server/error_sources/physical_model.h"
 
 namespace trammel {
 namespace {
@@ -66,6 +69,8 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
       map.refuse("peer_ports", fmt::format("'{}', expected a whole number, limit 1024 to 65535", text));
     }
     if (port == own) map.refuse("peer_ports", fmt::format("{} is this server's own port", port));
+    if (std::find(ports.begin(), ports.end(), port) != ports.end())
+      map.refuse("peer_ports", fmt::format("{} is given twice", port));
     ports.push_back(static_cast<std::uint16_t>(port));
   }
   return ports;
@@ -73,32 +78,42 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
 
 void read_dds(const YamlMap& map, DdsOptions& dds) {
   map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients"});
-  dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
-  dds.address = address(map, dds.address);
-  dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535));
-  dds.peer_ports = peer_ports(map, dds.port);
-  dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64);
-  dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000);
+  map.attempt([&] {
+    dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
+  });
+  map.attempt([&] { dds.address = address(map, dds.address); });
+  map.attempt([&] { dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535)); });
+  map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
+  map.attempt([&] { dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64); });
+  map.attempt([&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
   map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed"});
-  trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000);
-  trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000);
-  trainer.validation_share = number_within(map, "validation_share", trainer.validation_share, 0.05, 0.5);
-  trainer.accept_ratio = number_within(map, "accept_ratio", trainer.accept_ratio, 0.1, 10);
-  trainer.seed = static_cast<std::uint64_t>(
-      integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
+  map.attempt([&] { trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000); });
+  map.attempt([&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
+  map.attempt(
+      [&] { trainer.validation_share = number_within(map, "validation_share", trainer.validation_share, 0.05, 0.5); });
+  map.attempt([&] { trainer.accept_ratio = number_within(map, "accept_ratio", trainer.accept_ratio, 0.1, 10); });
+  map.attempt([&] {
+    trainer.seed = static_cast<std::uint64_t>(
+        integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
+  });
 }
 
 void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
   map.only({"level", "file"});
-  log.level = map.text("level", log.level);
-  const std::array known = {"debug", "info", "warn", "error"};
-  if (std::find(known.begin(), known.end(), log.level) == known.end()) {
-    map.refuse("level", fmt::format("'{}', expected {}", log.level, fmt::join(known, ", ")));
-  }
-  if (!map.is_null("file")) log.file = (folder / map.text("file")).string();
+  map.attempt([&] {
+    log.level = map.text("level", log.level);
+    const std::vector<std::string> known = {"debug", "info", "warn", "error"};
+    if (std::find(known.begin(), known.end(), log.level) == known.end()) {
+      map.refuse("level",
+                 fmt::format("'{}', expected {}{}", log.level, fmt::join(known, ", "), did_you_mean(log.level, known)));
+    }
+  });
+  map.attempt([&] {
+    if (!map.is_null("file")) log.file = (folder / map.text("file")).string();
+  });
 }
 
 /// The server file alone, and the cell files it names.
@@ -107,45 +122,97 @@ struct ServerFile {
   std::vector<std::string> cell_files;
 };
 
-ServerFile read_server_map(const YamlMap& map, const std::filesystem::path& folder) {
-  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
-  if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
-  ServerFile file;
-  file.config.dds.server_id = server_id(map, "server");
-  for (const std::string& cell : map.texts("cells")) file.cell_files.push_back((folder / cell).string());
-  if (file.cell_files.empty() || file.cell_files.size() > kMaxCells) {
-    map.refuse("cells", fmt::format("{} cell files, limit 1 to {}", file.cell_files.size(), kMaxCells));
+std::vector<std::string> cell_files_of(const YamlMap& map, const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  for (const std::string& cell : map.texts("cells")) files.push_back((folder / cell).string());
+  if (files.empty() || files.size() > kMaxCells) {
+    map.refuse("cells", fmt::format("{} cell files, limit 1 to {}", files.size(), kMaxCells));
   }
+  return files;
+}
+
+std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
   const std::string store = map.text("store");
   if (store.empty()) map.refuse("store", "expected a path");
-  file.config.store = (folder / store).string();
-  if (map.has("dds")) read_dds(map.map("dds"), file.config.dds);
-  if (map.has("trainer")) read_trainer(map.map("trainer"), file.config.trainer);
-  if (map.has("log")) read_log(map.map("log"), file.config.log, folder);
-  return file;
+  return (folder / store).string();
+}
+
+void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
+  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
+  map.attempt([&] {
+    if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+  });
+  ServerConfig& config = file.config;
+  map.attempt([&] { config.dds.server_id = server_id(map, "server"); });
+  map.attempt([&] { file.cell_files = cell_files_of(map, folder); });
+  map.attempt([&] { config.store = store_of(map, folder); });
+  map.attempt([&] {
+    if (map.has("dds")) read_dds(map.map("dds"), config.dds);
+  });
+  map.attempt([&] {
+    if (map.has("trainer")) read_trainer(map.map("trainer"), config.trainer);
+  });
+  map.attempt([&] {
+    if (map.has("log")) read_log(map.map("log"), config.log, folder);
+  });
+}
+
+/// What its first training would refuse.
+void check_training(const Cell& cell, const std::string& file, std::vector<std::string>& problems) {
+  const auto note = [&](const char* key, const std::string& why) {
+    problems.push_back(fmt::format("{}: model: {}: {}", file, key, why));
+  };
+  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error().message);
+  bool each_is_known = true;
+  for (const std::string& source : cell.model.error_sources) {
+    const auto made = make_error_source(source, cell);
+    if (!made) note("error_sources", made.error().message);
+    each_is_known = each_is_known && made;
+  }
+  if (!each_is_known) return;
+  const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
+  if (!together) note("error_sources", together.error().message);
+}
+
+void read_cells(const std::string& path, ServerFile& file, std::vector<std::string>& problems) {
+  std::map<std::string, std::string> file_of;
+  for (const std::string& cell_file : file.cell_files) {
+    auto cell = read_cell(cell_file);
+    if (!cell) {
+      problems.push_back(fmt::format("{}: cells: {}", path, cell.error().message));
+      continue;
+    }
+    const std::string name = cell->name;
+    if (name.size() > kMaxName)
+      problems.push_back(fmt::format("{}: cell: name of {} bytes, limit {}", cell_file, name.size(), kMaxName));
+    if (const auto [other, is_new] = file_of.emplace(name, cell_file); !is_new)
+      problems.push_back(fmt::format("{}: cells: {} and {} are both called {}", path, other->second, cell_file, name));
+    check_training(*cell, cell_file, problems);
+    file.config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
+  }
 }
 
 }  // namespace
 
-Result<ServerConfig> read_server_config(const std::string& path) {
+ServerReading read_server(const std::string& path) {
   const auto text = read_text_file(path);
-  if (!text) return tl::make_unexpected(text.error());
+  if (!text) return {{}, {text.error().message}};
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  auto file = read_yaml(*text, path, [&folder](const YamlMap& map) { return read_server_map(map, folder); });
-  if (!file) return tl::make_unexpected(file.error());
-  std::map<std::string, std::string> file_of;
-  for (const std::string& cell_file : file->cell_files) {
-    auto cell = read_cell(cell_file);
-    if (!cell) return tl::make_unexpected(cell.error());
-    const std::string name = cell->name;
-    if (name.size() > kMaxName)
-      return refused("{}: cell: name of {} bytes, limit {}", cell_file, name.size(), kMaxName);
-    if (const auto [other, is_new] = file_of.emplace(name, cell_file); !is_new) {
-      return refused("{}: cells: {} and {} are both called {}", path, other->second, cell_file, name);
-    }
-    file->config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
-  }
-  return std::move(file->config);
+  ServerFile file;
+  std::vector<std::string> problems;
+  const auto read = read_yaml(*text, path, [&](const YamlMap& map) {
+    read_server_map(map, folder, file);
+    return true;
+  });
+  if (!read) problems.push_back(read.error().message);
+  read_cells(path, file, problems);
+  return {std::move(file.config), std::move(problems)};
+}
+
+Result<ServerConfig> read_server_config(const std::string& path) {
+  ServerReading reading = read_server(path);
+  if (!reading.problems.empty()) return refused("{}", fmt::join(reading.problems, "\n"));
+  return std::move(reading.config);
 }
 
 }  // namespace trammel

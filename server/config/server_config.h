@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/base/result.h"
 #include "server/dds/dds_options.h"
@@ -26,8 +27,16 @@ struct ServerConfig {
 };
 
 /// Reads a server file (`config/server.yaml` has every key) and the cell files that it names. Paths in it are relative
-/// to it. Refuses, with file, key and limit: an unknown, doubled or missing key, a wrong type, a value out of range,
-/// two cells of one name, an address that leaves this host without `allow_network`.
+/// to it. Refuses, with file, key and limit, all of them at once, a line each: an unknown, doubled or missing key, a
+/// wrong type, a value out of range, two cells of one name, an address that leaves this host without `allow_network`, a
+/// bias or an error source that the first training would refuse.
 [[nodiscard]] Result<ServerConfig> read_server_config(const std::string& path);
+
+/// The same for those who want to know more: what could be read, and all that is wrong with the rest.
+struct ServerReading {
+  ServerConfig config;
+  std::vector<std::string> problems;  ///< a line each
+};
+[[nodiscard]] ServerReading read_server(const std::string& path);
 
 }  // namespace trammel

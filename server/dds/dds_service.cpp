@@ -1,7 +1,12 @@
 #include "server/dds/dds_service.h"
 
+#include <pthread.h>
+
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -15,6 +20,8 @@
 #include "server/dds/request_endpoint.h"
 #include "server/dds/service_events.h"
 #include "server/dds/state_topics.h"
+#include "server/dds/status_echo.h"
+#include "server/dds/watchdog.h"
 
 namespace trammel {
 namespace {
@@ -37,6 +44,21 @@ Status check_names(const DdsOptions& options, const Trainer& trainer) {
   return {};
 }
 
+/// What threads begun meanwhile are called, for those who look at the process: the library does not name its own.
+class ThreadName {
+ public:
+  explicit ThreadName(const char* name) {
+    ::pthread_getname_np(::pthread_self(), before_.data(), before_.size());
+    ::pthread_setname_np(::pthread_self(), name);
+  }
+  ~ThreadName() { ::pthread_setname_np(::pthread_self(), before_.data()); }
+  ThreadName(const ThreadName&) = delete;
+  ThreadName& operator=(const ThreadName&) = delete;
+
+ private:
+  std::array<char, 16> before_{};
+};
+
 }  // namespace
 
 class DdsService::Running {
@@ -44,26 +66,33 @@ class DdsService::Running {
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
+    auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
     auto events = std::make_unique<ServiceEvents>();
-    auto participant = wire::make_participant(
-        {"trammel server " + options.server_id, options.domain, options.address, options.port, options.peer_ports},
-        events.get());
+    const auto heard = std::make_shared<wire::HeardOfItself>();
+    auto participant = wire::make_participant({"trammel server " + options.server_id, options.domain, options.address,
+                                               options.port, options.peer_ports, heard},
+                                              events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
     if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
     auto topics = StateTopics::open(**participant);
     if (!topics) return tl::make_unexpected(topics.error());
+    auto echo = StatusEcho::open(**participant, *subscriber, topics->status_writer(), *heard);
+    if (!echo) return tl::make_unexpected(echo.error());
+    library.reset();
 
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
-                                                 std::move(*participant), *subscriber, *topics));
+                                                 std::move(*participant), *subscriber, *topics, std::move(*echo)));
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
+    running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
     return running;
   }
 
   ~Running() {
+    watchdog_.reset();
     status_thread_ = {};
     publish_status(wire::SERVICE_STOPPING);
     endpoints_.clear();
@@ -92,7 +121,7 @@ class DdsService::Running {
  private:
   Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry, PortLock port,
           std::unique_ptr<ServiceEvents> events, wire::ParticipantPtr participant, wire::dds::Subscriber& subscriber,
-          const StateTopics& topics)
+          const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
         registry_(registry),
@@ -101,6 +130,7 @@ class DdsService::Running {
         events_(std::move(events)),
         participant_(std::move(participant)),
         topics_(topics),
+        echo_(std::move(echo)),
         channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
         core_{options.server_id, *participant_, subscriber, handlers_, channels_} {}
 
@@ -121,13 +151,30 @@ class DdsService::Running {
   }
 
   void tell_status(const std::stop_token& stop) {
+    ::pthread_setname_np(::pthread_self(), "status");
     while (!stop.stop_requested()) {
       publish_status(wire::SERVICE_SERVING);
-      channels_.sweep();
+      ++status_steps_;
+      while (channels_.sweep()) ++status_steps_;
       for (const ReplyReader& reader : events_->wait(stop, wire::kStatusPeriod)) {
         channels_.expect(reader.partition, reader.topic);
+        ++status_steps_;
       }
     }
+  }
+
+  /// What proves that this service and the library below it still move, each counted by the thread that does it.
+  [[nodiscard]] std::vector<MovingPart> moving_parts(const std::shared_ptr<wire::HeardOfItself>& heard) const {
+    using Mark = std::optional<std::uint64_t>;
+    std::vector<MovingPart> parts = {{"discovery", [heard]() -> Mark { return heard->announcements.load(); }},
+                                     {"receiving", [this]() -> Mark { return echo_->heard(); }},
+                                     {"taking requests", [this] { return core_.taking.oldest(); }},
+                                     {"replying", [this] { return core_.replying.oldest(); }},
+                                     {"status", [this]() -> Mark { return status_steps_.load(); }}};
+    for (const auto& endpoint : endpoints_) {
+      parts.push_back({endpoint->name(), [at = endpoint.get()] { return at->unseen(); }});
+    }
+    return parts;
   }
 
   void publish_status(wire::ServiceState state) {
@@ -154,11 +201,14 @@ class DdsService::Running {
   std::unique_ptr<ServiceEvents> events_;
   wire::ParticipantPtr participant_;
   StateTopics topics_;
+  std::unique_ptr<StatusEcho> echo_;
   ReplyChannels channels_;
   ServiceCore core_;
   std::mutex mutex_;  // one model published at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::atomic<std::uint64_t> status_steps_{0};
   std::jthread status_thread_;
+  std::unique_ptr<Watchdog> watchdog_;
 };
 
 DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry)

@@ -14,7 +14,8 @@ namespace trammel {
 
 /// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
 /// requests (DdsOptions::compute_workers for each of PredictError and CorrectTarget, one for each other operation) and
-/// one that publishes its status every second; all stop in stop(). Thread-safe.
+/// one that publishes its status every second; all stop in stop(). A watchdog ends the process where these or the
+/// library's threads stop moving (watchdog.h). Thread-safe.
 class DdsService {
  public:
   /// `trainer`, `store` and `registry` outlive the service.

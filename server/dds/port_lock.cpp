@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <utility>
 
@@ -36,7 +37,11 @@ Result<PortLock> PortLock::take(const std::string& address, std::uint16_t port) 
   }
   const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const bool is_free = probe >= 0 && bind(probe, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0;
+  const int why = errno;
   if (probe >= 0) close(probe);
+  if (!is_free && why == EADDRNOTAVAIL) {
+    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address);
+  }
   if (!is_free) return failure(ErrorCode::kConflict, "UDP port {} on {} is taken by another program", port, address);
   return result;
 }

@@ -11,7 +11,8 @@ namespace trammel {
 /// client looks. Ends with the process, however that ends; leaves no file.
 class PortLock {
  public:
-  /// Refuses (kConflict) a port that another server, or any program, uses on `address`.
+  /// Refuses (kConflict) a port that another server, or any program, uses on `address`; (kUsage) an address that this
+  /// host does not have.
   [[nodiscard]] static Result<PortLock> take(const std::string& address, std::uint16_t port);
   ~PortLock();
   PortLock(PortLock&& other) noexcept;

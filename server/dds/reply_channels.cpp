@@ -11,6 +11,7 @@ using Clock = std::chrono::steady_clock;
 
 /// A client's reader is matched within a few announcements, or never.
 constexpr auto kPatience = 5 * wire::kAnnouncement;
+constexpr std::size_t kSweptAtOnce = 16;  // clients; each is up to six endpoints to delete
 
 }  // namespace
 
@@ -124,10 +125,10 @@ std::shared_ptr<ReplyChannels::Client> ReplyChannels::client(const std::string& 
   return result;
 }
 
-void ReplyChannels::sweep() {
+bool ReplyChannels::sweep() {
   std::vector<std::shared_ptr<Client>> gone;  // destroyed without the lock
   const std::lock_guard lock(mutex_);
-  for (auto entry = clients_.begin(); entry != clients_.end();) {
+  for (auto entry = clients_.begin(); entry != clients_.end() && gone.size() < kSweptAtOnce;) {
     const bool idle = Clock::now() - entry->second->last_used > kPatience;
     if (idle && entry->second->left()) {
       gone.push_back(std::move(entry->second));
@@ -136,6 +137,7 @@ void ReplyChannels::sweep() {
       ++entry;
     }
   }
+  return gone.size() == kSweptAtOnce;
 }
 
 std::size_t ReplyChannels::clients() const {

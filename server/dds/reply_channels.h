@@ -56,8 +56,8 @@ class ReplyChannels {
   /// `reply` is a sample of the topic's type. False when the client did not listen.
   [[nodiscard]] bool send(const std::string& partition, wire::dds::Topic* topic, void* reply,
                           const std::stop_token& stop);
-  /// Forgets clients that have left.
-  void sweep();
+  /// Forgets some of the clients that have left; whether there may be more of them.
+  bool sweep();
   [[nodiscard]] std::size_t clients() const;
 
  private:

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <pthread.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -9,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -20,6 +23,7 @@
 #include "server/dds/handlers.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/reply_memory.h"
+#include "server/dds/stillness.h"
 
 namespace trammel {
 
@@ -33,11 +37,17 @@ struct ServiceCore {
   std::atomic<std::uint64_t> requests{0};  ///< answered
   std::atomic<std::uint64_t> refused{0};   ///< of them, not with RESULT_OK
   std::atomic<std::uint64_t> unheard{0};   ///< of them, whose client had left
+  WorkUnderWay taking{};                   ///< of requests from their readers
+  WorkUnderWay replying{};
 };
 
 class RequestEndpointBase {
  public:
   virtual ~RequestEndpointBase() = default;
+  /// Of its operation.
+  [[nodiscard]] virtual const char* name() const = 0;
+  /// While requests have come that nobody looked for though somebody is free to: how many came before. Takes no lock.
+  [[nodiscard]] virtual std::optional<std::uint64_t> unseen() const = 0;
 };
 
 /// The reply to a request: the handler's, with its header; a remembered one for a repeat; an error for a wrong
@@ -107,6 +117,13 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     return endpoint;
   }
 
+  const char* name() const override { return Operation::kName; }
+  std::optional<std::uint64_t> unseen() const override {
+    const std::uint64_t looked = looked_;
+    if (arrivals_ == looked || idle_ == 0) return std::nullopt;
+    return looked;
+  }
+
   ~RequestEndpoint() override {
     for (std::jthread& worker : workers_) worker.request_stop();
     workers_.clear();
@@ -127,19 +144,27 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   }
 
   void work(const std::stop_token& stop) {
+    ::pthread_setname_np(::pthread_self(), "requests");
     Request request;
     wire::dds::SampleInfo info;
     while (!stop.stop_requested()) {
       std::unique_lock lock(mutex_);
       const std::uint64_t seen = arrivals_;
       lock.unlock();
-      while (!stop.stop_requested() &&
-             reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      while (!stop.stop_requested() && take(request, info)) {
         if (info.valid_data) serve(request, stop);
       }
+      ++idle_;
       lock.lock();
       arrived_.wait(lock, stop, [&] { return arrivals_ != seen; });
+      --idle_;
     }
+  }
+
+  bool take(Request& request, wire::dds::SampleInfo& info) {
+    const WorkUnderWay::Piece piece = core_.taking.begin();
+    looked_ = arrivals_.load();
+    return reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
   void serve(const Request& request, const std::stop_token& stop) {
@@ -148,6 +173,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     Reply reply = reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
     ++core_.requests;
     if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
+    const WorkUnderWay::Piece piece = core_.replying.begin();
     if (!core_.channels.send(request.header().reply_partition().to_string(), reply_topic_, &reply, stop)) {
       ++core_.unheard;
     }
@@ -159,7 +185,9 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   ReplyMemory<Reply> memory_;
   std::mutex mutex_;
   std::condition_variable_any arrived_;
-  std::uint64_t arrivals_ = 0;  // guarded by mutex_
+  std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_
+  std::atomic<std::uint64_t> looked_{0};    // arrivals when a worker last began to take
+  std::atomic<int> idle_{0};                // workers that wait for arrivals
   std::vector<std::jthread> workers_;
 };
 

@@ -13,6 +13,8 @@ class StateTopics {
  public:
   [[nodiscard]] static Result<StateTopics> open(wire::dds::DomainParticipant& participant);
 
+  [[nodiscard]] const wire::dds::DataWriter& status_writer() const { return *service_status_; }
+
   void publish(wire::ServiceStatus status);
   void publish(wire::TrainingProgress progress);
   /// ModelStatus and ModelSnapshot; a model too large for a sample has only the former.

@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "server/base/near_miss.h"
 #include "server/error_sources/sources.h"
 
 namespace trammel {
@@ -119,9 +120,10 @@ Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& ce
   if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
   const Known* known = find_known(cause_of(spec));
   if (known == nullptr) {
-    std::string names = "compliance";
-    for (const std::string& name : known_causes()) names += ", " + name;
-    return failure(ErrorCode::kUsage, "unknown error source '{}'; known: {}", spec, names);
+    std::vector<std::string> names = {"compliance"};
+    for (std::string& name : known_causes()) names.push_back(std::move(name));
+    return failure(ErrorCode::kUsage, "unknown error source '{}'{}; known: {}", spec,
+                   did_you_mean(cause_of(spec), names), fmt::join(names, ", "));
   }
   return parse_spec(spec, *known, cell).and_then([&](const SourceSpec& parsed) { return known->make(parsed, cell); });
 }

@@ -17,13 +17,7 @@ Vector3 read_vector(const YamlMap& map, const std::string& key) {
   return {v[0], v[1], v[2]};
 }
 
-Joint read_joint(const YamlMap& map) {
-  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg", "limits_mm", "sign",
-            "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm", "max_speed_deg_s", "max_speed_mm_s"});
-  Joint joint;
-  const std::string type = map.text("type", "revolute");
-  if (type != "revolute" && type != "prismatic") map.refuse("type", "expected revolute or prismatic");
-  joint.type = type == "revolute" ? JointType::kRevolute : JointType::kPrismatic;
+void read_link(const YamlMap& map, Joint& joint) {
   joint.hayati = map.boolean("hayati", false);
   if (joint.hayati && map.number("d_mm", 0) != 0) map.refuse("d_mm", "a Hayati link has no d");
   if (!joint.hayati && map.has("beta_deg")) map.refuse("beta_deg", "only a Hayati link has beta");
@@ -32,12 +26,10 @@ Joint read_joint(const YamlMap& map) {
   joint.link.a = from_mm(map.number("a_mm", 0));
   joint.link.alpha = from_deg(map.number("alpha_deg", 0));
   joint.link.beta = from_deg(map.number("beta_deg", 0));
-  joint.sign = map.number("sign", 1);
-  joint.gear_ratio = map.number("gear_ratio", 0);
-  joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
-  joint.mass = map.number("mass_kg", 0);
-  if (joint.mass < 0) map.refuse("mass_kg", "below 0");
-  if (map.has("cog_mm")) joint.p_cog = read_vector(map, "cog_mm") * from_mm(1);
+}
+
+/// How far and how fast the joint goes.
+void read_motion(const YamlMap& map, Joint& joint) {
   const bool revolute = joint.type == JointType::kRevolute;
   const std::string limits = revolute ? "limits_deg" : "limits_mm";
   const std::string speed = revolute ? "max_speed_deg_s" : "max_speed_mm_s";
@@ -48,6 +40,27 @@ Joint read_joint(const YamlMap& map) {
     joint.upper = si(range[1]);
   }
   if (map.has(speed)) joint.max_speed = si(map.number(speed));
+}
+
+Joint read_joint(const YamlMap& map) {
+  map.only({"type", "theta_deg", "d_mm", "a_mm", "alpha_deg", "beta_deg", "hayati", "limits_deg", "limits_mm", "sign",
+            "gear_ratio", "compliance_rad_per_nmm", "mass_kg", "cog_mm", "max_speed_deg_s", "max_speed_mm_s"});
+  Joint joint;
+  map.attempt([&] {
+    const std::string type = map.text("type", "revolute");
+    if (type != "revolute" && type != "prismatic") map.refuse("type", "expected revolute or prismatic");
+    joint.type = type == "revolute" ? JointType::kRevolute : JointType::kPrismatic;
+  });
+  map.attempt([&] { read_link(map, joint); });
+  map.attempt([&] {
+    joint.sign = map.number("sign", 1);
+    joint.gear_ratio = map.number("gear_ratio", 0);
+    joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
+    joint.mass = map.number("mass_kg", 0);
+    if (joint.mass < 0) map.refuse("mass_kg", "below 0");
+    if (map.has("cog_mm")) joint.p_cog = read_vector(map, "cog_mm") * from_mm(1);
+  });
+  map.attempt([&] { read_motion(map, joint); });
   return joint;
 }
 
@@ -91,50 +104,81 @@ Tracker read_tracker(const YamlMap& map) {
   return tracker;
 }
 
-Cell read_cell_map(const YamlMap& map) {
-  map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm"});
-  if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
-  Cell cell;
-  cell.name = map.text("cell");
-  if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
-    map.refuse("cell", "expected a name without blanks, '@' and '/'");
-  }
-  if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
-  if (map.has("gravity")) {
-    cell.gravity_W = read_vector(map, "gravity");
-    if (cell.gravity_W.norm() < 1e-9) map.refuse("gravity", "a direction of length 0");
-    cell.gravity_W.normalize();
-  }
+void read_tools(const YamlMap& map, Cell& cell) {
   if (!map.is_null("tools")) {
     const YamlMap tools = map.map("tools");
     for (const std::string& name : tools.keys()) {
-      cell.tools[name] = tools.is_null(name) ? std::nullopt : std::optional<Pose>(read_pose(tools.map(name)));
+      tools.attempt([&] {
+        cell.tools[name] = std::nullopt;
+        if (!tools.is_null(name)) cell.tools[name] = read_pose(tools.map(name));
+      });
     }
   }
   if (cell.tools.empty()) map.refuse("tools", "at least one tool is needed (null when its pose is unknown)");
-  if (!map.is_null("payloads")) {
-    const YamlMap payloads = map.map("payloads");
-    for (const std::string& name : payloads.keys()) {
+}
+
+void read_payloads(const YamlMap& map, Cell& cell) {
+  if (map.is_null("payloads")) return;
+  const YamlMap payloads = map.map("payloads");
+  for (const std::string& name : payloads.keys()) {
+    payloads.attempt([&] {
       const YamlMap entry = payloads.map(name);
       entry.only({"mass_kg", "cog_mm"});
       Payload payload{entry.number("mass_kg"), read_vector(entry, "cog_mm") * from_mm(1)};
       if (payload.mass < 0) entry.refuse("mass_kg", "below 0");
       cell.payloads[name] = payload;
-    }
+    });
   }
-  if (map.has("tracker")) cell.tracker = read_tracker(map.map("tracker"));
-  if (map.has("model")) {
-    const YamlMap model = map.map("model");
-    model.only({"error_sources", "bias"});
+}
+
+void read_model(const YamlMap& map, Cell& cell) {
+  if (!map.has("model")) return;
+  const YamlMap model = map.map("model");
+  model.only({"error_sources", "bias"});
+  model.attempt([&] {
     if (model.has("error_sources")) cell.model.error_sources = model.texts("error_sources");
-    cell.model.bias = model.text("bias", cell.model.bias);
-  }
-  if (map.has("workspace_mm")) {
+  });
+  model.attempt([&] { cell.model.bias = model.text("bias", cell.model.bias); });
+}
+
+void read_surroundings(const YamlMap& map, Cell& cell) {
+  map.attempt([&] {
+    if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
+  });
+  map.attempt([&] {
+    if (!map.has("gravity")) return;
+    cell.gravity_W = read_vector(map, "gravity");
+    if (cell.gravity_W.norm() < 1e-9) map.refuse("gravity", "a direction of length 0");
+    cell.gravity_W.normalize();
+  });
+  map.attempt([&] {
+    if (map.has("tracker")) cell.tracker = read_tracker(map.map("tracker"));
+  });
+  map.attempt([&] {
+    if (!map.has("workspace_mm")) return;
     const YamlMap box = map.map("workspace_mm");
     box.only({"lower", "upper"});
     cell.workspace = Workspace{read_vector(box, "lower") * from_mm(1), read_vector(box, "upper") * from_mm(1)};
-  }
+  });
+}
+
+Cell read_cell_map(const YamlMap& map) {
+  map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
+            "workspace_mm"});
+  Cell cell;
+  map.attempt([&] {
+    if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+  });
+  map.attempt([&] {
+    cell.name = map.text("cell");
+    if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
+      map.refuse("cell", "expected a name without blanks, '@' and '/'");
+    }
+  });
+  read_surroundings(map, cell);
+  map.attempt([&] { read_tools(map, cell); });
+  map.attempt([&] { read_payloads(map, cell); });
+  map.attempt([&] { read_model(map, cell); });
   return cell;
 }
 
@@ -181,32 +225,49 @@ Result<Chain> read_robot(const std::string& path) {
   return read_text_file(path).and_then([&](const std::string& text) { return parse_robot(text, path); });
 }
 
-Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {
-  Result<Chain> robot = parse_robot(robot_yaml, where + " (robot)");
-  if (!robot) return tl::make_unexpected(robot.error());
-  Result<Cell> cell = read_yaml(cell_yaml, where, [&](const YamlMap& map) {
-    Cell read = read_cell_map(map);
-    read.robot = *robot;
-    read_joint_ranges(map, read);
-    return read;
+namespace {
+
+/// Whatever became of its robot, all that is wrong with the cell is said.
+Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml, const std::string& where) {
+  return read_yaml(cell_yaml, where, [&](const YamlMap& map) {
+    Cell cell = read_cell_map(map);
+    if (!robot) throw YamlRefusal{robot.error().message};
+    cell.robot = *robot;
+    map.attempt([&] { read_joint_ranges(map, cell); });
+    cell.cell_yaml = cell_yaml;
+    return cell;
   });
-  if (cell) {
-    cell->cell_yaml = cell_yaml;
-    cell->robot_yaml = robot_yaml;
-  }
+}
+
+/// Of the robot that the cell names; its path is relative to the cell's.
+Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
+  const Result<std::string> name = read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); });
+  if (!name) return tl::make_unexpected(name.error());
+  robot_path = (std::filesystem::path(path).parent_path() / *name).string();
+  return read_text_file(robot_path).map_error([&](Error error) {
+    error.message = fmt::format("{}: robot: {}", path, error.message);
+    return error;
+  });
+}
+
+}  // namespace
+
+Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {
+  Result<Cell> cell = cell_with(parse_robot(robot_yaml, where + " (robot)"), cell_yaml, where);
+  if (cell) cell->robot_yaml = robot_yaml;
   return cell;
 }
 
 Result<Cell> read_cell(const std::string& path) {
-  const Result<std::string> cell_text = read_text_file(path);
-  if (!cell_text) return tl::make_unexpected(cell_text.error());
-  const Result<std::string> robot_file =
-      read_yaml(*cell_text, path, [](const YamlMap& map) { return map.text("robot"); });
-  if (!robot_file) return tl::make_unexpected(robot_file.error());
-  const Result<std::string> robot_text =
-      read_text_file((std::filesystem::path(path).parent_path() / *robot_file).string());
-  if (!robot_text) return refused("{}: robot: {}", path, robot_text.error().message);
-  return parse_cell(*cell_text, *robot_text, path);
+  const Result<std::string> cell_yaml = read_text_file(path);
+  if (!cell_yaml) return tl::make_unexpected(cell_yaml.error());
+  std::string robot_path;
+  const Result<std::string> robot_yaml = robot_text_of(*cell_yaml, path, robot_path);
+  const Result<Chain> robot =
+      robot_yaml.and_then([&](const std::string& text) { return parse_robot(text, robot_path); });
+  Result<Cell> cell = cell_with(robot, *cell_yaml, path);
+  if (cell) cell->robot_yaml = *robot_yaml;
+  return cell;
 }
 
 namespace {

@@ -11,13 +11,12 @@
 #include <utility>
 
 #include "server/base/hash.h"
+#include "server/store/file_header.h"
 #include "server/store/writer_lock.h"
 
 namespace trammel {
 namespace {
 
-constexpr int kApplicationId = 0x54524D4C;  // "TRML", in the file's header
-constexpr int kSchemaVersion = 2;
 constexpr int kPagesKept = 20;      // of diagnoses; their findings are kept for ever
 constexpr int kBusyTimeout = 5000;  // ms, for whoever else reads the file
 

@@ -20,12 +20,32 @@ std::string holder_of(int descriptor) {
   return pid.substr(0, pid.find('\n'));
 }
 
-}  // namespace
-
-Result<WriterLock> WriterLock::take(const std::string& file) {
+std::string lock_path_of(const std::string& file) {
   std::error_code unknown;
   const auto real = std::filesystem::weakly_canonical(file, unknown);
-  const std::string path = (unknown ? file : real.string()) + ".lock";
+  return (unknown ? file : real.string()) + ".lock";
+}
+
+tl::unexpected<Error> held(const std::string& file, int descriptor, const std::string& lock) {
+  return failure(ErrorCode::kConflict, "{} is being written by process {} (lock {}); one writer at a time", file,
+                 holder_of(descriptor), lock);
+}
+
+}  // namespace
+
+Status WriterLock::look(const std::string& file) {
+  const std::string path = lock_path_of(file);
+  const WriterLock lock(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (lock.descriptor_ < 0) {
+    if (errno == ENOENT) return {};
+    return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, std::strerror(errno));
+  }
+  if (::flock(lock.descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return {};
+  return held(file, lock.descriptor_, path);
+}
+
+Result<WriterLock> WriterLock::take(const std::string& file) {
+  const std::string path = lock_path_of(file);
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (descriptor < 0) return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, std::strerror(errno));
   WriterLock lock(descriptor);
@@ -33,8 +53,7 @@ Result<WriterLock> WriterLock::take(const std::string& file) {
     if (errno != EWOULDBLOCK) {
       return failure(ErrorCode::kInternal, "{}: cannot be locked: {}", path, std::strerror(errno));
     }
-    return failure(ErrorCode::kConflict, "{} is being written by process {} (lock {}); one writer at a time", file,
-                   holder_of(descriptor), path);
+    return held(file, descriptor, path);
   }
   const std::string pid = std::to_string(::getpid()) + "\n";
   if (::ftruncate(descriptor, 0) != 0 || ::pwrite(descriptor, pid.data(), pid.size(), 0) < 0) {

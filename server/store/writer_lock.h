@@ -14,6 +14,8 @@ class WriterLock {
   /// Refuses (kConflict) when somebody has it already, this process included. Links and relative paths to the same file
   /// meet at one lock.
   [[nodiscard]] static Result<WriterLock> take(const std::string& file);
+  /// Refuses (kConflict) when somebody has it; takes nothing and leaves no file.
+  [[nodiscard]] static Status look(const std::string& file);
   WriterLock(WriterLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   WriterLock& operator=(WriterLock&&) = delete;
   ~WriterLock();

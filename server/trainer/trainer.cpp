@@ -1,5 +1,7 @@
 #include "server/trainer/trainer.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -212,7 +214,10 @@ Result<std::vector<std::string>> Trainer::start() {
   }
   for (const StoredJob& job : *taken_up_) report(progress_of(job));
   taken_up_.reset();
-  worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  worker_ = std::jthread([this](const std::stop_token& stop) {
+    ::pthread_setname_np(::pthread_self(), "trainer");
+    work(stop);
+  });
   return notices;
 }
 

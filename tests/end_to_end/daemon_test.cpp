@@ -119,6 +119,59 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortIsRefused) {
   EXPECT_EQ(daemon_.stop(), 0);
 }
 
+TEST_F(DaemonTest, AnImportOfAnyBytesIsRefusedAndTheDaemonGoesOn) {
+  wait_for(submit("lt-07", 60));
+  const client::ModelInfo before = model();
+  const std::string head = R"({"trammel_model":1,"content":)";
+  for (const std::string& text : {head + std::string(1'000'000, '['), std::string(30'000'000, '['), std::string("{}"),
+                                  head + "{\"a\":" + std::string(20'000'000, '7') + "}}"}) {
+    const auto imported = session_->import_model("cell-7", text);
+    ASSERT_FALSE(imported);
+    EXPECT_EQ(imported.error().message.find("no server"), std::string::npos) << imported.error().message;
+    EXPECT_EQ(imported.error().message.rfind("imported model: ", 0), 0u) << imported.error().message;
+  }
+  EXPECT_EQ(model().hash, before.hash);
+  EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
+}
+
+TEST_F(DaemonTest, AClientOfAnotherDomainIsNotAnswered) {
+  const std::string trammel = TRAMMEL_BINARY_DIR "/clients/trammel";
+  const auto status = [&](std::uint32_t domain) {
+    return test::run({trammel, "status", "--service", "--port", std::to_string(daemon_.port()), "--domain",
+                      std::to_string(domain), "--timeout", "3"});
+  };
+  EXPECT_EQ(status(daemon_.domain()).exit_code, 0);
+  const auto other = status(daemon_.domain() + 65);
+  EXPECT_EQ(other.exit_code, 4) << other.out << other.err;
+  EXPECT_NE(other.err.find(fmt::format("domain {}", daemon_.domain() + 65)), std::string::npos) << other.err;
+  EXPECT_EQ(status(daemon_.domain()).exit_code, 0);
+}
+
+TEST_F(DaemonTest, DaemonsOfTwoDomainsEachAnswerTheirOwn) {
+  auto second = daemon_.command_line();
+  const std::uint16_t port = daemon_.port() + 2;
+  const std::uint32_t domain = daemon_.domain() + 65;
+  second[4] = std::to_string(port);
+  second[6] = std::to_string(domain);
+  second.insert(second.end(), {"--store", daemon_.store_path() + "2"});
+  test::Process other(second);
+  ASSERT_TRUE(other.wait_for_line("ready", std::chrono::seconds(30))) << other.standard_error();
+
+  // Each client looks at both ports.
+  for (const std::uint32_t of : {daemon_.domain(), domain}) {
+    client::SessionOptions options = daemon_.session_options();
+    options.domain = of;
+    options.server_ports = {daemon_.port(), port};
+    auto session = client::Session::open(options);
+    ASSERT_TRUE(session) << session.error().message;
+    const auto servers = (*session)->servers();
+    ASSERT_TRUE(servers) << servers.error().message;
+    EXPECT_EQ(servers->size(), 1u);
+  }
+  other.signal(SIGTERM);
+  EXPECT_EQ(other.wait(std::chrono::seconds(30)), 0) << other.standard_error();
+}
+
 TEST(DaemonCommandLine, ExitsWith2OnWrongUsage) {
   EXPECT_EQ(test::run({test::trammeld_path()}).exit_code, 2);
   EXPECT_EQ(test::run({test::trammeld_path(), "--config", "x", "--bogus"}).exit_code, 2);
@@ -134,6 +187,23 @@ TEST(DaemonCommandLine, ExitsWith3OnARefusedServerFileAndNamesIt) {
   EXPECT_NE(refused.err.find(file), std::string::npos) << refused.err;
   EXPECT_NE(refused.err.find("bogus"), std::string::npos) << refused.err;
   EXPECT_TRUE(refused.out.empty()) << refused.out;
+}
+
+TEST(DaemonCommandLine, RefusesTheSameMistakesWhenCheckedAndWhenStarted) {
+  const test::TemporaryFolder folder;
+  folder.write("cell.yaml", "version: 1\ncell: a\nrobot: " TRAMMEL_SOURCE_DIR
+                            "/models/abb_irb6640-205-275.yaml\ntools: {t: null}\n"
+                            "model: {error_sources: [base, complience], bias: rbf}\n");
+  const std::string file = folder.write("server.yaml", "version: 1\nserver: a\ncells: [cell.yaml]\nstore: t.db\n");
+  for (const bool check : {true, false}) {
+    std::vector<std::string> command = {test::trammeld_path(), "--config", file};
+    if (check) command.emplace_back("--check");
+    const auto refused = test::run(command);
+    EXPECT_EQ(refused.exit_code, 3);
+    EXPECT_NE(refused.err.find("did you mean compliance?"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("`rbf` is unknown"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.file("t.db")));
+  }
 }
 
 TEST(DaemonCommandLine, ChecksWhatShipsWithoutServing) {

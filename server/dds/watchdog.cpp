@@ -1,0 +1,62 @@
+#include "server/dds/watchdog.h"
+
+#include <poll.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <mutex>
+#include <utility>
+
+namespace trammel {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Formatted without memory from the heap.
+[[noreturn]] void end_hung(const std::vector<const char*>& stopped) {
+  std::array<char, 256> names{};
+  for (const char* name : stopped) {
+    const std::size_t length = std::strlen(names.data());
+    std::snprintf(names.data() + length, names.size() - length, "%s%s", length == 0 ? "" : ", ", name);
+  }
+  std::array<char, 512> line{};
+  std::snprintf(line.data(), line.size(),
+                "trammeld: hangs: no progress for %lld s in: %s; ends at once, to be started again\n",
+                static_cast<long long>(Watchdog::kLimit.count() / 1000), names.data());
+  end_at_once(line.data());
+}
+
+}  // namespace
+
+void end_at_once(const char* line) {
+  pollfd out{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&out, 1, 0) == 1 && (out.revents & POLLOUT) != 0) {
+    static_cast<void>(!::write(STDERR_FILENO, line, std::strlen(line)));
+  }
+  ::_exit(kExitHung);
+}
+
+Watchdog::Watchdog(std::vector<MovingPart> parts)
+    : stillness_(std::move(parts), kTick, kLimit), thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+void Watchdog::watch(const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "watchdog");
+  std::mutex mutex;
+  std::condition_variable_any never;
+  std::unique_lock lock(mutex);
+  Clock::time_point last = Clock::now();
+  while (!stop.stop_requested()) {
+    never.wait_for(lock, stop, kTick, [] { return false; });
+    const Clock::time_point now = Clock::now();
+    const auto stopped = stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(now - last));
+    last = now;
+    if (!stopped.empty() && !stop.stop_requested()) end_hung(stopped);
+  }
+}
+
+}  // namespace trammel

@@ -1,0 +1,81 @@
+#include "server/store/store_check.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "server/store/file_header.h"
+#include "server/store/writer_lock.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kMagic("SQLite format 3\0", 16);
+constexpr std::size_t kHeader = 100;  // bytes
+constexpr std::size_t kSchemaAt = 60, kApplicationAt = 68;
+
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char c : bytes) value = value << 8 | static_cast<unsigned char>(c);
+  return value;
+}
+
+Status check_folder(const fs::path& path) {
+  std::error_code error;
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (!fs::exists(folder, error))
+    return refused("{}: its folder {} is not there; create it, or name another", path.string(), folder.string());
+  if (!fs::is_directory(folder, error))
+    return refused("{}: {} is no folder; name another", path.string(), folder.string());
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    return refused("{}: its folder {} cannot be written to: {}; change its owner or its mode", path.string(),
+                   folder.string(), std::strerror(errno));
+  return {};
+}
+
+/// Of a file that is there and not empty. What is still in its journal it does not say.
+Status check_header(const fs::path& path) {
+  std::string header(kHeader, '\0');
+  std::ifstream in(path, std::ios::binary);
+  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) || !header.starts_with(kMagic))
+    return refused("{}: no store: not an SQLite file; name another, or move this one away", path.string());
+  const auto application = big_endian(std::string_view(header).substr(kApplicationAt, 4));
+  const auto schema = big_endian(std::string_view(header).substr(kSchemaAt, 4));
+  std::error_code error;
+  const bool in_journal = application == 0 && schema == 0 && fs::exists(path.string() + "-wal", error);
+  if (in_journal) return {};
+  if (application != static_cast<std::uint32_t>(kApplicationId))
+    return refused("{}: a database of another program (application id {:#x}, not {:#x}); name another", path.string(),
+                   application, kApplicationId);
+  if (schema > static_cast<std::uint32_t>(kSchemaVersion))
+    return refused("{}: schema {} is newer than this program's, limit {}; start a newer one", path.string(), schema,
+                   kSchemaVersion);
+  return {};
+}
+
+Status check_file(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return {};
+  if (!fs::is_regular_file(path, error)) return refused("{}: no store: not a file; name another", path.string());
+  if (::access(path.c_str(), R_OK | W_OK) != 0)
+    return refused("{}: cannot be read and written: {}; change its owner or its mode", path.string(),
+                   std::strerror(errno));
+  if (fs::file_size(path, error) == 0) return {};
+  return check_header(path);
+}
+
+}  // namespace
+
+Status check_store(const std::string& path) {
+  return check_folder(path).and_then([&] { return check_file(path); }).and_then([&] { return WriterLock::look(path); });
+}
+
+}  // namespace trammel

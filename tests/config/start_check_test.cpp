@@ -1,0 +1,182 @@
+#include "server/config/start_check.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "server/dds/port_lock.h"
+#include "server/store/store.h"
+#include "tests/support/demand.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::uint16_t own_port() { return static_cast<std::uint16_t>(20000 + 4 * (::getpid() % 3000)); }
+
+class StartCheckTest : public testing::Test {
+ protected:
+  StartCheckTest() {
+    folder_.write("robot.yaml", test::small_robot_yaml());
+    folder_.write("cell-7.yaml", test::small_cell_yaml("cell-7"));
+    folder_.write("cell-8.yaml", test::small_cell_yaml("cell-8"));
+    write_server("");
+  }
+  void write_server(const std::string& more, const std::string& store = "t.db") {
+    server_ =
+        folder_.write("server.yaml", fmt::format("version: 1\nserver: a\ncells: [cell-7.yaml, cell-8.yaml]\nstore: {}\n"
+                                                 "dds: {{port: {}}}\n{}",
+                                                 store, own_port(), more));
+  }
+  /// cell-7 with `old` replaced.
+  void change_cell(const std::string& old, const std::string& with) {
+    std::string cell = test::small_cell_yaml("cell-7");
+    const auto at = cell.find(old);
+    ASSERT_NE(at, std::string::npos) << old;
+    folder_.write("cell-7.yaml", cell.replace(at, old.size(), with));
+  }
+  /// After which the folder holds what it held.
+  StartCheck check() const {
+    const auto before = listing();
+    StartCheck found = check_start(read_server(server_), server_);
+    EXPECT_EQ(listing(), before) << "the check changed something";
+    return found;
+  }
+  std::string problems() const { return fmt::format("{}", fmt::join(check().problems, "\n")); }
+  void expect_problem(const std::vector<std::string>& parts) const {
+    const std::vector<std::string> found = check().problems;
+    const auto says_all = [&](const std::string& problem) {
+      return std::all_of(parts.begin(), parts.end(),
+                         [&](const std::string& part) { return problem.find(part) != std::string::npos; });
+    };
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), says_all))
+        << fmt::format("{} is not in\n{}", fmt::join(parts, " ... "), fmt::join(found, "\n"));
+  }
+
+  test::TemporaryFolder folder_;
+  std::string server_;
+
+ private:
+  std::map<std::string, std::string> listing() const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
+      files[entry.path().string()] = entry.is_regular_file() ? test::read_file(entry.path().string()) : "";
+    }
+    return files;
+  }
+};
+
+TEST_F(StartCheckTest, WhatCanStartHasNoProblems) {
+  EXPECT_EQ(problems(), "");
+  static_cast<void>(test::demand(Store::open(folder_.file("t.db"))));  // a store that was there before
+  EXPECT_EQ(problems(), "");
+}
+
+TEST_F(StartCheckTest, WhatTheFirstTrainingWouldRefuseIsNamedWithFileKeyAndValue) {
+  change_cell("bias: none", "bias: rbf");
+  expect_problem({"cell-7.yaml", "model: bias:", "`rbf` is unknown", "se"});
+  change_cell("[base]", "[base, complience]");
+  expect_problem({"cell-7.yaml", "model: error_sources:", "'complience'", "did you mean compliance?"});
+  change_cell("[base]", "[payload]");
+  expect_problem({"cell-7.yaml", "'payload'", "has no payload"});
+  change_cell("[base]", "[compliance_first_order, compliance_linear]");
+  expect_problem({"cell-7.yaml", "two forms of one cause"});
+  change_cell("[base]", "['gear_transmission:9']");
+  expect_problem({"cell-7.yaml", "gear_transmission:9", "1 to 6"});
+  change_cell("[base]", "[base, base]");
+  expect_problem({"cell-7.yaml", "'base' given twice"});
+}
+
+TEST_F(StartCheckTest, WhatIsWrongWithTheFilesIsNamed) {
+  change_cell("robot.yaml", "nowhere.yaml");
+  expect_problem({"cell-7.yaml", "robot:", "nowhere.yaml", "no such file"});
+  change_cell("tracker:", "traker:");
+  expect_problem({"cell-7.yaml", "traker", "did you mean tracker?"});
+  folder_.write("robot.yaml", "version: 1\nname: x\njoints: [{d_mm: long, a_mm: 1, limits_deg: [0, 1]}]\n");
+  expect_problem({"robot.yaml", "joints 1", "d_mm", "expected a number"});
+  write_server("log: {level: wran}\n");
+  expect_problem({"server.yaml", "log: level", "'wran'", "did you mean warn?"});
+  write_server("trainr: {}\n");
+  expect_problem({"server.yaml", "trainr", "did you mean trainer?"});
+}
+
+TEST_F(StartCheckTest, EveryProblemIsNamedInOneRun) {
+  change_cell("bias: none", "bias: rbf");
+  folder_.write("cell-8.yaml",
+                "version: 2\ncell: a b\nrobot: nowhere.yaml\ntools: {}\ntracker: {sigma_mm: -1}\nnoise: 1\n"
+                "model: {error_sources: base}\n");
+  write_server("trainer: {seed: -1, accept_ratio: 99}\nlog: {level: loud}\n", "nowhere/t.db");
+  for (const std::vector<std::string>& parts :
+       std::vector<std::vector<std::string>>{{"cell-7.yaml", "rbf"},
+                                             {"cell-8.yaml", "version", "expected 1"},
+                                             {"cell-8.yaml", "cell", "without blanks"},
+                                             {"cell-8.yaml", "tools", "at least one"},
+                                             {"cell-8.yaml", "sigma_mm", "above 0"},
+                                             {"cell-8.yaml", "noise", "unknown key"},
+                                             {"cell-8.yaml", "error_sources", "list"},
+                                             {"cell-8.yaml", "robot", "nowhere.yaml"},
+                                             {"server.yaml", "seed", "-1"},
+                                             {"server.yaml", "accept_ratio", "99"},
+                                             {"server.yaml", "level", "loud"},
+                                             {"server.yaml", "store", "nowhere", "not there"}}) {
+    expect_problem(parts);
+  }
+}
+
+TEST_F(StartCheckTest, AStoreThatCouldNotBeOpenedIsNamed) {
+  write_server("", "nowhere/t.db");
+  expect_problem({"server.yaml: store:", "nowhere", "is not there", "create it"});
+  write_server("", "cell-7.yaml/t.db");
+  expect_problem({"server.yaml: store:", "is no folder"});
+  write_server("", ".");
+  expect_problem({"server.yaml: store:", "not a file"});
+  folder_.write("notes.db", std::string(200, 'x'));
+  write_server("", "notes.db");
+  expect_problem({"server.yaml: store:", "not an SQLite file"});
+  std::string header = "SQLite format 3" + std::string(1, '\0') + std::string(84, '\0');
+  header.replace(60, 4, std::string("\0\0\0\x63", 4));
+  header.replace(68, 4, "TRML");
+  folder_.write("new.db", header);
+  write_server("", "new.db");
+  expect_problem({"server.yaml: store:", "schema 99 is newer"});
+  header.replace(68, 4, "ABCD");
+  folder_.write("other.db", header);
+  write_server("", "other.db");
+  expect_problem({"server.yaml: store:", "another program"});
+}
+
+TEST_F(StartCheckTest, APortOrAnAddressThatCannotBeHadIsNamed) {
+  {
+    const auto taken = test::demand(PortLock::take("127.0.0.1", own_port()));
+    expect_problem({"server.yaml: dds: port:", std::to_string(own_port())});
+  }
+  EXPECT_EQ(problems(), "");
+  server_ = folder_.write("server.yaml",
+                          "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n"
+                          "dds: {address: 203.0.113.77, allow_network: true}\n");
+  expect_problem({"server.yaml: dds: address:", "203.0.113.77", "not one of this host's"});
+}
+
+TEST_F(StartCheckTest, TheServerThatRunsAlreadyIsANote) {
+  const auto store = test::demand(Store::open(folder_.file("t.db")));
+  expect_problem({"server.yaml: store:", "is being written by process"});
+  const auto port = test::demand(PortLock::take("127.0.0.1", own_port()));
+  const StartCheck found = check_start(read_server(server_), server_);
+  EXPECT_TRUE(found.problems.empty()) << found.problems.front();
+  ASSERT_EQ(found.notes.size(), 1u);
+  EXPECT_NE(found.notes[0].find("runs already"), std::string::npos);
+}
+
+TEST_F(StartCheckTest, ALogFileThatCannotBeWrittenIsNamed) {
+  write_server("log: {file: nowhere/x.log}\n");
+  expect_problem({"server.yaml: log: file:", "nowhere/x.log", "cannot be written"});
+}
+
+}  // namespace
+}  // namespace trammel
