@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <random>
-#include <filesystem>
 
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/batch_file.h"
@@ -99,8 +99,9 @@ TEST(PlaySign, ARealRobotWhoseDirectionsAreItsMovesIsNotToldToAdjustItsGears) {
   for (Measurement& m : batch.measurements) {  // the rows of the whole series, in order
     m.context.direction.assign(6, 0);
     for (int j = 0; last != nullptr && j < 6; ++j)
-      m.context.direction[static_cast<std::size_t>(j)] =
-          m.context.q(j) > (*last)(j) ? 1 : m.context.q(j) < (*last)(j) ? -1 : 0;
+      m.context.direction[static_cast<std::size_t>(j)] = m.context.q(j) > (*last)(j)   ? 1
+                                                         : m.context.q(j) < (*last)(j) ? -1
+                                                                                       : 0;
     last = &m.context.q;
   }
   for (std::size_t i = 0; 9 * i < batch.measurements.size(); ++i) batch.measurements[i] = batch.measurements[9 * i];
