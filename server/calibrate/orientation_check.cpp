@@ -24,8 +24,8 @@ constexpr double kMuchBetter = 0.25;            // of the rms as given, that ano
 constexpr double kCap = from_deg(30);           // off is off
 constexpr double kNoModelError = 0.025;         // m rms: what no model of a robot leaves,
 constexpr double kNoModelShare = 0.05;          // and of how far the positions spread
-constexpr double kLeastLever = 20;              // times the residual: spread of positions that tells where the base points
-constexpr double kBadPosition = 6;              // times the median residual: a pose that is out as a whole
+constexpr double kLeastLever = 20;  // times the residual: spread of positions that tells where the base points
+constexpr double kBadPosition = 6;  // times the median residual: a pose that is out as a whole
 constexpr double kMostBadPositions = 0.1;
 constexpr std::size_t kMostTries = 40;       // poses whose own R_FT is tried
 constexpr std::size_t kMostPositions = 300;  // evenly drawn beyond
@@ -192,8 +192,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
       reading("as given", group, q_WB, as_it_is),
       reading("as xyzw", group, q_WB, from_xyzw),
       reading("as the inverse", group, q_WB, inverse),
-      reading("as xyzw and the inverse", group, q_WB,
-              [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
+      reading("as xyzw and the inverse", group, q_WB, [](const Quaternion& q) { return from_xyzw(q).conjugate(); }),
       reading("as wxyz under an xyzw header", group, q_WB, from_wxyz),
       reading("as wxyz under an xyzw header and the inverse", group, q_WB,
               [](const Quaternion& q) { return from_wxyz(q).conjugate(); }),

@@ -9,10 +9,10 @@
 /// Whether measured orientations are those of the commanded joints, before anything is identified from them.
 ///
 /// The model: R_WT = R_WB R_BF(q) R_FT, to the few degrees that a nominal chain may be off. R_WB is what the positions
-/// say (or the cell), and so R_BF(q)' R_WB' R_WT is one and the same rotation at every pose of a tool: its R_FT. How far
-/// the poses scatter about it says whether the orientations follow the joints; how far it stands from the cell's own
-/// R_FT, whether they are of another tool frame. The same is asked of the other ways in which the numbers may have been
-/// meant (xyzw order, the inverse, the robot's base for the tracker, a joint reversed, rows shifted by one).
+/// say (or the cell), and so R_BF(q)' R_WB' R_WT is one and the same rotation at every pose of a tool: its R_FT. How
+/// far the poses scatter about it says whether the orientations follow the joints; how far it stands from the cell's
+/// own R_FT, whether they are of another tool frame. The same is asked of the other ways in which the numbers may have
+/// been meant (xyzw order, the inverse, the robot's base for the tracker, a joint reversed, rows shifted by one).
 ///
 /// What is identifiable: with one constant orientation and an unknown tool every reading fits as well as any other, and
 /// none does harm. Where base and tool are unknown and positions tell neither, both are fitted to the orientations.

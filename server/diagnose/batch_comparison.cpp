@@ -143,12 +143,12 @@ Pose Comparison::located_base(const PhysicalModel& model) const {
 
 /// One alternative being fitted.
 struct Fitting {
-  Eigen::VectorXd scale, values;      ///< of the parameters, SI
-  Eigen::MatrixXd prior;              ///< precision, in units of scale
+  Eigen::VectorXd scale, values;          ///< of the parameters, SI
+  Eigen::MatrixXd prior;                  ///< precision, in units of scale
   std::vector<Eigen::VectorXd> residual;  ///< of each pose, m and rad
   std::vector<Eigen::MatrixXd> rows;      ///< as many x P a pose: derivative over expected deviation, in units of scale
-  std::vector<double> square;         ///< |residual over expected deviation|^2
-  Eigen::MatrixXd information;        ///< of the poses that count
+  std::vector<double> square;             ///< |residual over expected deviation|^2
+  Eigen::MatrixXd information;            ///< of the poses that count
 };
 
 Fitting Comparison::begun(const Alternative& alternative) const {
@@ -187,8 +187,8 @@ Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest
     const auto at = static_cast<std::size_t>(i);
     if (fitting.square[at] > farthest) continue;
     fitting.information.noalias() += fitting.rows[at].transpose() * fitting.rows[at];
-    gradient.noalias() += fitting.rows[at].transpose() *
-                          fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
+    gradient.noalias() +=
+        fitting.rows[at].transpose() * fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
   }
   return (fitting.information + fitting.prior).ldlt().solve(gradient);
 }
@@ -235,9 +235,8 @@ Fit Comparison::fit(const Alternative& alternative) const {
     linearise(alternative, fitting);
     // First all poses, so that what has begun is followed; then only those that are not much farther off than others.
     const auto changed = fitting.square.begin() + alternative.first;
-    const double farthest = iteration == 0
-                                ? std::numeric_limits<double>::infinity()
-                                : std::max(limit(6), kFarthest * median({changed, fitting.square.end()}));
+    const double farthest = iteration == 0 ? std::numeric_limits<double>::infinity()
+                                           : std::max(limit(6), kFarthest * median({changed, fitting.square.end()}));
     const Eigen::VectorXd next = step(alternative, farthest, fitting);
     if (iteration >= kMostIterations || !(next.norm() > kDone)) return judged(alternative, fitting);
     fitting.values += next.cwiseProduct(fitting.scale);

@@ -75,10 +75,10 @@ class Comparison {
 
   const CompensatedModel& model_;
   const MeasurementBatch& batch_;
-  Eigen::Matrix3Xd bias_B_;                // m
-  std::vector<Matrix3> rotation_bias_B_;   // of each pose
+  Eigen::Matrix3Xd bias_B_;                 // m
+  std::vector<Matrix3> rotation_bias_B_;    // of each pose
   Eigen::Matrix<double, 6, -1> deviation_;  // m, rad
-  std::vector<bool> is_turned_;            // whether its orientation is judged
+  std::vector<bool> is_turned_;             // whether its orientation is judged
   std::vector<PoseContext> contexts_;
 };
 

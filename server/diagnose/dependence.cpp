@@ -20,10 +20,10 @@ using Eigen::VectorXd;
 
 constexpr Index kMostPoses = 200;  // distances are quadratic; evenly drawn beyond
 constexpr int kPermutations = 999;
-constexpr int kAsLarge = 10;             // permutations at least as large: then their share is known well enough
-constexpr double kLeastChance = 1e-6;    // no tail is known further
-constexpr double kNegligible = 1e-4;     // of the largest weight
-constexpr double kNarrow = 1e-6;         // of a saddlepoint near the mean
+constexpr int kAsLarge = 10;           // permutations at least as large: then their share is known well enough
+constexpr double kLeastChance = 1e-6;  // no tail is known further
+constexpr double kNegligible = 1e-4;   // of the largest weight
+constexpr double kNarrow = 1e-6;       // of a saddlepoint near the mean
 constexpr double kLeastSpread = 1e-9;
 
 /// Distances between rows, less row and column means.

@@ -101,8 +101,8 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
     tell_recovery(explained, families, options.seed + 2, diagnosis);
   }
   if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
-  diagnosis.leftover = dependence_of(explained.after, explained.all,
-                                     explained.all.project(explained.after.residual()), options.seed);
+  diagnosis.leftover =
+      dependence_of(explained.after, explained.all, explained.all.project(explained.after.residual()), options.seed);
   tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
   diagnosis.batch = recorded;
   diagnosis.batch_hash = batch_hash(batch);

@@ -144,7 +144,7 @@ struct Diagnosis {
   double instrument = 0;  ///< m per axis: what the measurement itself is said to be good for
   std::string noise_from;
   LeftOver left_position, left_rotation;  ///< m; rad
-  ErrorFigures before, after;  ///< of all poses used, before and after extension
+  ErrorFigures before, after;             ///< of all poses used, before and after extension
   std::optional<ErrorFigures> held_out_before, held_out_after;
   /// The same without the poses held out that fit neither model; empty where there are none.
   std::optional<ErrorFigures> held_out_before_without, held_out_after_without;

@@ -47,9 +47,10 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
   if (prepared.repeats.sigma > kMore * position.stated)
     return fmt::format("poses measured repeatedly scatter by {} as well: the measurement is noisier than the cell says",
                        micrometres(prepared.repeats.sigma));
-  return fmt::format("poses measured repeatedly scatter by {} only: the model lacks something that more poses, with "
-                     "times, temperatures and approach directions, may show",
-                     micrometres(prepared.repeats.sigma));
+  return fmt::format(
+      "poses measured repeatedly scatter by {} only: the model lacks something that more poses, with "
+      "times, temperatures and approach directions, may show",
+      micrometres(prepared.repeats.sigma));
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 /// Whether what is left after all that was found is still the noise that is stated for a measurement.
 ///
 /// With sigma known to a tenth, the sum of squares left is (1.1 sigma)^2 times a chi-square of as many degrees of
-/// freedom as the fit has left, at the most. More than 1.3 times the stated sigma is more than noise, if chance makes it
-/// in less than 1 of 100 batches: something is there that the poses do not say anything else of.
+/// freedom as the fit has left, at the most. More than 1.3 times the stated sigma is more than noise, if chance makes
+/// it in less than 1 of 100 batches: something is there that the poses do not say anything else of.
 namespace trammel {
 
 enum class NoiseVerdict {

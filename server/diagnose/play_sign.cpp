@@ -9,15 +9,15 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSure = 1.645;       // standard deviations, of the mean: one side, 95 %
-constexpr double kSureOfPose = 2;     // the same of one pose
+constexpr double kSure = 1.645;    // standard deviations, of the mean: one side, 95 %
+constexpr double kSureOfPose = 2;  // the same of one pose
 constexpr double kPartOfPoses = 0.25;
 constexpr double kInterval95 = 1.959963984540;
 
 }  // namespace
 
-PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint,
-                      const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance) {
+PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint, const Eigen::VectorXd& change,
+                      const Eigen::MatrixXd& covariance) {
   const std::vector<Eigen::Index> places = places_of_source(problem.model(), source);
   Eigen::Vector2d value, scale;
   for (Eigen::Index k = 0; k < 2; ++k) {
@@ -45,19 +45,19 @@ PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, i
 }
 
 std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, bool every) {
-  std::string joints;
+  std::vector<std::string> joints;
   for (const PlaySign& one : negative) {
-    joints += fmt::format("{}joint {} by {:.0f} ± {:.0f} urad", joints.empty() ? "" : ", ", one.joint + 1,
-                          -1e6 * one.mean, 1e6 * kInterval95 * one.stddev);
+    joints.push_back(
+        fmt::format("joint {} ({:.0f} ± {:.0f} urad)", one.joint + 1, 1e6 * one.mean, 1e6 * kInterval95 * one.stddev));
   }
   const std::string text = fmt::format(
-      "with its side of approach {} stands off as no play does (play hangs back, this runs ahead), and no gear is to be "
-      "adjusted: joints read or measured before they stood still, a servo that overshoots or lags, or",
-      joints);
+      "coming from its side of approach {} runs ahead where play would hang back: this is no play, and no gear is to "
+      "be "
+      "adjusted; were joints read or measured before they stood still, does a servo overshoot or lag, or ",
+      fmt::join(joints, ", "));
   if (!every || negative.size() < 2)
-    return text + fmt::format(" a dir{} column of the wrong sign", negative.front().joint + 1);
-  return text + " dir columns of the wrong sign: so it is in every joint that shows anything; are the dir columns "
-                "reversed?";
+    return text + fmt::format("is the dir{} column of the wrong sign?", negative.front().joint + 1);
+  return text + "are the dir columns reversed? So it is in every joint that shows anything";
 }
 
 }  // namespace trammel

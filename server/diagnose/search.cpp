@@ -154,8 +154,7 @@ class Search {
   void open_negative_play() {
     for (std::size_t k = 0; k < result_.accepted.size();) {
       const Accepted one = result_.accepted[k];
-      const std::optional<PlaySign> sign =
-          one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
+      const std::optional<PlaySign> sign = one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
       if (!sign || !sign->negative) {
         ++k;
         continue;

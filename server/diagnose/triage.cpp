@@ -5,9 +5,9 @@
 //
 // with delta what calibration left uncertain of the model's own parameters (C is its posterior covariance), S_i the
 // variance that the model expects of this very pose (measurement, learned bias, discrepancy; not below what its own
-// held-out poses showed, of positions and of orientations), and theta what one alternative sets free: six numbers of the base, six of the tool, four of
-// the payload, one zero of a joint, or all that the model knows of the arm. Every alternative is fitted in full (the
-// sources' exact derivatives, Gauss-Newton) and scored by
+// held-out poses showed, of positions and of orientations), and theta what one alternative sets free: six numbers of
+// the base, six of the tool, four of the payload, one zero of a joint, or all that the model knows of the arm. Every
+// alternative is fitted in full (the sources' exact derivatives, Gauss-Newton) and scored by
 //
 //   sum_i min(|S_i^-1/2 r_i|^2, c_i) + delta' C^-1 delta + k log m,    c_i = m_i log m + 2 log n,
 //

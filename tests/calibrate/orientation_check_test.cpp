@@ -122,8 +122,8 @@ TEST(OrientationCheck, SomeRowsOfAnotherOrderAreCountedAndTheFirstIsNamed) {
       const auto doubt = orientation_doubt(batch, *cell);
       ASSERT_TRUE(doubt) << every;
       const std::size_t count = (batch.measurements.size() + every - 1) / every;
-      EXPECT_NE(doubt->find(fmt::format("{} of 119 orientations (the first in row {})", count,
-                                        batch.measurements.front().row)),
+      EXPECT_NE(doubt->find(
+                    fmt::format("{} of 119 orientations (the first in row {})", count, batch.measurements.front().row)),
                 std::string::npos)
           << *doubt;
       EXPECT_NE(doubt->find("read as xyzw they would fit to 0."), std::string::npos) << *doubt;

@@ -64,9 +64,8 @@ TEST(MoreThanNoise, OrientationsAreJudgedLikePositions) {
 TEST(MoreThanNoise, ALittleMoreIsANote) {
   const Diagnosis note = diagnosed(with_noise(1.22, 1, 6, 250));
   EXPECT_EQ(note.verdict, Verdict::kNothing) << note.sentence;
-  EXPECT_TRUE(std::any_of(note.limits.begin(), note.limits.end(), [](const std::string& limit) {
-    return limit.starts_with("a little more than noise");
-  }));
+  EXPECT_TRUE(std::any_of(note.limits.begin(), note.limits.end(),
+                          [](const std::string& limit) { return limit.starts_with("a little more than noise"); }));
 }
 
 TEST(MoreThanNoise, FewPosesMayScatterMoreByChance) {

@@ -26,8 +26,8 @@ std::shared_ptr<const Cell> rail(const Vector3& gravity_W) {
 MeasurementBatch measured_on(const std::shared_ptr<const Cell>& cell, bool uneven, std::uint64_t seed) {
   std::vector<std::string> sources = {"base", "geometry", "compliance_first_order"};
   if (uneven) sources.emplace_back("joint_map:4@1");
-  VirtualRobot robot{test::demand(make_physical_model(cell, sources)), cell->tracker.sigma,
-                     cell->tracker.sigma_rotation, {}};
+  VirtualRobot robot{
+      test::demand(make_physical_model(cell, sources)), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
   const std::vector<Parameter> parameters = robot.truth.parameters();
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;

@@ -61,7 +61,7 @@ TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
 }
 
 TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
-  EXPECT_EQ(noise_name(13e-6, 9e-6), "noise of one measurement");
+  EXPECT_EQ(noise_name(11e-6, 9e-6), "noise of one measurement");
   EXPECT_EQ(noise_name(70e-6, 9e-6), "what stays unexplained of a pose");
   Diagnosis real = with({});
   real.unexplained = {true, {}, 1.2e-4, 1e-12, "more than noise: 70 um an axis are left"};

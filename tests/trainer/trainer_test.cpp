@@ -690,6 +690,38 @@ TEST_F(TrainerTest, JobsAreListedWithWhatBecameOfThemAndWhen) {
   EXPECT_EQ(jobs->at(2).progress.stage, JobStage::kQueued);
   EXPECT_EQ(jobs->at(2).asked.batch_ids, std::vector<std::string>{"lt-09"});
   EXPECT_FALSE(jobs->at(2).asked.started_at);
+
+/// The same batch with orientations, under a wxyz header in that order or in xyzw.
+std::string with_orientations(const std::string& csv, const Cell& cell, bool in_xyzw_order) {
+  auto batch = parse_batch_csv(csv, "batch.csv");
+  EXPECT_TRUE(batch);
+  for (Measurement& m : batch->measurements) {
+    const Eigen::Quaterniond q((cell.robot.flange_pose(m.context.q) * *cell.tools.begin()->second).linear());
+    m.R_WT = in_xyzw_order ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix() : q.toRotationMatrix();
+  }
+  return to_csv(*batch);
+}
+
+TEST_F(TrainerTest, OrientationsInAnotherOrderBecomeNoModelNeitherFirstNorLater) {
+  start();
+  const Cell& cell = *cells_.at("cell-7");
+  const auto trained = [&](const std::string& id, std::uint64_t seed, bool in_xyzw_order) {
+    const auto job = trainer_->submit("cell-7", id, with_orientations(csv({.seed = seed}), cell, in_xyzw_order), id);
+    EXPECT_TRUE(job) << job.error().message;
+    return watch_.wait_until_finished(job.value_or(0));
+  };
+  const JobProgress first = trained("lt-07", 1, true);
+  EXPECT_EQ(first.stage, JobStage::kFailed);
+  EXPECT_NE(first.what.find("read as xyzw they would fit to 0."), std::string::npos) << first.what;
+  EXPECT_EQ(in_force(), 0);
+  EXPECT_EQ(trained("lt-08", 2, false).stage, JobStage::kDone);
+  ASSERT_EQ(in_force(), 1);
+  const JobProgress later = trained("lt-09", 3, true);
+  EXPECT_EQ(later.stage, JobStage::kFailed);
+  EXPECT_NE(later.what.find("quarantine"), std::string::npos) << later.what;
+  EXPECT_NE(later.what.find("xyzw order? another tool frame?"), std::string::npos) << later.what;
+  EXPECT_EQ(trainer_->quarantined("cell-7")->front().id, "lt-09");
+  EXPECT_EQ(in_force(), 1);
 }
 
 TEST_F(TrainerTest, ABatchOfATrackerThatWasSetUpElsewhereIsLearnedFromAndSaysSo) {
