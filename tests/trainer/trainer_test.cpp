@@ -690,6 +690,7 @@ TEST_F(TrainerTest, JobsAreListedWithWhatBecameOfThemAndWhen) {
   EXPECT_EQ(jobs->at(2).progress.stage, JobStage::kQueued);
   EXPECT_EQ(jobs->at(2).asked.batch_ids, std::vector<std::string>{"lt-09"});
   EXPECT_FALSE(jobs->at(2).asked.started_at);
+}
 
 /// The same batch with orientations, under a wxyz header in that order or in xyzw.
 std::string with_orientations(const std::string& csv, const Cell& cell, bool in_xyzw_order) {
