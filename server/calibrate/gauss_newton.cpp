@@ -41,6 +41,7 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
   Eigen::VectorXd residuals(6 * kPosesAtATime);
   Eigen::Index filled = 0;
   const auto add_filled = [&] {
+    if (filled == 0) return;  // Eigen divides by the inner dimension of a large rank update
     const auto J = jacobians.leftCols(filled);
     at.gradient.noalias() += J * residuals.head(filled);
     at.information.selfadjointView<Eigen::Lower>().rankUpdate(J);

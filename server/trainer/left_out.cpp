@@ -70,7 +70,7 @@ std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses
     }
     // The precision of the parameters without these poses. With them the gradient was 0, so they answer for its rest.
     MatrixXd precision = MatrixXd::Identity(J.cols(), J.cols());
-    precision.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), -1.0);
+    if (count > 0) precision.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), -1.0);
     const Eigen::LLT<MatrixXd> factor(precision);
     if (factor.info() != Eigen::Success) return std::nullopt;
     moved = factor.solve(J.transpose() * residual);

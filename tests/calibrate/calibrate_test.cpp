@@ -55,6 +55,17 @@ TEST(Calibrate, ThreePositionsAPoseAreEnough) {
   EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 4)), 0.0265);
 }
 
+// The poses are multiplied 64 at a time: a rank update of none of them divided by zero and ended the program.
+TEST(Calibrate, ManyParametersAndAWholeNumberOfBlocksOfPosesEndNoProgram) {
+  const auto cell = cell_7();
+  const std::vector<std::string> many = {"base", "geometry", "compliance", "joint_map:1@12"};
+  for (const int poses : {64, 128}) {
+    const Result<CalibrationResult> result = calibrate(cell, many, measured(chapter_5_robot(cell), poses, 3), {});
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_GE(result->parameters.size(), 48U);
+  }
+}
+
 TEST(Calibrate, FindsAnUnknownBaseAndTool) {
   const auto cell = test::cell_7_unlocated();
   VirtualRobot robot = chapter_5_robot(cell);
