@@ -97,13 +97,21 @@ CREATE TABLE diagnoses (
 )sql";
 
 /// Beside the tables of the schema, so that programs that do not know them can still open the file: when jobs began and
-/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded).
+/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded); which
+/// batches in quarantine a job may train from, and releases if its model goes in force.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
   started_at  INTEGER,
   finished_at INTEGER
 );
+CREATE TABLE IF NOT EXISTS job_releases (
+  job   INTEGER NOT NULL REFERENCES jobs (id),
+  cell  TEXT    NOT NULL,
+  batch TEXT    NOT NULL,
+  PRIMARY KEY (job, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
+) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS model_times (
   cell        TEXT    NOT NULL,
   version     INTEGER NOT NULL,
@@ -295,8 +303,12 @@ void insert_activation(SQLite::Database& database, const std::string& cell, int 
   row.exec();
 }
 
-/// Puts `version` in force on top of what is.
+/// Puts `version` in force on top of what is; the batches that its job may release leave quarantine.
 void activate_on_top(SQLite::Database& database, const std::string& cell, int version) {
+  change(database,
+         "UPDATE batches SET quarantine = '' WHERE cell = ? AND id IN (SELECT batch FROM job_releases JOIN jobs "
+         "ON jobs.id = job_releases.job WHERE jobs.cell = ? AND jobs.model_version = ?)",
+         cell, cell, version);
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
@@ -434,10 +446,20 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
 
 Result<StoredJob> Store::add_job(const StoredJob& job, bool release) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    for (const std::string& id : job.batch_ids) {
-      if (release) change(database, "UPDATE batches SET quarantine = '' WHERE cell = ? AND id = ?", job.cell, id);
-    }
-    return insert_job_over(database, job);
+    Result<StoredJob> queued = insert_job_over(database, job);
+    if (!queued || !release) return queued;
+    for (const std::string& id : job.batch_ids)
+      change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
+    return queued;
+  });
+}
+
+Result<bool> Store::may_release(std::int64_t job) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM job_releases WHERE job = ?)");
+    query.bind(1, job);
+    query.executeStep();
+    return query.getColumn(0).getInt() != 0;
   });
 }
 

@@ -80,9 +80,11 @@ class Store {
   /// same request with the same content again returns the job it made then. Refuses (kConflict) an id that this cell
   /// already has otherwise.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
-  /// Queues a job over batches that are already there. With `release` these leave quarantine in the same transaction.
-  /// Refuses (kNotFound) unknown ones.
+  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may train from
+  /// them in quarantine too: they leave it when its model is put in force, in the same transaction.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false);
+  /// Whether the job was added so.
+  [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis: of the one batch that the job names, or of the one that comes with it. Refuses as add_job().
   [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis);
   /// kNotFound: the job is not there, or is no diagnosis.

@@ -71,13 +71,14 @@ bool not_worse(const PairedGain& gain, double accept_ratio) {
   return gain.rms_after <= accept_ratio * gain.rms_before && (gain.z() > kUnclear || gain.rms_after <= gain.rms_before);
 }
 
-/// Of orientations, beside positions that gain: beyond chance, or by half.
-bool clearly_worse(const PairedGain& turns, double accept_ratio) {
+/// Of orientations, beside positions that gain: beyond chance, or by half. What is left of a turn is never held to be
+/// less than the instrument's own `sigma` an axis.
+bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
   constexpr double kByFar = 1.5;
   if (turns.poses == 0) return false;
+  const double before = std::max(turns.rms_before, std::sqrt(3.0) * sigma);
   const bool beyond_chance = std::min(turns.z_ranks, turns.z_sum) < -PairedGain::kBeyondChance;
-  return turns.rms_after > kByFar * turns.rms_before ||
-         (beyond_chance && turns.rms_after > accept_ratio * turns.rms_before);
+  return turns.rms_after > kByFar * before || (beyond_chance && turns.rms_after > accept_ratio * before);
 }
 
 /// How many different poses these rows are.
@@ -181,7 +182,8 @@ class Duel {
   [[nodiscard]] std::string figures() const {
     const PairedGain gain = gain_of(before_.position, after_.position, shared_);
     if (gain.poses == 0) return "";
-    return fmt::format(" (held-out rms {:.4f} mm, before {:.4f} mm)", to_mm(gain.rms_after), to_mm(gain.rms_before));
+    return fmt::format(" (held-out rms {:.4f} mm before, {:.4f} mm after)", to_mm(gain.rms_before),
+                       to_mm(gain.rms_after));
   }
 
   /// Of a candidate that predicts what the one in force does: it may know one tool more.
@@ -236,13 +238,14 @@ class Duel {
     } else if (kept && turns.beyond_chance()) {
       why = fmt::format("not worse, and its orientations are better beyond chance ({})", in_words(turns));
     }
-    const std::string text = fmt::format("held-out rms {:.4f} mm, before {:.4f} mm (version {}) on the same {} poses",
-                                         to_mm(gain.rms_after), to_mm(gain.rms_before), present_.version, gain.poses);
+    const std::string text =
+        fmt::format("held-out rms {:.4f} mm before (version {}), {:.4f} mm after, on the same {} poses",
+                    to_mm(gain.rms_before), present_.version, to_mm(gain.rms_after), gain.poses);
     if (why.empty()) {
       return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text, gain.z(),
                                PairedGain::kBeyondChance));
     }
-    if (clearly_worse(turns, options_.accept_ratio))
+    if (clearly_worse(turns, options_.accept_ratio, candidate_.cell().tracker.sigma_rotation))
       return stays(fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)));
     if (const std::string better = better_before(); !better.empty()) return stays(text + ": " + better);
     return {true, fmt::format("in force: {}: {}", text, why)};
@@ -299,7 +302,7 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
     return no(fmt::format("{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)", text,
                           to_mm(arm.rms_after), to_mm(arm.rms_before)));
   }
-  if (clearly_worse(turns, options.accept_ratio))
+  if (clearly_worse(turns, options.accept_ratio, question.candidate.cell().tracker.sigma_rotation))
     return no(fmt::format("{}: its orientations are worse ({:.4f} deg, nominal {:.4f} deg)", text,
                           to_deg(turns.rms_after), to_deg(turns.rms_before)));
   return {true, "in force: " + text};

@@ -98,7 +98,7 @@ Result<std::vector<JudgingSession>> Trainer::judging_sessions(const StoredJob& j
   for (auto batch = batches->rbegin(); batch != batches->rend() && newest_first.size() < kMostSessions; ++batch) {
     const bool own = std::find(job.batch_ids.begin(), job.batch_ids.end(), batch->id) != job.batch_ids.end();
     const auto came_with = store_.job(batch->job);
-    if (!batch->quarantine.empty() || (!own && (!came_with || came_with->state != JobState::kDone))) continue;
+    if (!own && (!batch->quarantine.empty() || !came_with || came_with->state != JobState::kDone)) continue;
     const auto stored = store_.batch(job.cell, batch->id);
     if (!stored) return tl::make_unexpected(stored.error());
     const auto checked = checked_batch(*stored, cell);
@@ -184,12 +184,16 @@ Status Trainer::keep(const CompensatedModel& model, JobProgress progress, Bar ba
     (*own)->judges = std::move(judges.batch);
     judged = judged_without(judges.left_out) + judged;
   }
+  const auto may_release = store_.may_release(job->id);
+  if (!may_release) return tl::make_unexpected(may_release.error());
   for (;;) {
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(progress.cell);
     auto verdict = this->verdict(model, present.get(), *sessions, progress.cell, bar);
     if (!verdict) return tl::make_unexpected(verdict.error());
     verdict->message += judged;
+    if (*may_release && !verdict->put_in_force)
+      verdict->message += fmt::format("; what was in quarantine of {} stays there", fmt::join(job->batch_ids, ", "));
     const std::lock_guard lock(activation_mutex_);
     if (registry_.in_force(progress.cell) != present) continue;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict->put_in_force, verdict->message);

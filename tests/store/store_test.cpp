@@ -253,7 +253,7 @@ TEST_F(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
   EXPECT_TRUE(numbers("cell-8", 20).empty());
 }
 
-TEST_F(StoreTest, ReleasesBatchesWithTheJobThatTakesThemOrNotAtAll) {
+TEST_F(StoreTest, ReleasesBatchesWithTheModelThatGoesInForceOrNotAtAll) {
   ASSERT_TRUE(store_->add_batch(batch("a"), job()));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "a", "another tool"));
   StoredJob wanted = job();
@@ -261,7 +261,13 @@ TEST_F(StoreTest, ReleasesBatchesWithTheJobThatTakesThemOrNotAtAll) {
   EXPECT_EQ(store_->add_job(wanted, true).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "another tool");
   wanted.batch_ids = {"a"};
-  ASSERT_TRUE(store_->add_job(wanted, true));
+  const auto refused = store_->add_job(wanted, true), accepted = store_->add_job(wanted, true);
+  ASSERT_TRUE(refused && accepted);
+  EXPECT_TRUE(*store_->may_release(accepted->id));
+  EXPECT_FALSE(*store_->may_release(1));
+  ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, 11), refused->id, false, ""));
+  EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "another tool");
+  ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, 12), accepted->id, true, ""));
   EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "");
 }
 

@@ -245,7 +245,7 @@ TEST(Refit, RefusesAFrameThatIsNotTheModelsAndIsNotNamed) {
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const CompensatedModel model = trained(cell, test::measured(robot, 60, 88), "M1", "none");
   auto other = std::make_shared<Cell>(*cell);
-  other->tools["spindle"] = make_pose(Matrix3::Identity(), {0.1, 0, 0.2});
+  other->tools.at("spindle")->translation().z() += 0.05;
   const auto refused = train(other, test::measured(robot, 20, 89), from(model, {"base"}));
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("tool 'spindle' is 50.000 mm"), std::string::npos) << refused.error().message;

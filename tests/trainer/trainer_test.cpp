@@ -615,7 +615,7 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsR
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
   const auto released = [this](const std::vector<std::string>& ids, const std::string& level, const std::string& bias) {
     const auto job = trainer_->retrain("cell-7", ids, level, bias, Trainer::Quarantine::kReleased);
-    EXPECT_EQ(trainer_->quarantined("")->empty(), job.has_value());
+    EXPECT_EQ(trainer_->quarantined("")->size(), 1u) << "asking releases nothing";
     return job;
   };
   EXPECT_FALSE(released({"lt-07"}, "M9", ""));
@@ -630,6 +630,21 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsR
   options_.queue_capacity = 3;
   make_trainer();
   EXPECT_TRUE(released({"lt-07"}, "", ""));
+}
+
+TEST_F(TrainerTest, ABatchLeavesQuarantineOnlyWithAModelThatIsPutInForce) {
+  start();
+  train("lt-07");
+  const JobProgress kept_out = train("lt-08", {.noise = 2e-3, .seed = 5});
+  ASSERT_EQ(trainer_->quarantined("")->size(), 1u) << kept_out.what;
+  const auto job = trainer_->retrain("cell-7", {"lt-08"}, "", "", Trainer::Quarantine::kReleased);
+  ASSERT_TRUE(job) << job.error().message;
+  const JobProgress done = watch_.wait_until_finished(*job);
+  EXPECT_FALSE(done.in_force) << done.what;
+  EXPECT_NE(done.what.find("lt-08 stays there"), std::string::npos) << done.what;
+  EXPECT_EQ(trainer_->quarantined("")->size(), 1u);
+  ASSERT_TRUE(trainer_->activate("cell-7", done.model_version)) << "a person may know better";
+  EXPECT_TRUE(trainer_->quarantined("")->empty());
 }
 
 TEST_F(TrainerTest, AModelOfOldMeasurementsIsAsOldAsTheyAre) {
@@ -715,8 +730,9 @@ TEST_F(TrainerTest, OrientationsInAnotherOrderBecomeNoModelNeitherFirstNorLater)
   EXPECT_EQ(first.stage, JobStage::kFailed);
   EXPECT_NE(first.what.find("read as xyzw they would fit to 0."), std::string::npos) << first.what;
   EXPECT_EQ(in_force(), 0);
-  EXPECT_EQ(trained("lt-08", 2, false).stage, JobStage::kDone);
-  ASSERT_EQ(in_force(), 1);
+  const JobProgress good = trained("lt-08", 2, false);
+  EXPECT_EQ(good.stage, JobStage::kDone);
+  ASSERT_EQ(in_force(), 1) << good.what;
   const JobProgress later = trained("lt-09", 3, true);
   EXPECT_EQ(later.stage, JobStage::kFailed);
   EXPECT_NE(later.what.find("quarantine"), std::string::npos) << later.what;
