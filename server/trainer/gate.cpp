@@ -298,7 +298,7 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   const std::string text = fmt::format("held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", to_mm(gain.rms_after),
                                        to_mm(gain.rms_before), gain.poses);
   if (!better) return no(text + ": not better; activate it if it is wanted");
-  if (!not_worse(arm, options.accept_ratio)) {
+  if (arm.rms_after > options.accept_ratio * arm.rms_before && arm.z() < kUnclear) {
     return no(fmt::format("{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)", text,
                           to_mm(arm.rms_after), to_mm(arm.rms_before)));
   }
