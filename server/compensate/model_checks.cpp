@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 namespace trammel {
 namespace {
@@ -20,6 +21,14 @@ Status check_frame(const Pose& X, const std::string& name) {
   if (off > kRigid || R.determinant() < 0)
     return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid);
   return {};
+}
+
+Status check_frames(const PhysicalModel& physics, const std::string& whose) {
+  Status fine = check_frame(physics.X_WB, whose + "base");
+  for (const auto& [name, X_FT] : physics.tools) {
+    if (fine) fine = check_frame(X_FT, whose + "tool " + name);
+  }
+  return fine;
 }
 
 double asymmetry(const Eigen::MatrixXd& m) {
@@ -54,6 +63,11 @@ Status check_covariance(const Eigen::MatrixXd& covariance) {
   return {};
 }
 
+Status check_size(const Eigen::MatrixXd& covariance, Eigen::Index P) {
+  if (covariance.rows() == P && covariance.cols() == P) return {};
+  return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(), covariance.cols(), P, P);
+}
+
 Status check_parameters(const CompensatedModel::Parts& parts) {
   for (const IdentifiedParameter& p : parts.parameters) {
     if (p.stddev < 0) return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name, p.stddev);
@@ -72,6 +86,19 @@ Status check_bias(const BiasState& bias) {
   return {};
 }
 
+/// Where a bias was learned that was kept since: with all the standard sources, which it was told of.
+Status check_origin(const CompensatedModel::Parts::BiasOrigin& origin, Eigen::Index P) {
+  for (const std::string_view name : {"base", "geometry", "compliance"}) {
+    const auto& sources = origin.physics.sources;
+    if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
+      return refused("model: the physics that its bias was learned beside has no {}", name);
+  }
+  Status fine = check_frames(origin.physics, "where its bias was learned, ");
+  if (fine) fine = check_size(origin.covariance, P);
+  if (fine) fine = check_covariance(origin.covariance);
+  return fine;
+}
+
 Status check_ranges(const CompensatedModel::Parts& parts) {
   if (!parts.q_min.allFinite() || !parts.q_max.allFinite() || !parts.extrapolation_slope.allFinite())
     return refused("model: a joint range is not finite");
@@ -88,19 +115,15 @@ Status check_ranges(const CompensatedModel::Parts& parts) {
 }  // namespace
 
 Status check_parts(const CompensatedModel::Parts& parts) {
-  Status fine = check_frame(parts.physics.X_WB, "base");
-  for (const auto& [name, X_FT] : parts.physics.tools) {
-    if (fine) fine = check_frame(X_FT, "tool " + name);
-  }
+  Status fine = check_frames(parts.physics, "");
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
-  if (fine && (parts.covariance.rows() != P || parts.covariance.cols() != P))
-    fine = refused("model: a covariance of {} x {}, should be {} x {}", parts.covariance.rows(),
-                   parts.covariance.cols(), P, P);
+  if (fine) fine = check_size(parts.covariance, P);
   if (fine) fine = check_parameters(parts);
   if (fine) fine = check_ranges(parts);
   if (fine && parts.bias) fine = check_bias(*parts.bias);
   if (fine && parts.rotation_bias) fine = check_bias(*parts.rotation_bias);
   if (fine) fine = check_covariance(parts.covariance);
+  if (fine && parts.bias_origin) fine = check_origin(*parts.bias_origin, P);
   return fine;
 }
 

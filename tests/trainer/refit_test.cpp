@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
 
+#include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
@@ -220,6 +223,36 @@ TEST(Refit, ABiasThatIsNamedIsLearnedAnewAndOneThatIsNotIsKept) {
   const CompensatedModel without = test::demand(train(cell, batch, options));
   EXPECT_FALSE(without.parts().bias);
   EXPECT_EQ(without.parts().q_min, model.parts().q_min);
+}
+
+TEST(Refit, AModelFileWhoseBiasWasLearnedNowhereIsRefusedThoughItsHashFits) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel model = trained(cell, test::measured(robot, 40, 83), "M2", "se + parameters");
+  const MeasurementBatch batch = seen_from(set_up_elsewhere(), test::measured(robot, 30, 84), "moved");
+  const std::string text = serialize(test::demand(train(cell, batch, from(model, {"base"}))));
+  const auto message = [&](const std::function<void(nlohmann::json & origin)>& change) -> std::string {
+    auto file = nlohmann::json::parse(text);
+    change(file["content"]["bias_origin"]);
+    file["hash"] = sha256_hex(file["content"].dump());
+    const Result<CompensatedModel> read = deserialize(file.dump(), "file");
+    return read ? "accepted" : read.error().message;
+  };
+  const auto expect = [&](const std::string& part, const std::function<void(nlohmann::json & origin)>& change) {
+    EXPECT_NE(message(change).find(part), std::string::npos) << message(change);
+  };
+  EXPECT_EQ(message([](nlohmann::json&) {}), "accepted");
+  expect("has no base", [](nlohmann::json& origin) {
+    origin["error_sources"] = nlohmann::json::array();
+    origin["values"] = {{"rows", 0}, {"columns", 1}, {"values", nlohmann::json::array()}};
+  });
+  expect("base: its rotation is not rigid", [](nlohmann::json& origin) { origin["X_WB"]["values"][0] = 5; });
+  expect("tool spindle: its place is no length",
+         [](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; });
+  expect("has the variance", [](nlohmann::json& origin) { origin["covariance"]["values"][0] = -1e-3; });
+  expect("a covariance of 1 x 1", [](nlohmann::json& origin) {
+    origin["covariance"] = {{"rows", 1}, {"columns", 1}, {"values", {1.0}}};
+  });
 }
 
 TEST(Refit, ACauseThatTheModelDidNotHaveIsAdded) {
