@@ -159,12 +159,10 @@ Result<std::string> Trainer::hold_against_model_in_force(const StoredJob& job, c
   const auto stored = store_.batch(job.cell, job.batch_ids.front());
   if (!stored) return tl::make_unexpected(stored.error());
   if (stored->job != job.id) return "";  // somebody asked for this training, knowing the batch
-  const auto batch = batch_to_diagnose(job, {}, cell);
+  auto batch = batch_to_diagnose(job, {}, cell);
   if (!batch) return tl::make_unexpected(batch.error());
-  const auto known = [&](const Measurement& m) {
-    return served->model.check_trained_with(m.context.tool, m.context.payload).has_value();
-  };
-  if (!std::all_of(batch->measurements.begin(), batch->measurements.end(), known)) return "";  // nothing to compare
+  std::erase_if(batch->measurements, [&](const Measurement& m) { return !knows(served->model, m); });
+  if (batch->measurements.empty()) return "";  // nothing to compare
   const Triage seen = triage(served->model, *batch);
   if (seen.learn) return seen.verdict == TriageVerdict::kClean ? "" : seen.sentence;
   if (const Status kept = store_.set_quarantine(job.cell, stored->id, seen.sentence); !kept) {
