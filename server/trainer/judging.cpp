@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "server/measurement/velocity.h"
 #include "server/robot/rigid_fit.h"
@@ -12,6 +14,7 @@ namespace trammel {
 namespace {
 
 constexpr double kSamePose = 1e-4;       // rad or m, in each joint
+constexpr double kSamePlace = 1e-6;      // m: of one measurement written twice; another one has noise of its own
 constexpr double kEnoughJudges = 34;     // poses: 30 after some turn out bad or out of range
 constexpr double kMostForJudges = 0.34;  // of the poses: fewer stay fewer
 
@@ -73,6 +76,25 @@ std::vector<Indices> drawn_poses(const MeasurementBatch& batch, double share, st
   }
   return drawn;
 }
+
+/// Measurements to recognise.
+class Rows {
+ public:
+  void add(const MeasurementBatch& batch) {
+    for (const Measurement& m : batch.measurements) rows_.emplace(m.p_W.x(), m);
+  }
+  [[nodiscard]] bool has(const Measurement& m) const {
+    const auto end = rows_.upper_bound(m.p_W.x() + kSamePlace);
+    return std::any_of(rows_.lower_bound(m.p_W.x() - kSamePlace), end,
+                       [&](const std::pair<const double, Measurement>& row) {
+                         const Vector3 apart = row.second.p_W - m.p_W;
+                         return same_pose(row.second, m) && apart.cwiseAbs().maxCoeff() <= kSamePlace;
+                       });
+  }
+
+ private:
+  std::multimap<double, Measurement> rows_;  // by the first coordinate
+};
 
 /// Where the base stands for predictions `p_B` of `p_W`, without the rows that are far off the others; `otherwise`
 /// where that cannot be told.
@@ -145,6 +167,28 @@ JudgingSession judging_session(const MeasurementBatch& batch, double share, std:
   std::erase_if(session.training.measurements, [](const Measurement& m) { return m.set != MeasurementSet::kTrain; });
   std::erase_if(session.judges.measurements, [&](const Measurement& m) { return !judges.contains(m.row); });
   return session;
+}
+
+void judge_once(std::vector<JudgingSession>& sessions) {
+  Rows older;
+  for (JudgingSession& session : sessions) {
+    const MeasurementBatch drawn = session.judges;
+    std::erase_if(session.judges.measurements, [&](const Measurement& m) { return older.has(m); });
+    older.add(session.training);
+    older.add(drawn);
+  }
+}
+
+MeasurementBatch without_older_judges(MeasurementBatch batch, const std::vector<JudgingSession>& sessions) {
+  Rows judges;
+  for (const JudgingSession& session : sessions) {
+    if (session.batch_id == batch.id) break;
+    judges.add(session.judges);
+  }
+  for (Measurement& m : batch.measurements) {
+    if (judges.has(m)) m.set = MeasurementSet::kValidation;
+  }
+  return batch;
 }
 
 bool knows(const CompensatedModel& model, const Measurement& m) {

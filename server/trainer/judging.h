@@ -29,6 +29,13 @@ struct JudgingSession {
 /// `batch` is checked against the cell and held_out_by_service() is not applied to it yet.
 [[nodiscard]] JudgingSession judging_session(const MeasurementBatch& batch, double share, std::uint64_t seed);
 
+/// Leaves a row that an older batch has as well, because it was sent again under another id or in part, to judge there
+/// alone. `sessions`: oldest first.
+void judge_once(std::vector<JudgingSession>& sessions);
+/// `batch` with its copies of judges of the sessions before its own held out: nothing is learned from them.
+[[nodiscard]] MeasurementBatch without_older_judges(MeasurementBatch batch,
+                                                    const std::vector<JudgingSession>& sessions);
+
 /// Measured - predicted of the judges of one session, in B, with the base where the session's training rows put it for
 /// this very model: 3 x N. A column is not a number where the model does not know the tool or payload; of rotations
 /// also where no orientation was measured.

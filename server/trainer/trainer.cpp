@@ -526,6 +526,8 @@ TrainOptions Trainer::train_options(const StoredJob& job, const Cell& cell, cons
 Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell& cell) const {
   const auto may_release = store_.may_release(job.id);
   if (!may_release) return tl::make_unexpected(may_release.error());
+  const auto sessions = judging_sessions(job);
+  if (!sessions) return tl::make_unexpected(sessions.error());
   std::vector<MeasurementBatch> batches;
   for (const std::string& id : job.batch_ids) {
     const auto stored = store_.batch(job.cell, id);
@@ -534,7 +536,8 @@ Result<MeasurementBatch> Trainer::load_batches(const StoredJob& job, const Cell&
     auto checked = checked_batch(*stored, cell);
     if (!checked) return checked;
     // The drawing of the rows held out is a property of the batch: see the class.
-    batches.push_back(held_out_by_service(std::move(*checked), options_.validation_share, options_.seed));
+    checked = held_out_by_service(std::move(*checked), options_.validation_share, options_.seed);
+    batches.push_back(without_older_judges(std::move(*checked), *sessions));
   }
   if (batches.size() == 1) return std::move(batches.front());
   MeasurementBatch all;

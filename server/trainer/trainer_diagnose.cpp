@@ -9,6 +9,7 @@
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
 #include "server/trainer/extend.h"
+#include "server/trainer/judging.h"
 #include "server/trainer/trainer.h"
 
 // What the trainer does besides training: looks at a batch before it is learned from, and diagnoses one.
@@ -106,7 +107,12 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   auto batch = batch_to_diagnose(job, *asked, *cell_found);
   if (!batch) return tl::make_unexpected(batch.error());
   // What is to judge an extended model must not have been looked at.
-  if (asked->apply) *batch = held_out_by_service(std::move(*batch), options_.validation_share, options_.seed);
+  if (asked->apply) {
+    const auto sessions = judging_sessions(job);
+    if (!sessions) return tl::make_unexpected(sessions.error());
+    *batch = held_out_by_service(std::move(*batch), options_.validation_share, options_.seed);
+    *batch = without_older_judges(std::move(*batch), *sessions);
+  }
   DiagnoseOptions options;
   options.seed = options_.seed;
   const double whole = asked->apply ? kDiagnosisShare : 1;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -38,15 +39,33 @@ std::string narrower(const ServedModel& present, const MeasurementBatch& batch) 
                      100 * covered, present.version, 100 * GateOptions::kLeastCoverage);
 }
 
-/// Where among `sessions` those begin that came after `model` was trained.
+/// Where among `sessions` those begin that came after `model` was trained: behind its own batches, or, where none of
+/// these is among them, behind all that was measured before it.
 std::size_t first_new(const std::vector<JudgingSession>& sessions, const CompensatedModel& model) {
-  const std::string& trained_on = model.provenance().batch_id;  // several: joined by plus signs
-  const auto is_own = [&](const JudgingSession& session) {
-    return trained_on == session.batch_id ||
-           ("+" + trained_on + "+").find("+" + session.batch_id + "+") != std::string::npos;
+  const ModelProvenance& provenance = model.provenance();
+  const auto behind = [&](const auto& is_old) {
+    return static_cast<std::size_t>(sessions.rend() - std::find_if(sessions.rbegin(), sessions.rend(), is_old));
   };
-  const auto last = std::find_if(sessions.rbegin(), sessions.rend(), is_own);
-  return static_cast<std::size_t>(sessions.rend() - last);
+  const std::size_t own = behind([&](const JudgingSession& one) { return one.batch_id == provenance.batch_id; });
+  if (own > 0) return own;
+  const std::string several = "+" + provenance.batch_id + "+";  // joined by plus signs
+  const std::size_t last =
+      behind([&](const JudgingSession& one) { return several.find("+" + one.batch_id + "+") != std::string::npos; });
+  if (last > 0) return last;
+  const std::int64_t made_at = provenance.measured_at.value_or(provenance.trained_at);
+  return behind([&](const JudgingSession& session) { return session.training.measured_at.value_or(0) <= made_at; });
+}
+
+/// The batches that a finished training of the cell was made from.
+Result<std::set<std::string>> learned_from(const Store& store, const std::string& cell) {
+  const auto jobs = store.recent_jobs(cell, std::numeric_limits<int>::max());
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  std::set<std::string> learned;
+  for (const StoredJob& job : *jobs) {
+    if (job.state == JobState::kDone && job.model_version > 0)
+      learned.insert(job.batch_ids.begin(), job.batch_ids.end());
+  }
+  return learned;
 }
 
 /// Where the version marked in force cannot be asked: against what its own held-out poses said when it was made.
@@ -92,13 +111,14 @@ Result<CompensatedModel> Trainer::trained(const StoredJob& job, const Measuremen
 
 Result<std::vector<JudgingSession>> Trainer::judging_sessions(const StoredJob& job) const {
   const Cell& cell = *cells_.at(job.cell);
-  auto batches = store_.batches(job.cell);
+  const auto batches = store_.batches(job.cell);
   if (!batches) return tl::make_unexpected(batches.error());
+  const auto may_judge = learned_from(store_, job.cell);
+  if (!may_judge) return tl::make_unexpected(may_judge.error());
   std::vector<JudgingSession> newest_first;
   for (auto batch = batches->rbegin(); batch != batches->rend() && newest_first.size() < kMostSessions; ++batch) {
     const bool own = std::find(job.batch_ids.begin(), job.batch_ids.end(), batch->id) != job.batch_ids.end();
-    const auto came_with = store_.job(batch->job);
-    if (!own && (!batch->quarantine.empty() || !came_with || came_with->state != JobState::kDone)) continue;
+    if (!own && (!batch->quarantine.empty() || !may_judge->contains(batch->id))) continue;
     const auto stored = store_.batch(job.cell, batch->id);
     if (!stored) return tl::make_unexpected(stored.error());
     const auto checked = checked_batch(*stored, cell);
@@ -106,6 +126,7 @@ Result<std::vector<JudgingSession>> Trainer::judging_sessions(const StoredJob& j
     newest_first.push_back(judging_session(*checked, options_.validation_share, options_.seed));
   }
   std::reverse(newest_first.begin(), newest_first.end());
+  judge_once(newest_first);
   return newest_first;
 }
 
@@ -162,6 +183,7 @@ Result<JudgingSession*> Trainer::session_of_diagnosis(const StoredJob& job,
   const auto batch = batch_to_diagnose(job, *asked, *cells_.at(job.cell));
   if (!batch) return tl::make_unexpected(batch.error());
   sessions.push_back(judging_session(*batch, options_.validation_share, options_.seed));
+  judge_once(sessions);
   return &sessions.back();
 }
 

@@ -4,7 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
 #include "server/trainer/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -74,6 +78,32 @@ TEST_F(GateTest, ASubmitterDoesNotChooseHisJudges) {
   expect_not_worse({corner});
 }
 
+TEST_F(GateTest, JudgesThatAreSentAgainAsABatchOfTheirOwnDoNotTeachTheirOwnAnswers) {
+  const MeasurementBatch first = first_day();
+  MeasurementBatch judges = test::demand(check_against_cell(first, *cell_));
+  const std::set<int> rows = judging_rows(judges, TrainerOptions{}.validation_share, TrainerOptions{}.seed);
+  std::erase_if(judges.measurements, [&](const Measurement& m) { return !rows.contains(m.row); });
+  judges.source_text.clear();
+  LearningCell learning(cell_);
+  learning.submit(first);
+  const JobProgress done = learning.submit(judges);
+  EXPECT_FALSE(done.in_force) << done.what;
+}
+
+TEST_F(GateTest, AnArmThatWasIsNotLearnedAgainFromTheBatchesOfItsTime) {
+  LearningCell learning(cell_);
+  learning.submit(first_day());
+  TrainOptions offline;
+  offline.trained_at = unix_now();
+  const CompensatedModel changed = test::demand(
+      train(cell_, measured_on(with_joint_2_off(1e-3), {.poses = 120, .seed = 39, .set_up_anew = true}), offline));
+  const int version = test::demand(learning.trainer().import_model(cell_->name, serialize(changed)));
+  ASSERT_TRUE(learning.trainer().activate(cell_->name, version)) << "the arm has changed, and a person says so";
+  const JobProgress again = learning.finished(test::demand(learning.trainer().retrain(cell_->name, {"day-1"}, "", "")));
+  EXPECT_FALSE(again.in_force) << again.what;
+  EXPECT_EQ(learning.in_force(), version);
+}
+
 TEST_F(GateTest, EverNoisierBatchesDoNotAddUpToAWorseModel) {
   std::vector<MeasurementBatch> days;
   for (const double noise : {1.35, 1.7, 2.05, 2.4, 2.75, 3.1}) {
@@ -95,6 +125,37 @@ class TwoToolsTest : public GateTest {
 
 TEST_F(TwoToolsTest, AnotherToolAloneDoesNotSpoilTheFirst) {
   expect_not_worse({measured_on(robot_, {.poses = 80, .seed = 36, .tool = "probe"})}, "spindle");
+}
+
+TEST_F(TwoToolsTest, ABatchThatShowsAChangedToolIsKeptOutThoughItTeachesAnotherToo) {
+  LearningCell learning(cell_);
+  learning.submit(first_day("spindle"));
+  VirtualRobot bumped = robot_;
+  bumped.truth.tools.at("spindle").translation() += Vector3(0.4e-3, 0, 0);
+  MeasurementBatch day = measured_on(bumped, {.poses = 120, .seed = 43, .tool = "spindle"});
+  Measurement other = measured_on(robot_, {.poses = 20, .seed = 44, .tool = "probe"}).measurements.front();
+  other.pose_id = "another";
+  day.measurements.push_back(std::move(other));
+  const JobProgress done = learning.submit(day);
+  EXPECT_EQ(done.stage, JobStage::kFailed) << done.what;
+  EXPECT_NE(done.what.find("quarantine"), std::string::npos) << done.what;
+  EXPECT_EQ(learning.in_force(), 1);
+}
+
+TEST_F(TwoToolsTest, AReleasedBatchJudgesFromThenOn) {
+  LearningCell learning(cell_);
+  learning.submit(first_day("spindle"));
+  VirtualRobot bumped = robot_;
+  bumped.truth.tools.at("spindle").translation() += Vector3(0.4e-3, 0, 0);
+  const JobProgress kept_out = learning.submit(measured_on(bumped, {.poses = 120, .seed = 43, .tool = "spindle"}));
+  ASSERT_EQ(kept_out.stage, JobStage::kFailed) << kept_out.what;
+  Trainer& trainer = learning.trainer();
+  const auto released = trainer.retrain(cell_->name, {"day-2"}, "", "", Trainer::Quarantine::kReleased);
+  const JobProgress taken = learning.finished(test::demand(released));
+  ASSERT_TRUE(taken.in_force) << taken.what;
+  const JobProgress again = learning.finished(test::demand(trainer.retrain(cell_->name, {"day-1"}, "", "")));
+  EXPECT_FALSE(again.in_force) << again.what;
+  EXPECT_NE(again.what.find("held-out rms"), std::string::npos) << "held against day-2: " << again.what;
 }
 
 TEST_F(TwoToolsTest, ABatchOfAnotherToolAloneTeachesThatTool) {

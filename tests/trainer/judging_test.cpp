@@ -67,6 +67,42 @@ TEST(JudgingRows, ACopyOfAJudgeIsNotLearnedFrom) {
   for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ(held_out.measurements[i].set, held_out.measurements[i + 50].set);
 }
 
+MeasurementBatch measured_batch(const std::string& id, int first, int last) {
+  MeasurementBatch batch = batch_of(last);
+  batch.measurements.erase(batch.measurements.begin(), batch.measurements.begin() + first);
+  for (Measurement& m : batch.measurements) m.p_W = Vector3(1.2, 0.3, 0.01 * m.row);
+  batch.id = id;
+  return batch;
+}
+
+TEST(JudgingSessions, ARowThatIsSentAgainUnderAnotherIdJudgesOnceAndIsNotLearnedFrom) {
+  const MeasurementBatch again = measured_batch("again", 10, 120);
+  std::vector<JudgingSession> sessions = {judging_session(measured_batch("first", 0, 100), kShare, 1),
+                                          judging_session(again, kShare, 1)};
+  const MeasurementBatch first_judges = sessions[0].judges;
+  judge_once(sessions);
+  EXPECT_EQ(sessions[0].judges.measurements.size(), first_judges.measurements.size());
+  for (const Measurement& m : sessions[1].judges.measurements) EXPECT_GE(m.row, 102) << "of the twenty new ones";
+  EXPECT_FALSE(sessions[1].judges.measurements.empty());
+  const MeasurementBatch learned = without_older_judges(held_out_by_service(again, kShare, 1), sessions);
+  std::set<int> judges;
+  for (const Measurement& m : first_judges.measurements) judges.insert(m.row);
+  for (const Measurement& m : learned.measurements)
+    EXPECT_TRUE(m.set != MeasurementSet::kTrain || !judges.contains(m.row)) << m.row;
+  const MeasurementBatch first = held_out_by_service(measured_batch("first", 0, 100), kShare, 1);
+  const MeasurementBatch kept = without_older_judges(first, sessions);
+  EXPECT_EQ(count(kept, MeasurementSet::kTrain), count(first, MeasurementSet::kTrain));
+}
+
+TEST(JudgingSessions, TheSamePoseMeasuredAnotherTimeJudgesAgain) {
+  MeasurementBatch later = measured_batch("later", 0, 100);
+  for (Measurement& m : later.measurements) m.p_W.x() += 12e-6;
+  std::vector<JudgingSession> sessions = {judging_session(measured_batch("first", 0, 100), kShare, 1),
+                                          judging_session(later, kShare, 1)};
+  judge_once(sessions);
+  EXPECT_EQ(sessions[1].judges.measurements.size(), 34U);
+}
+
 TEST(Coverage, IsOfTheJointWhereItIsLeastAndNoSinglePoseWidensIt) {
   const JointVector low = JointVector::Constant(6, -1), high = JointVector::Constant(6, 1);
   std::vector<JointVector> poses;
