@@ -10,6 +10,7 @@
 #include "server/diagnose/triage.h"
 #include "server/measurement/batch_file.h"
 #include "server/report/model_page.h"
+#include "server/trainer/refitted.h"
 #include "server/trainer/train.h"
 
 namespace trammel::cli {
@@ -31,15 +32,17 @@ struct TrainArguments {
 
 /// As the service does before it learns from a batch: holds it against the model to start from. What is refitted may
 /// differ; anything else would be learned as if it belonged to it.
-Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit,
+Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
                     const MeasurementBatch& batch) {
   const Result<MeasurementBatch> checked = check_against_cell(batch, from.cell());
-  if (!checked) return {};  // its tools are others: nothing to compare
+  const Result<MeasurementBatch> here = check_against_cell(batch, cell);
+  if (!checked || !here) return {};  // its tools are others: nothing to compare
+  if (const Status fits = check_may_start_from(from, cell, *here, refit); !fits) return fits;
   const bool known = std::all_of(checked->measurements.begin(), checked->measurements.end(), [&](const Measurement& m) {
     return from.check_trained_with(m.context.tool, m.context.payload).has_value();
   });
   if (!known) return {};
-  const Triage seen = triage(from, *checked);
+  const Triage seen = triage(from, *checked, with_known_tools(cell, from, refit));
   const std::map<std::string, std::string> same = {
       {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
   const auto named = [&](const std::string& source) {
@@ -71,7 +74,7 @@ Status train_model(const TrainArguments& arguments) {
     Result<std::vector<std::string>> refit = parse_level(arguments.refit);
     if (!refit) return tl::make_unexpected(refit.error());
     options.refit = std::move(*refit);
-    if (const Status fits = hold_against(*options.from, options.refit, *batch); !fits) return fits;
+    if (const Status fits = hold_against(*options.from, options.refit, *cell, *batch); !fits) return fits;
   }
   const Result<CompensatedModel> model = [&] {
     ProgressLine progress;

@@ -376,8 +376,21 @@ std::optional<Quaternion> by_orientations(const Oriented& group) {
   return Quaternion(found->X_WB.linear());
 }
 
+/// Whether the positions are those of a base at `X_WB`, to what a model of a robot may leave.
+bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented& group) {
+  const Positions positions = positions_of(group);
+  Eigen::Matrix3Xd p_F(3, positions.p_W.cols());
+  for (Eigen::Index i = 0; i < p_F.cols(); ++i)
+    p_F.col(i) = positions.X_BF[static_cast<std::size_t>(i)].inverse() * (X_WB.inverse() * positions.p_W.col(i));
+  const Vector3 p_FT = X_FT ? Vector3(X_FT->translation()) : Vector3(p_F.rowwise().mean());
+  std::vector<double> off;
+  for (Eigen::Index i = 0; i < p_F.cols(); ++i) off.push_back((p_F.col(i) - p_FT).norm());
+  return median(off) <= kNoModelError;
+}
+
 std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
-  const Located located = by_positions(group, cell.tools.at(group.tool));
+  const std::optional<Pose>& X_FT = cell.tools.at(group.tool);
+  const Located located = by_positions(group, X_FT);
   if (!located.belong) return std::nullopt;  // the joints themselves are in question
   std::vector<Quaternion> turned;
   if (located.turned) {
@@ -387,7 +400,7 @@ std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
   // The cell's base is the finer of the two, unless the tracker stands elsewhere.
   const auto base = cell.X_WB ? std::optional<Quaternion>(cell.X_WB->linear()) : std::nullopt;
   if (base && (turned.empty() || angle(*base, turned.front()) < kMostOff)) turned.push_back(*base);
-  if (turned.empty()) {
+  if (!located.turned && !(cell.X_WB && stands_at(*cell.X_WB, X_FT, group))) {
     if (const auto q_WB = by_orientations(group)) turned.push_back(*q_WB);
   }
   // The base that suits the numbers as given is theirs.

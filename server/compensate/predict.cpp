@@ -19,6 +19,22 @@ BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   return now;
 }
 
+/// How well the arm is known is asked as it was learned: a tool that is elsewhere now makes no pose a new one. Where
+/// its point goes is in the covariance.
+void share_as_learned(const BiasModel& bias, const BiasPhysics& then, const std::vector<PoseContext>& poses,
+                      const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& now,
+                      std::vector<BiasPrediction>& predictions) {
+  std::vector<BiasFeatures> as_learned;
+  bool moved = false;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    as_learned.push_back(then.at(poses[i]));
+    moved = moved || as_learned.back().by_parameter != now[i].by_parameter;
+  }
+  if (!moved) return;
+  const std::vector<BiasPrediction> known = bias.predict_all(q, as_learned);
+  for (std::size_t i = 0; i < poses.size(); ++i) predictions[i].prior_share = known[i].prior_share;
+}
+
 }  // namespace
 
 PoseContext CompensatedModel::completed(PoseContext asked) const {
@@ -53,15 +69,20 @@ std::vector<CompensatedModel::Learned> CompensatedModel::turn(std::vector<Learne
 std::vector<CompensatedModel::Learned> CompensatedModel::learned(const std::vector<PoseContext>& poses) const {
   const BiasModel& bias = *inside_->bias;
   Eigen::MatrixXd q(static_cast<Eigen::Index>(poses.size()), cell().robot.size());
+  std::vector<PoseContext> contexts;
   std::vector<BiasFeatures> of_position, of_rotation;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     q.row(static_cast<Eigen::Index>(i)) = poses[i].q.transpose();
     if (!bias.needs_features()) continue;
-    of_position.push_back(features(completed(poses[i])));
+    contexts.push_back(completed(poses[i]));
+    of_position.push_back(features(contexts.back()));
     if (inside_->rotation_bias) of_rotation.push_back(turned(of_position.back()));
   }
+  std::vector<BiasPrediction> positions = bias.predict_all(q, of_position);
+  if (parts().bias_origin && bias.needs_features())
+    share_as_learned(bias, learned_physics(), contexts, q, of_position, positions);
   std::vector<Learned> all;
-  for (BiasPrediction& position : bias.predict_all(q, of_position)) all.push_back({std::move(position), std::nullopt});
+  for (BiasPrediction& position : positions) all.push_back({std::move(position), std::nullopt});
   if (!inside_->rotation_bias) return turn(std::move(all));
   std::vector<BiasPrediction> rotations = inside_->rotation_bias->predict_all(q, of_rotation);
   for (std::size_t i = 0; i < all.size(); ++i) all[i].rotation = std::move(rotations[i]);

@@ -208,7 +208,11 @@ std::string_view to_string(TriageVerdict verdict) {
 }
 
 Triage triage(const CompensatedModel& model, const MeasurementBatch& batch) {
-  if (const auto doubt = orientation_doubt(batch, model.cell())) {
+  return triage(model, batch, model.cell());
+}
+
+Triage triage(const CompensatedModel& model, const MeasurementBatch& batch, const Cell& cell) {
+  if (const auto doubt = orientation_doubt(batch, cell)) {
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;

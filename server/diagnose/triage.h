@@ -40,4 +40,7 @@ struct Triage {
 /// positions say. With fewer than 8 poses nothing else is said: clean.
 [[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch);
 
+/// The same where tools and base are to be those of `cell`, which may say others than the model's.
+[[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch, const Cell& cell);
+
 }  // namespace trammel

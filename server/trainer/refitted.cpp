@@ -42,11 +42,13 @@ std::vector<std::string> names_of(const CompensatedModel& model) {
   return names;
 }
 
-Status check_fits(const CompensatedModel& from, const Cell& cell, const MeasurementBatch& trained,
-                  const std::vector<std::string>& only) {
+}  // namespace
+
+Status check_may_start_from(const CompensatedModel& from, const Cell& cell, const MeasurementBatch& batch,
+                            const std::vector<std::string>& only) {
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
-    return refused("batch {}: the model to start from is of another robot than cell {}", trained.id, cell.name);
+    return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell.name);
   }
   if (!contains(only, "base")) {
     if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
@@ -57,7 +59,7 @@ Status check_fits(const CompensatedModel& from, const Cell& cell, const Measurem
     const Status same = check_same_frame(cell, fmt::format("tool '{}'", name), said->second, kept, "tool");
     if (!same) return same;
   }
-  for (const Measurement& m : trained.measurements) {
+  for (const Measurement& m : batch.measurements) {
     const std::string& tool = m.context.tool;
     const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
                                       [&](const auto& known) { return known.first == tool; });
@@ -65,10 +67,12 @@ Status check_fits(const CompensatedModel& from, const Cell& cell, const Measurem
     return refused(
         "batch {} row {}: where tool '{}' sits is known to neither cell {} nor the model to start from: name "
         "tool among what is refitted",
-        trained.id, m.row, tool, cell.name);
+        batch.id, m.row, tool, cell.name);
   }
   return {};
 }
+
+namespace {
 
 CalibrationResult known_of(const CompensatedModel::Parts& parts) {
   CalibrationResult known;
@@ -172,7 +176,8 @@ void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const 
 Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
                           const MeasurementBatch& batch, const MeasurementBatch& trained,
                           const std::vector<std::string>& only) {
-  if (const Status fits = check_fits(from, *cell, trained, only); !fits) return tl::make_unexpected(fits.error());
+  if (const Status fits = check_may_start_from(from, *cell, trained, only); !fits)
+    return tl::make_unexpected(fits.error());
   Refitted result;
   result.poses = trained;
   const bool of_this_batch = lasting_sources(only) != only;
@@ -221,6 +226,15 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   result.found.covariance.setZero();
   result.found.covariance(found->anew, found->anew) = found->given_rest;
   return result;
+}
+
+Cell with_known_tools(Cell cell, const CompensatedModel& from, const std::vector<std::string>& only) {
+  if (contains(only, "tool")) return cell;
+  for (const auto& [name, payload] : from.parts().trained_with) {
+    const auto tool = cell.tools.find(name);
+    if (tool != cell.tools.end() && !tool->second) tool->second = served_tool(from.parts().physics, name);
+  }
+  return cell;
 }
 
 }  // namespace trammel

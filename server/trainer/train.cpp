@@ -289,8 +289,13 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   };
   const Result<MeasurementBatch> checked = check_against_cell(batch, *cell);
   if (!checked) return tl::make_unexpected(checked.error());
-  if (const Status oriented = check_orientations(*checked, *cell); !oriented)
-    return tl::make_unexpected(oriented.error());
+  if (options.from) {
+    const Status fits = check_may_start_from(*options.from, *cell, *checked, options.refit);
+    if (!fits) return tl::make_unexpected(fits.error());
+  }
+  const Status oriented =
+      check_orientations(*checked, options.from ? with_known_tools(*cell, *options.from, options.refit) : *cell);
+  if (!oriented) return tl::make_unexpected(oriented.error());
   const BatchSplit split = prepared(*checked, cell->tracker.sigma, options);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 

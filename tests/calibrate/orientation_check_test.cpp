@@ -168,6 +168,24 @@ TEST(OrientationCheck, ATrackerSetUpElsewhereIsNoReasonForDoubt) {
   EXPECT_NE(doubt->find("read against the robot's base instead of the tracker"), std::string::npos) << *doubt;
 }
 
+TEST(OrientationCheck, FewPosesOfAnUnknownToolAreNotDoubtedBecauseTheTrackerStandsElsewhere) {
+  const Pose X = Eigen::Translation3d(0.4, -0.3, 0.2) * Eigen::AngleAxisd(-0.3, Vector3::UnitZ());
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  cell->tools["spindle"].reset();
+  for (const int poses : {3, 4, 5}) {
+    MeasurementBatch batch = measured(test::cell_7(), poses, 14);
+    for (Measurement& m : batch.measurements) {
+      m.p_W = X * m.p_W;
+      m.R_WT = X.linear() * *m.R_WT;
+    }
+    const auto doubt = orientation_doubt(batch, *cell);
+    EXPECT_FALSE(doubt) << poses << ": " << doubt.value_or("");
+    if (poses == 3) continue;  // of two turns both orders have the angles
+    change(batch, in_xyzw_order);
+    EXPECT_TRUE(orientation_doubt(batch, *cell)) << poses;
+  }
+}
+
 TEST(OrientationCheck, OrientationsAgainstTheRobotsBaseAreToldFromThoseAgainstTheTracker) {
   MeasurementBatch batch = measured(test::cell_7(), 80, 11);
   const Matrix3 R = rotation_exp({0, 0, 0.8});

@@ -178,6 +178,26 @@ TEST_F(CommandLine, RefittingTheBaseOnThreePositionsKeepsAToolThatTheCellDoesNot
   EXPECT_NE(second["X_WB"], first["X_WB"]);
 }
 
+TEST_F(CommandLine, AToolThatIsTurnedAsTheNewCellFileSaysIsRefitted) {
+  const std::string first = train(measure("b", 60, 5), "M2");
+  std::string cell = test::read_file(cell_);
+  cell.replace(cell.find("../models"), 9, TRAMMEL_SOURCE_DIR "/models");
+  const std::string was = "q_wxyz: [0.923879532511287, 0, -0.382683432365090, 0]}";
+  ASSERT_NE(cell.find(was), std::string::npos);
+  cell.replace(cell.find(was), was.size(), "q_wxyz: [1, 0, 0, 0]}");  // by 45 degrees
+  const std::string turned = folder_.write("turned.yaml", cell);
+  must({"plan", "--cell", turned, "--count", "20", "--seed", "6", "-o", file("plan.csv")});
+  must({"simulate", "--cell", turned, "--truth", kTruth, "--plan", file("plan.csv"), "--seed", "6", "-o",
+        file("few.csv")});
+  must({"train", "--cell", turned, "--batch", file("few.csv"), "--from", first, "--refit", "tool", "-o",
+        file("second.model")});
+  const Finished refused = trammel(
+      {"train", "--cell", cell_, "--batch", file("few.csv"), "--from", first, "--refit", "tool", "-o", file("no")});
+  EXPECT_EQ(refused.exit_code, kRefusedData);
+  EXPECT_NE(refused.err.find("turned by 45 deg against tool 'spindle' of the cell file"), std::string::npos)
+      << refused.err;
+}
+
 TEST_F(CommandLine, TrainSaysWhereComplianceHasNothingToActOn) {
   std::string cell = test::read_file(cell_);
   cell.replace(cell.find("../models"), 9, TRAMMEL_SOURCE_DIR "/models");

@@ -136,6 +136,20 @@ TEST(Refit, ABaseIsFoundFromThreePositionsAndNothingElseMoves) {
   }
 }
 
+TEST(Refit, OrientationsOfFewPosesAreHeldAgainstTheToolThatTheModelKnows) {
+  const auto cell = test::cell_7_unlocated();
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const CompensatedModel model = trained(cell, test::measured(robot, 120, 90), "M2", "none");
+  MeasurementBatch four = seen_from(set_up_elsewhere(), test::measured(robot, 4, 91), "four");
+  ASSERT_TRUE(four.measurements.front().R_WT);
+  expect_kept(test::demand(train(cell, four, from(model, {"base"}))), model, "base");
+  for (Measurement& m : four.measurements) m.R_WT = *m.R_WT * rotation_exp({0, 0, from_deg(30)});
+  const auto refused = train(cell, four, from(model, {"base"}));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("turned by 30 deg against tool"), std::string::npos)
+      << refused.error().message;
+}
+
 TEST(Refit, ABaseFromTwentyPositionsAtOneWristIsAsGoodAsTheModelItself) {
   const auto cell = test::cell_7_unlocated();
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
@@ -205,6 +219,20 @@ TEST(Refit, AToolThatTheNewPosesDoNotHaveStaysKnown) {
     EXPECT_EQ(refit.parts().covariance(at, at), model.parts().covariance(at, at)) << parameters[k].name;
   }
   EXPECT_LT(to_mm(refit.evaluate(measured_with(knocked, 82, false, 200)).compensated.rms), 0.028);
+}
+
+TEST(Refit, AToolThatIsElsewhereLeavesPosesInTheDomainOfABiasWithParameters) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  cell->tools["spindle"].reset();
+  VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const CompensatedModel model = trained(cell, test::measured(robot, 120, 92), "M2", "se + parameters");
+  const int in_domain = model.evaluate(test::measured(robot, 100, 93)).in_domain;
+  robot.truth.tools["spindle"].translation() += Vector3(0.01, -0.005, 0.02);
+  const CompensatedModel refit = test::demand(train(cell, test::measured(robot, 25, 94), from(model, {"tool"})));
+  const Evaluation after = refit.evaluate(test::measured(robot, 100, 93));
+  EXPECT_EQ(after.in_domain, in_domain);
+  EXPECT_GT(after.coverage_95, 0.9);
+  EXPECT_LT(to_mm(after.compensated.rms), 0.035);
 }
 
 TEST(Refit, ABiasThatIsNamedIsLearnedAnewAndOneThatIsNotIsKept) {
@@ -282,6 +310,19 @@ TEST(Refit, RefusesAFrameThatIsNotTheModelsAndIsNotNamed) {
   const auto refused = train(other, test::measured(robot, 20, 89), from(model, {"base"}));
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("tool 'spindle' is 50.000 mm"), std::string::npos) << refused.error().message;
+}
+
+TEST(Refit, AToolThatIsTurnedInTheCellFileAndNotNamedIsToldAsAFrameNotAsOrientations) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel model = trained(cell, test::measured(robot, 60, 95), "M1", "none");
+  auto turned = std::make_shared<Cell>(*cell);
+  turned->tools.at("spindle")->linear() = Matrix3::Identity();
+  const auto refused = train(turned, test::measured(robot, 20, 96), from(model, {"base"}));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("and 45.0000 deg from that of the model to start from: name tool"),
+            std::string::npos)
+      << refused.error().message;
 }
 
 class MeasuredRobot : public testing::Test {
