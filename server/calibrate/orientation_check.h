@@ -15,8 +15,8 @@
 /// been meant (xyzw order, the inverse, the robot's base for the tracker, a joint reversed, rows shifted by one).
 ///
 /// What is identifiable: with one constant orientation and an unknown tool every reading fits as well as any other, and
-/// none does harm. Where positions do not tell the base, and are not those of the cell's, base and tool are fitted to the
-/// orientations: from four poses that turn about different axes on, another order does not fit.
+/// none does harm. Where positions do not tell the base, and are not those of the cell's, base and tool are fitted to
+/// the orientations: from four poses that turn about different axes on, another order does not fit.
 namespace trammel {
 
 /// What speaks against the orientations of `batch` (checked against `cell`), with both figures and the question that

@@ -193,6 +193,11 @@ void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& fa
   diagnosis.could_not_have_seen = std::move(blind.unseen);
   std::erase_if(diagnosis.could_not_have_seen,
                 [&](const Unseen& unseen) { return is_by_surrogate(surrogates, unseen.cause); });
+  std::erase_if(diagnosis.could_not_have_seen, [&](const Unseen& unseen) {  // seen, with a sign that has no name
+    const std::vector<PlaySign>& seen = explained.found.negative_play;
+    return unseen.cause.cause == "backlash" &&
+           std::any_of(seen.begin(), seen.end(), [&](const PlaySign& one) { return one.joint == unseen.cause.joint; });
+  });
   static_cast<void>(candidate_sources(cell, recorded, &diagnosis.could_not_have_seen));
   diagnosis.not_separable = std::move(blind.inseparable);
   for (Inseparable& pair : hidden_by_constancy(explained.found.before.model, recorded))

@@ -84,7 +84,7 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   const std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
   Unexplained& unexplained = diagnosis.unexplained;
   if (unexplained.present) {
-    diagnosis.limits.push_back(fmt::format("more than noise beside what is unexplained: {}; {}", what, more));
+    diagnosis.limits.push_back(fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
     return;
   }
   const double beyond = std::max(0.0, position.left * position.left - position.stated * position.stated);

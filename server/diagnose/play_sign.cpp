@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "server/base/coverage.h"
 #include "server/diagnose/effect.h"
 #include "server/robot/arm_state.h"
 
@@ -12,7 +13,6 @@ namespace {
 constexpr double kSure = 1.645;    // standard deviations, of the mean: one side, 95 %
 constexpr double kSureOfPose = 2;  // the same of one pose
 constexpr double kPartOfPoses = 0.25;
-constexpr double kInterval95 = 1.959963984540;
 
 }  // namespace
 
@@ -48,13 +48,13 @@ std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, boo
   std::vector<std::string> joints;
   for (const PlaySign& one : negative) {
     joints.push_back(
-        fmt::format("joint {} ({:.0f} ± {:.0f} urad)", one.joint + 1, 1e6 * one.mean, 1e6 * kInterval95 * one.stddev));
+        fmt::format("joint {} ({:.0f} ± {:.0f} urad)", one.joint + 1, 1e6 * one.mean, 1e6 * kExpanded * one.stddev));
   }
   const std::string text = fmt::format(
       "coming from its side of approach {} runs ahead where play would hang back: this is no play, and no gear is to "
       "be "
       "adjusted; were joints read or measured before they stood still, does a servo overshoot or lag, or ",
-      fmt::join(joints, ", "));
+      fmt::join(joints, " as well as "));
   if (!every || negative.size() < 2)
     return text + fmt::format("is the dir{} column of the wrong sign?", negative.front().joint + 1);
   return text + "are the dir columns reversed? So it is in every joint that shows anything";

@@ -62,6 +62,12 @@ std::string p_value_shown(double p) {
   return p <= kLeast ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
 }
 
+/// Behind the letter: " = 0.02", or that it is smaller than anything that can be told.
+std::string p_value_after_p(double p) {
+  const std::string shown = p_value_shown(p);
+  return (shown.front() == '<' ? " " : " = ") + html_text(shown);
+}
+
 std::string estimates_of(const Finding& finding) {
   std::string html;
   for (const Estimate& estimate : finding.parameters) {
@@ -146,8 +152,8 @@ std::string unexplained_text(const Diagnosis& diagnosis) {
   if (!left.present) return "";
   const std::string on =
       left.depends_on.empty() ? "nothing known" : fmt::format("{}", fmt::join(left.depends_on, ", "));
-  return fmt::format("<p class=\"left\">Unexplained: {} rms that depend on {} (p = {:.2g}). No known cause fits.</p>\n",
-                     micrometres(left.rms), html_text(on), left.p_value);
+  return fmt::format("<p class=\"left\">Unexplained: {} rms that depend on {} (p{}). No known cause fits.</p>\n",
+                     micrometres(left.rms), html_text(on), p_value_after_p(left.p_value));
 }
 
 std::string leftover_text(const Diagnosis& diagnosis) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -64,8 +65,10 @@ std::string tiles(const Evaluation& evaluation) {
 
 std::string warnings(const CompensatedModel& model, const Evaluation& evaluation) {
   std::string html;
-  for (const std::string& one : warnings_of(model, evaluation))
+  for (std::string one : warnings_of(model, evaluation)) {
+    one.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(one.front())));
     html += "<p class=\"warning\">" + html_text(one) + ".</p>\n";
+  }
   return html;
 }
 

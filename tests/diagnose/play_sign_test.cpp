@@ -76,6 +76,9 @@ TEST(PlaySign, TheOtherSignIsNoPlayButUnknownAndDependsOnTheSideOfThatJoint) {
     EXPECT_NE(open.sentence.find("dir3 column"), std::string::npos) << open.sentence;
     EXPECT_EQ(open.sentence.find("gear adjusted"), std::string::npos) << open.sentence;
     for (const std::string& source : open.sources_after) EXPECT_FALSE(source.starts_with("backlash")) << source;
+    for (const Unseen& unseen : open.could_not_have_seen)
+      EXPECT_FALSE(unseen.cause.cause == "backlash" && unseen.cause.joint == 2) << unseen.needs;
+    for (const std::string& limit : open.limits) EXPECT_EQ(limit.find("beside what is unexplained"), std::string::npos);
   }
 }
 

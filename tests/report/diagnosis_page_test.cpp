@@ -151,6 +151,13 @@ TEST_F(DiagnosisPage, CallsNoNoiseWhatIsBeyondTheInstrument) {
   EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>what stays unexplained of a pose</span>"));
 }
 
+TEST_F(DiagnosisPage, AChanceThatIsSmallerThanAnythingKnownIsNoEquality) {
+  diagnosis_.unexplained = {true, {"q4"}, 5e-5, 1e-6, ""};
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms that depend on q4 (p &lt;\u00a010⁻⁶)."));
+  diagnosis_.unexplained.p_value = 0.02;
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms that depend on q4 (p = 0.02)."));
+}
+
 TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {
   for (Measurement& m : diagnosis_.batch.measurements) {
     m.context.time.reset();

@@ -61,13 +61,13 @@ TEST_F(ModelPage, ABiasThatDoesNotHelpIsSaidNotToAndIsNotGreen) {
   parts.validation->compensated.rms = 23.3e-6;
   parts.validation->bias_gain_z = -2;
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
-  EXPECT_TRUE(has(page, "the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 9 poses."));
+  EXPECT_TRUE(has(page, "The bias does not help here: 0.0233 mm with it, 0.0229 mm without on 9 poses."));
   EXPECT_TRUE(has(page, "<div class=\"tile doubtful\"><b>0.023 mm</b><span>compensated, rms</span>"));
   EXPECT_EQ(chart_data(page).at("doubtful"), true);
   parts.validation->compensated.rms = 10e-6;
   parts.validation->bias_gain_z = 5;
   const std::string helped = model_page(CompensatedModel::make(parts).value(), std::nullopt);
-  EXPECT_FALSE(has(helped, "the bias does not help"));
+  EXPECT_FALSE(has(helped, "The bias does not help"));
   EXPECT_TRUE(has(helped, "<div class=\"tile compensated\">"));
 }
 
@@ -76,7 +76,7 @@ TEST_F(ModelPage, SaysThatComplianceWithoutALoadDoesNothing) {
   options.level = "M3";
   options.bias = "none";
   const CompensatedModel model = train(cell_, batch_, options).value();
-  EXPECT_TRUE(has(model_page(model, std::nullopt), "compliance does nothing here: neither link masses nor a payload"));
+  EXPECT_TRUE(has(model_page(model, std::nullopt), "Compliance does nothing here: neither link masses nor a payload"));
   EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "does nothing here"));
 }
 
