@@ -124,7 +124,11 @@ class Duel {
       return stays(fmt::format("it was trained on {:.0f} % of the joint ranges of version {}, limit {:.0f} %",
                                100 * covered, present_.version, 100 * GateOptions::kLeastCoverage));
     if (!shared_.empty() && apart() < GateOptions::kSame) return of_the_same();
-    if (const std::string few = too_few(); !few.empty()) return stays(few);
+    if (const std::string few = too_few(); !few.empty()) {
+      GateVerdict undecided = stays(few);
+      undecided.undecided = true;
+      return undecided;
+    }
     return of_another();
   }
 

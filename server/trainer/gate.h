@@ -4,9 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "server/compensate/paired_gain.h"
 #include "server/registry/model_registry.h"
 #include "server/trainer/judging.h"
-#include "server/compensate/paired_gain.h"
 
 /// Whether a new model takes the place of the one in force by itself.
 ///
@@ -45,7 +45,8 @@ struct GateQuestion {
 
 struct GateVerdict {
   bool put_in_force = false;
-  std::string message;  ///< before, after, limit and why
+  std::string message;     ///< before, after, limit and why
+  bool undecided = false;  ///< not enough to judge by: nothing speaks against the candidate, a person decides
 };
 
 [[nodiscard]] GateVerdict judge(const GateQuestion& question, const GateOptions& options);

@@ -214,12 +214,16 @@ Status Trainer::keep(const CompensatedModel& model, JobProgress progress, Bar ba
     auto verdict = this->verdict(model, present.get(), *sessions, progress.cell, bar);
     if (!verdict) return tl::make_unexpected(verdict.error());
     verdict->message += judged;
-    if (*may_release && !verdict->put_in_force)
+    const bool released = *may_release && (verdict->put_in_force || verdict->undecided);
+    if (*may_release && !released)
       verdict->message += fmt::format("; what was in quarantine of {} stays there", fmt::join(job->batch_ids, ", "));
     const std::lock_guard lock(activation_mutex_);
     if (registry_.in_force(progress.cell) != present) continue;
     const auto version = store_.add_model(progress.cell, model, progress.job, verdict->put_in_force, verdict->message);
     if (!version) return tl::make_unexpected(version.error());
+    for (const std::string& id : released ? job->batch_ids : std::vector<std::string>{}) {
+      if (const Status free = store_.set_quarantine(progress.cell, id, ""); !free) return free;
+    }
     const auto served = std::make_shared<const ServedModel>(ServedModel{progress.cell, *version, model});
     if (verdict->put_in_force) {
       put_in_force(served);

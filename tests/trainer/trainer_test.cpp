@@ -632,10 +632,10 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsR
   EXPECT_TRUE(released({"lt-07"}, "", ""));
 }
 
-TEST_F(TrainerTest, ABatchLeavesQuarantineOnlyWithAModelThatIsPutInForce) {
+TEST_F(TrainerTest, ABatchStaysInQuarantineWhereItsModelIsJudgedAndFoundNotBetter) {
   start();
-  train("lt-07");
-  const JobProgress kept_out = train("lt-08", {.noise = 2e-3, .seed = 5});
+  train("lt-07", {.poses = 200});
+  const JobProgress kept_out = train("lt-08", {.poses = 200, .noise = 2e-3, .seed = 5});
   ASSERT_EQ(trainer_->quarantined("")->size(), 1u) << kept_out.what;
   const auto job = trainer_->retrain("cell-7", {"lt-08"}, "", "", Trainer::Quarantine::kReleased);
   ASSERT_TRUE(job) << job.error().message;
