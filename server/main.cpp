@@ -204,7 +204,7 @@ int run(const Arguments& arguments) {
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;
-  if (!config.log.file.empty()) spdlog::error("{}", served.error().message);
+  if (!config.log.file.empty()) spdlog::error("{}", sentence(served.error()));
   return refuse(served.error());
 }
 

@@ -13,7 +13,8 @@
 #include <string_view>
 #include <vector>
 
-// The one rule of the house that a machine holds: who may include whom, who may start a thread, and that nobody sleeps.
+// The rules of the house that a machine holds: who may include whom, who may start a thread, and that nobody sleeps.
+// Rooms, floors and doors are those of the table in server/README.md.
 // A source tree is a map from path to text, so that the checks themselves are tested on small made-up trees.
 
 namespace trammel {
@@ -22,19 +23,22 @@ namespace {
 using SourceTree = std::map<std::string, std::string>;
 using Complaints = std::vector<std::string>;
 
-/// Lower floors only; siblings never.
-const std::map<std::string, int> kFloors = {
-    {"server/base", 0},       {"server/robot", 1},    {"server/error_sources", 2}, {"server/measurement", 2},
-    {"server/calibrate", 3},  {"server/bias", 3},     {"server/plan", 3},          {"server/simulate", 3},
-    {"server/compensate", 4}, {"server/diagnose", 5}, {"server/store", 6},         {"server/registry", 6},
-    {"server/report", 6},     {"server/trainer", 7},  {"server/dds", 8},           {"server/http", 8},
-    {"server/config", 9},     {"server", 10}};  // server/main.cpp
+/// What the table of server/README.md says of a room or of a room's subfolder.
+struct Room {
+  std::optional<int> floor;  ///< a room's; a subfolder stands on its room's
+  bool all_is_door = false;
+  std::set<std::string> door;  ///< headers, relative to this folder
+};
+using Rooms = std::map<std::string, Room>;
+
+constexpr int kFloorOfMain = 10;  // server/main.cpp
 
 /// What the folders outside server/ see of our own tree, and the highest floor of server/ with it.
 struct Outsider {
   std::set<std::string> folders;
   int highest_floor = 0;
 };
+
 const std::map<std::string, Outsider> kOutsiders = {
     {"clients/session", {{"idl"}, 0}},
     {"clients/cam", {{"idl", "clients/session"}, 0}},
@@ -131,41 +135,143 @@ std::vector<Include> includes_of(const std::string& text) {
   return includes;
 }
 
-/// Why a file in `folder` may not include `header`, a path of our own tree; nothing when it may.
-std::optional<std::string> why_not(const std::string& folder, const std::string& header) {
-  const std::string target = folder_of(header);
-  if (target == folder) return std::nullopt;
-  if (folder == "server/config" && header.ends_with("_options.h")) return std::nullopt;
-  const auto target_floor = kFloors.find(target);
-  if (const auto outsider = kOutsiders.find(folder); outsider != kOutsiders.end()) {
-    if (outsider->second.folders.contains(target)) return std::nullopt;
-    if (target_floor != kFloors.end() && target_floor->second <= outsider->second.highest_floor) return std::nullopt;
-    return target + " is not for " + folder;
+/// The cells of a line of a table in Markdown, without the spaces around them.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream in(line);
+  std::string cell;
+  std::getline(in, cell, '|');
+  while (std::getline(in, cell, '|')) {
+    const auto first = cell.find_first_not_of(' ');
+    cells.push_back(first == std::string::npos ? "" : cell.substr(first, cell.find_last_not_of(' ') - first + 1));
   }
-  if (target == "idl")
-    return folder == "server/dds" ? std::nullopt : std::optional<std::string>("idl is for server/dds");
-  if (target_floor == kFloors.end()) return target + " has no floor that the server knows";
-  if (target_floor->second < kFloors.at(folder)) return std::nullopt;
-  return target + " is on floor " + std::to_string(target_floor->second) + ", " + folder + " on floor " +
-         std::to_string(kFloors.at(folder));
+  return cells;
 }
 
-Complaints check_floors(const SourceTree& tree) {
+/// The words that stand between back quotes.
+std::set<std::string> quoted(const std::string& cell) {
+  static const std::regex kQuoted("`([^`]+)`");
+  std::set<std::string> words;
+  for (auto at = std::sregex_iterator(cell.begin(), cell.end(), kQuoted); at != std::sregex_iterator(); ++at)
+    words.insert((*at)[1]);
+  return words;
+}
+
+/// The rows `| floor | room | what is decided here | door |`; the floor of a subfolder is left empty.
+Rooms rooms_of(const std::string& readme) {
+  Rooms rooms;
+  std::istringstream lines(readme);
+  for (std::string line; std::getline(lines, line);) {
+    const std::vector<std::string> cells = cells_of(line);
+    if (cells.size() != 4 || !cells[1].starts_with("`")) continue;
+    Room room{std::nullopt, cells[3] == "all", quoted(cells[3])};
+    if (!cells[0].empty()) room.floor = std::stoi(cells[0]);
+    rooms[*quoted(cells[1]).begin()] = room;
+  }
+  return rooms;
+}
+
+/// `server/bias` of `server/bias/kernels`; the folder itself where it is a room.
+std::string room_of(const std::string& folder) {
+  const auto slash = folder.find('/', folder.find('/') + 1);
+  return slash == std::string::npos ? folder : folder.substr(0, slash);
+}
+
+/// The floor of a room of the server, its main program above them all.
+std::optional<int> floor_of(const Rooms& rooms, const std::string& room) {
+  if (room == "server") return kFloorOfMain;
+  const auto found = rooms.find(room);
+  return found == rooms.end() ? std::nullopt : found->second.floor;
+}
+
+/// Why a file in `folder` may not include `header`, a path of our own tree; nothing when it may. By floors alone.
+std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder, const std::string& header) {
+  const std::string target = room_of(folder_of(header)), room = room_of(folder);
+  if (target == room) return std::nullopt;
+  if (room == "server/config" && header.ends_with("_options.h")) return std::nullopt;
+  const auto target_floor = floor_of(rooms, target);
+  if (const auto outsider = kOutsiders.find(room); outsider != kOutsiders.end()) {
+    if (outsider->second.folders.contains(target)) return std::nullopt;
+    if (target_floor && *target_floor <= outsider->second.highest_floor) return std::nullopt;
+    return target + " is not for " + room;
+  }
+  if (target == "idl") return room == "server/dds" ? std::nullopt : std::optional<std::string>("idl is for server/dds");
+  if (!target_floor) return target + " has no floor that the server knows";
+  const int own = *floor_of(rooms, room);
+  if (*target_floor < own) return std::nullopt;
+  return target + " is on floor " + std::to_string(*target_floor) + ", " + room + " on floor " + std::to_string(own);
+}
+
+bool is_ours(const std::string& header) {
+  return header.starts_with("server/") || header.starts_with("clients/") || header.starts_with("idl/") ||
+         header.starts_with("tests/");
+}
+
+Complaints check_floors(const SourceTree& tree, const Rooms& rooms) {
   Complaints complaints;
   for (const auto& [path, text] : tree) {
     if (!is_source(path) || is_under(path, "tests")) continue;
-    const std::string folder = folder_of(path);
-    if (!kFloors.contains(folder) && !kOutsiders.contains(folder)) {
+    const std::string folder = folder_of(path), room = room_of(folder);
+    const bool known =
+        kOutsiders.contains(room) || (floor_of(rooms, room) && (room == folder || rooms.contains(folder)));
+    if (!known) {
       complaints.push_back(path + ": folder " + folder + " has no floor");
       continue;
     }
     for (const auto& [line, header] : includes_of(text)) {
-      const bool ours = header.starts_with("server/") || header.starts_with("clients/") || header.starts_with("idl/") ||
-                        header.starts_with("tests/");
-      if (!ours) continue;
-      if (const auto reason = why_not(folder, header)) {
+      if (!is_ours(header)) continue;
+      if (const auto reason = why_not(rooms, folder, header))
         complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header + ": " + *reason);
-      }
+    }
+  }
+  return complaints;
+}
+
+/// Whether the door of `folder` lets this header out.
+bool is_door(const Rooms& rooms, const std::string& folder, const std::string& header) {
+  const auto room = rooms.find(folder);
+  return room == rooms.end() || room->second.all_is_door ||
+         room->second.door.contains(header.substr(folder.size() + 1));
+}
+
+/// The folder whose inside a file may see: its own; for a test, the room that it mirrors.
+std::string inside_of(const std::string& path) {
+  const std::string folder = folder_of(path);
+  if (!is_under(path, "tests")) return folder;
+  return folder == "tests/clients" ? "clients/cli" : "server" + room_of(folder).substr(std::string("tests").size());
+}
+
+/// The folder whose door keeps `header` from the file at `path`; nothing where the file may see it.
+std::optional<std::string> shut_by(const Rooms& rooms, const std::string& path, const std::string& header) {
+  const std::string inside = inside_of(path), target = folder_of(header), room = room_of(target);
+  const bool same_room = room_of(inside) == room;
+  if (same_room && (is_under(path, "tests") || target == inside)) return std::nullopt;
+  const std::string& shut = same_room ? target : room;
+  if ((same_room && target == room) || is_door(rooms, shut, header)) return std::nullopt;
+  return shut;
+}
+
+/// Complains of headers that are inside another room, or inside another subfolder of the same room. Benchmarks may
+/// measure anything.
+Complaints check_doors(const SourceTree& tree, const Rooms& rooms) {
+  Complaints complaints;
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || is_under(path, "tests/benchmarks")) continue;
+    for (const auto& [line, header] : includes_of(text)) {
+      if (!is_ours(header) || is_under(header, "tests")) continue;
+      if (const auto shut = shut_by(rooms, path, header))
+        complaints.push_back(path + ":" + std::to_string(line) + ": includes " + header + ", which is inside " + *shut);
+    }
+  }
+  return complaints;
+}
+
+/// Complains of doors that name a header which is not there.
+Complaints check_doors_lead_somewhere(const SourceTree& tree, const Rooms& rooms) {
+  Complaints complaints;
+  for (const auto& [folder, room] : rooms) {
+    for (const std::string& header : room.door) {
+      if (!tree.contains(folder + "/" + header)) complaints.push_back(folder + ": there is no " + header);
     }
   }
   return complaints;
@@ -185,31 +291,52 @@ Complaints check_reserved_libraries(const SourceTree& tree) {
   return complaints;
 }
 
-/// Folders that include each other, however long the way round.
-Complaints check_cycles(const SourceTree& tree) {
-  std::map<std::string, std::set<std::string>> reaches;
-  for (const auto& [path, text] : tree) {
-    if (!is_source(path) || is_under(path, "tests")) continue;
-    for (const auto& include : includes_of(text)) {
-      const std::string target = folder_of(include.header);
-      if (tree.contains(include.header) && target != folder_of(path)) reaches[folder_of(path)].insert(target);
-    }
-  }
+using Graph = std::map<std::string, std::set<std::string>>;
+
+/// The nodes that lead to themselves, however long the way round.
+std::set<std::string> in_circles(Graph reaches) {
   for (bool grew = true; grew;) {
     grew = false;
-    for (auto& [folder, targets] : reaches) {
+    for (auto& [node, targets] : reaches) {
       const std::set<std::string> known = targets;
       for (const std::string& target : known) {
-        if (const auto further = reaches.find(target); further != reaches.end()) {
+        if (const auto further = reaches.find(target); further != reaches.end())
           targets.insert(further->second.begin(), further->second.end());
-        }
       }
       grew = grew || targets.size() != known.size();
     }
   }
+  std::set<std::string> nodes;
+  for (const auto& [node, targets] : reaches) {
+    if (targets.contains(node)) nodes.insert(node);
+  }
+  return nodes;
+}
+
+/// Who includes whom among the nodes that `node_of` makes of paths. A room's own files may use its subfolders and be
+/// used by them.
+template <typename NodeOf>
+Graph graph_of(const SourceTree& tree, NodeOf node_of) {
+  Graph graph;
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || is_under(path, "tests")) continue;
+    for (const auto& include : includes_of(text)) {
+      if (!tree.contains(include.header) || node_of(include.header) == node_of(path)) continue;
+      graph[node_of(path)].insert(node_of(include.header));
+    }
+  }
+  return graph;
+}
+
+/// Files that include each other, a header and its source taken as one; rooms; and the subfolders of a room.
+Complaints check_circles(const SourceTree& tree) {
+  const auto without_ending = [](const std::string& path) { return path.substr(0, path.rfind('.')); };
+  const auto room = [](const std::string& path) { return room_of(folder_of(path)); };
+  Graph folders = graph_of(tree, folder_of);
+  std::erase_if(folders, [](const auto& node) { return node.first == room_of(node.first); });
   Complaints complaints;
-  for (const auto& [folder, targets] : reaches) {
-    if (targets.contains(folder)) complaints.push_back(folder + ": includes itself by way of other folders");
+  for (const Graph& graph : {graph_of(tree, without_ending), graph_of(tree, room), folders}) {
+    for (const std::string& node : in_circles(graph)) complaints.push_back(node + ": includes itself by way of others");
   }
   return complaints;
 }
@@ -263,6 +390,13 @@ Complaints check_mirror(const SourceTree& tree) {
   return complaints;
 }
 
+Rooms read_rooms() {
+  std::ifstream in(std::filesystem::path(TRAMMEL_SOURCE_DIR) / "server/README.md");
+  std::ostringstream text;
+  text << in.rdbuf();
+  return rooms_of(std::move(text).str());
+}
+
 SourceTree read_source_tree() {
   SourceTree tree;
   const std::filesystem::path root = TRAMMEL_SOURCE_DIR;
@@ -295,11 +429,16 @@ TEST(Tidy, TheSourceTreeIsThere) {
   EXPECT_TRUE(tree.contains("tests/tidy_test.cpp"));
 }
 
-TEST(Tidy, FoldersIncludeLowerFloorsOnly) { EXPECT_EQ(shown(check_floors(read_source_tree())), ""); }
+TEST(Tidy, RoomsIncludeLowerFloorsOnly) { EXPECT_EQ(shown(check_floors(read_source_tree(), read_rooms())), ""); }
+
+TEST(Tidy, NobodyLooksBehindADoor) {
+  EXPECT_EQ(shown(check_doors(read_source_tree(), read_rooms())), "");
+  EXPECT_EQ(shown(check_doors_lead_somewhere(read_source_tree(), read_rooms())), "");
+}
 
 TEST(Tidy, LibrariesStayInTheFoldersThatOwnThem) { EXPECT_EQ(shown(check_reserved_libraries(read_source_tree())), ""); }
 
-TEST(Tidy, NoFoldersIncludeEachOther) { EXPECT_EQ(shown(check_cycles(read_source_tree())), ""); }
+TEST(Tidy, NothingIncludesItselfByWayOfOthers) { EXPECT_EQ(shown(check_circles(read_source_tree())), ""); }
 
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
@@ -309,50 +448,102 @@ TEST(Tidy, TestFoldersMirrorTheServer) { EXPECT_EQ(shown(check_mirror(read_sourc
 
 // The checks themselves.
 
-TEST(TidyChecks, AllowLowerFloorsAndTheOwnFolder) {
-  EXPECT_EQ(
-      shown(check_floors({{"server/calibrate/a.cpp",
-                           include("server/calibrate/a.h") + include("server/measurement/m.h") + "#include <vector>\n"},
-                          {"server/main.cpp", include("server/config/c.h")},
-                          {"server/dds/d.cpp", include("idl/topics.h")}})),
-      "");
+/// A small house: four rooms, one with two subfolders.
+const Rooms& small_house() {
+  static const Rooms kRooms = rooms_of(
+      "| floor | room | what is decided here | door |\n|---|---|---|---|\n"
+      "| 0 | `server/base` | results | all |\n"
+      "| 3 | `server/bias` | the rest | `model.h` `kernels/spelling.h` |\n"
+      "| | `server/bias/kernels` | kernels | `kernel.h` `spelling.h` |\n"
+      "| | `server/bias/search` | starts | none |\n"
+      "| 3 | `server/calibrate` | parameters | `c.h` |\n"
+      "| 7 | `server/trainer` | jobs | `trainer.h` |\n"
+      "| 8 | `server/dds` | requests | all |\n"
+      "| 9 | `server/config` | files | all |\n");
+  return kRooms;
+}
+
+std::string floors(const SourceTree& tree) { return shown(check_floors(tree, small_house())); }
+std::string doors(const SourceTree& tree) { return shown(check_doors(tree, small_house())); }
+
+TEST(TidyChecks, ReadRoomsFloorsAndDoorsFromATable) {
+  EXPECT_EQ(small_house().size(), 8u);
+  EXPECT_EQ(small_house().at("server/dds").floor, 8);
+  EXPECT_TRUE(small_house().at("server/base").all_is_door);
+  EXPECT_EQ(small_house().at("server/bias/kernels").floor, std::nullopt);
+  EXPECT_TRUE(small_house().at("server/bias/search").door.empty());
+}
+
+TEST(TidyChecks, AllowLowerFloorsAndTheOwnRoom) {
+  EXPECT_EQ(floors({{"server/calibrate/a.cpp",
+                     include("server/calibrate/a.h") + include("server/base/m.h") + "#include <vector>\n"},
+                    {"server/main.cpp", include("server/config/c.h")},
+                    {"server/bias/kernels/k.cpp", include("server/bias/model.h")},
+                    {"server/dds/d.cpp", include("idl/topics.h")}}),
+            "");
 }
 
 TEST(TidyChecks, ComplainOfHigherFloorsAndSiblings) {
   EXPECT_EQ(
-      shown(check_floors({{"server/robot/a.h", "\n" + include("server/calibrate/b.h")},
-                          {"server/bias/b.cpp", include("server/calibrate/b.h")},
-                          {"server/trainer/t.cpp", include("clients/session/session.h")},
-                          {"server/store/s.cpp", include("idl/topics.h")}})),
-      "server/bias/b.cpp:1: includes server/calibrate/b.h: server/calibrate is on floor 3, server/bias on floor 3\n"
-      "server/robot/a.h:2: includes server/calibrate/b.h: server/calibrate is on floor 3, server/robot on floor 1\n"
-      "server/store/s.cpp:1: includes idl/topics.h: idl is for server/dds\n"
+      floors({{"server/base/a.h", "\n" + include("server/calibrate/b.h")},
+              {"server/bias/kernels/b.cpp", include("server/calibrate/b.h")},
+              {"server/trainer/t.cpp", include("clients/session/session.h") + include("idl/topics.h")}}),
+      "server/base/a.h:2: includes server/calibrate/b.h: server/calibrate is on floor 3, server/base on floor 0\n"
+      "server/bias/kernels/b.cpp:1: includes server/calibrate/b.h: server/calibrate is on floor 3, server/bias on "
+      "floor 3\n"
       "server/trainer/t.cpp:1: includes clients/session/session.h: clients/session has no floor that the server "
-      "knows\n");
+      "knows\n"
+      "server/trainer/t.cpp:2: includes idl/topics.h: idl is for server/dds\n");
 }
 
-TEST(TidyChecks, ComplainOfAFolderWithoutAFloor) {
-  EXPECT_EQ(shown(check_floors({{"server/utils/a.h", ""}})), "server/utils/a.h: folder server/utils has no floor\n");
+TEST(TidyChecks, ComplainOfAFolderThatIsNotInTheTable) {
+  EXPECT_EQ(floors({{"server/utils/a.h", ""}, {"server/bias/more/a.h", ""}}),
+            "server/bias/more/a.h: folder server/bias/more has no floor\n"
+            "server/utils/a.h: folder server/utils has no floor\n");
 }
 
 TEST(TidyChecks, LetClientsSeeTheirPartOnly) {
-  EXPECT_EQ(
-      shown(check_floors({{"clients/session/a.cpp", include("idl/topics.h") + include("server/base/result.h")},
-                          {"clients/cam/a.cpp", include("clients/session/session.h")},
-                          {"clients/cli/a.cpp", include("clients/cam/a.h") + include("server/trainer/train.h")}})),
-      "");
-  EXPECT_EQ(check_floors({{"clients/session/a.cpp", include("server/robot/chain.h")}}).size(), 1u);
-  EXPECT_EQ(check_floors({{"clients/cam/a.cpp", include("server/robot/chain.h")}}).size(), 1u);
-  EXPECT_EQ(check_floors({{"clients/session/a.cpp", include("clients/cli/a.h")}}).size(), 1u);
-  EXPECT_EQ(check_floors({{"clients/cli/a.cpp", include("server/dds/codec.h")}}).size(), 1u);
-  EXPECT_EQ(check_floors({{"clients/cli/a.cpp", include("idl/topics.h")}}).size(), 1u);
+  EXPECT_EQ(floors({{"clients/session/a.cpp", include("idl/topics.h") + include("server/base/result.h")},
+                    {"clients/cam/a.cpp", include("clients/session/session.h")},
+                    {"clients/cli/a.cpp", include("clients/cam/a.h") + include("server/trainer/train.h")}}),
+            "");
+  EXPECT_NE(floors({{"clients/session/a.cpp", include("server/bias/model.h")}}), "");
+  EXPECT_NE(floors({{"clients/cam/a.cpp", include("server/bias/model.h")}}), "");
+  EXPECT_NE(floors({{"clients/session/a.cpp", include("clients/cli/a.h")}}), "");
+  EXPECT_NE(floors({{"clients/cli/a.cpp", include("server/dds/codec.h")}}), "");
+  EXPECT_NE(floors({{"clients/cli/a.cpp", include("idl/topics.h")}}), "");
 }
 
 TEST(TidyChecks, LetConfigSeeOptionsOfAnyFloor) {
+  EXPECT_EQ(floors({{"server/config/c.h", include("server/dds/dds_options.h") + include("server/dds/codec.h")}}), "");
+  EXPECT_NE(floors({{"server/trainer/c.h", include("server/dds/dds_options.h")}}), "");
+}
+
+TEST(TidyChecks, LetTheRoomItsTestsAndItsDoorSeeWhatIsInside) {
   EXPECT_EQ(
-      check_floors({{"server/config/c.h", include("server/dds/dds_options.h") + include("server/dds/codec.h")}}).size(),
-      0u);
-  EXPECT_EQ(check_floors({{"server/registry/c.h", include("server/dds/dds_options.h")}}).size(), 1u);
+      doors({{"server/bias/model.cpp", include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
+             {"server/bias/kernels/tiles.cpp", include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
+             {"server/trainer/t.cpp", include("server/bias/model.h") + include("server/bias/kernels/spelling.h")},
+             {"tests/bias/a_test.cpp", include("server/bias/kernels/tiles.h") + include("server/bias/inner.h")},
+             {"tests/benchmarks/a.cpp", include("server/bias/inner.h")}}),
+      "");
+}
+
+TEST(TidyChecks, ComplainOfWhoeverLooksBehindADoor) {
+  EXPECT_EQ(
+      doors({{"server/bias/search/starts.cpp", include("server/bias/kernels/tiles.h")},
+             {"server/trainer/t.cpp", include("server/bias/inner.h") + include("server/bias/kernels/kernel.h")},
+             {"tests/trainer/t_test.cpp", include("server/bias/inner.h")}}),
+      "server/bias/search/starts.cpp:1: includes server/bias/kernels/tiles.h, which is inside server/bias/kernels\n"
+      "server/trainer/t.cpp:1: includes server/bias/inner.h, which is inside server/bias\n"
+      "server/trainer/t.cpp:2: includes server/bias/kernels/kernel.h, which is inside server/bias\n"
+      "tests/trainer/t_test.cpp:1: includes server/bias/inner.h, which is inside server/bias\n");
+}
+
+TEST(TidyChecks, ComplainOfADoorThatLeadsNowhere) {
+  EXPECT_EQ(shown(check_doors_lead_somewhere({{"server/bias/a.h", ""}},
+                                             rooms_of("| 3 | `server/bias` | the rest | `a.h` `b.h` |\n"))),
+            "server/bias: there is no b.h\n");
 }
 
 TEST(TidyChecks, ComplainOfLibrariesOutsideTheirFolders) {
@@ -371,17 +562,37 @@ TEST(TidyChecks, ComplainOfLibrariesOutsideTheirFolders) {
   EXPECT_EQ(complaints("server/trainer/trainer.cpp", "sqlite3.h"), 1u);
 }
 
-TEST(TidyChecks, FindCyclesHoweverLong) {
+TEST(TidyChecks, FindCirclesOfRoomsHoweverLong) {
   const SourceTree line = {{"server/a/a.h", include("server/b/b.h")},
                            {"server/b/b.h", include("server/c/c.h")},
                            {"server/c/c.h", include("server/c/d.h")},
                            {"server/c/d.h", ""}};
-  EXPECT_EQ(shown(check_cycles(line)), "");
+  EXPECT_EQ(shown(check_circles(line)), "");
   SourceTree circle = line;
-  circle["server/c/d.h"] = include("server/a/a.h");
-  EXPECT_EQ(shown(check_cycles(circle)),
-            "server/a: includes itself by way of other folders\nserver/b: includes itself by way of other folders\n"
-            "server/c: includes itself by way of other folders\n");
+  circle["server/c/d.h"] = include("server/a/e.h");
+  circle["server/a/e.h"] = "";
+  EXPECT_EQ(shown(check_circles(circle)),
+            "server/a: includes itself by way of others\nserver/b: includes itself by way of others\n"
+            "server/c: includes itself by way of others\n");
+}
+
+TEST(TidyChecks, FindCirclesOfFilesAHeaderAndItsSourceTakenAsOne) {
+  EXPECT_EQ(shown(check_circles({{"server/a/a.h", ""},
+                                 {"server/a/a.cpp", include("server/a/a.h") + include("server/a/b.h")},
+                                 {"server/a/b.h", include("server/a/a.h")}})),
+            "server/a/a: includes itself by way of others\nserver/a/b: includes itself by way of others\n");
+}
+
+TEST(TidyChecks, FindCirclesOfSubfoldersButLetARoomAndItsSubfoldersMeet) {
+  EXPECT_EQ(shown(check_circles({{"server/a/a.h", ""},
+                                 {"server/a/b.cpp", include("server/a/x/c.h")},
+                                 {"server/a/x/c.h", include("server/a/a.h")}})),
+            "");
+  EXPECT_EQ(shown(check_circles({{"server/a/x/a.h", include("server/a/y/b.h")},
+                                 {"server/a/y/b.h", ""},
+                                 {"server/a/y/c.h", include("server/a/x/d.h")},
+                                 {"server/a/x/d.h", ""}})),
+            "server/a/x: includes itself by way of others\nserver/a/y: includes itself by way of others\n");
 }
 
 TEST(TidyChecks, FindThreadsInCodeAndNotInComments) {

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "clients/cli/commands.h"
+#include "clients/cli/commands/commands.h"
 
 namespace trammel::cli {
 
@@ -62,7 +62,7 @@ int run_command_line(int argc, const char* const* argv) {
   const std::string command = app.get_subcommands().front()->get_name();
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  fmt::print(stderr, "trammel {}: {}\n", command, done.error().message);
+  fmt::print(stderr, "trammel {}: {}\n", command, sentence(done.error()));
   return exit_code(done.error().code);
 }
 

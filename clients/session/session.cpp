@@ -76,7 +76,7 @@ struct Session::Participant {
                                                              const Route& route) {
     auto reply = caller.call(std::move(request), route, deadline());
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
-      return failure(ErrorCode::kUnreachable, "{} ({})", reply.error().message, where_it_looked());
+      return failure(ErrorCode::kUnreachable, "{} ({})", sentence(reply.error()), where_it_looked());
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
@@ -130,7 +130,7 @@ struct Session::Participant {
         auto reply = call(caller, std::move(request), {context.cell, {}, false});
         if (!reply) {
           if (first == 0 || reply.error().code == ErrorCode::kUnreachable) return tl::make_unexpected(reply.error());
-          return failure(reply.error().code, "after the first {}: {}", first, reply.error().message);
+          return failure(reply.error().code, "after the first {}: {}", first, sentence(reply.error()));
         }
         if (get(*reply).size() != count) {
           return failure(ErrorCode::kInternal, "server {} answered {} items for {}",

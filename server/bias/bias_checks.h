@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "server/bias/bias_model.h"
-#include "server/bias/kernel_spelling.h"
+#include "server/bias/kernels/kernel_spelling.h"
 
 /// What a bias cannot be learned or restored from, in sentences that name row, value and limit.
 namespace trammel {

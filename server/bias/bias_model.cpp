@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "server/bias/bias_checks.h"
-#include "server/bias/bias_outputs.h"
+#include "server/bias/outputs/bias_outputs.h"
 
 namespace trammel {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/bias/linear_block.h"
+#include "server/bias/kernels/linear_block.h"
 #include "server/robot/pose.h"
 
 /// What the physics leaves over, learned: joints -> residual of the tool position, with its uncertainty.

@@ -7,8 +7,8 @@
 #include <numeric>
 
 #include "server/base/units.h"
-#include "server/bias/halves.h"
-#include "server/bias/kernel_spelling.h"
+#include "server/bias/kernels/kernel_spelling.h"
+#include "server/bias/process/halves.h"
 
 namespace trammel {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <map>
 
-#include "server/calibrate/check_needs.h"
-#include "server/calibrate/frames.h"
-#include "server/calibrate/identify.h"
-#include "server/calibrate/order_search.h"
+#include "server/calibrate/frames/frames.h"
+#include "server/calibrate/identify/check_needs.h"
+#include "server/calibrate/identify/identify.h"
+#include "server/calibrate/identify/order_search.h"
 
 namespace trammel {
 
@@ -43,8 +43,7 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   CalibrationProblem complete = problem;
   if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {
-      return tl::make_unexpected(
-          Error{found.error().code, fmt::format("batch {}: {}", problem.batch.id, found.error().message)});
+      return Failure(found.error()).in("batch " + problem.batch.id);
     }
   }
   if (Status fit = check_needs(complete); !fit) return tl::make_unexpected(fit.error());

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/calibrate/identifiability.h"
+#include "server/calibrate/identify/identifiability.h"
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/base/units.h"
-#include "server/calibrate/localisation.h"
+#include "server/calibrate/frames/localisation.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel {

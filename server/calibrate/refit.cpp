@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <set>
 
-#include "server/calibrate/check_needs.h"
-#include "server/calibrate/gauss_newton.h"
-#include "server/calibrate/identify.h"
-#include "server/calibrate/refit_frames.h"
+#include "server/calibrate/frames/refit_frames.h"
+#include "server/calibrate/identify/check_needs.h"
+#include "server/calibrate/identify/gauss_newton.h"
+#include "server/calibrate/identify/identify.h"
 
 namespace trammel {
 
@@ -223,8 +223,7 @@ Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const 
   if (Status located =
           locate_refitted_frames(before, batch, contains(names, "base"), contains(names, "tool"), problem.model);
       !located) {
-    return tl::make_unexpected(
-        Error{located.error().code, fmt::format("batch {}: {}", batch.id, located.error().message)});
+    return Failure(located.error()).in("batch " + batch.id);
   }
   Result<CalibrationResult> found = identify(problem, options);
   if (!found) return tl::make_unexpected(found.error());

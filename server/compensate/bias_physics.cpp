@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "server/base/check.h"
-#include "server/calibrate/frames.h"
+#include "server/calibrate/frames/frames.h"
 
 namespace trammel {
 

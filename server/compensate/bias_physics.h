@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "server/bias/linear_block.h"
+#include "server/bias/kernels/linear_block.h"
 #include "server/error_sources/physical_model.h"
 
 namespace trammel {

@@ -7,14 +7,13 @@
 #include "server/base/check.h"
 #include "server/base/coverage.h"
 #include "server/base/units.h"
-#include "server/bias/kernel_spelling.h"
+#include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/paired_gain.h"
 
 namespace trammel {
 
 namespace {
-
 
 /// Mean over the coordinates of minus the log density of errors in normal distributions of these stddevs, nat.
 std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {

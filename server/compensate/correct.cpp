@@ -180,7 +180,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   };
 
   const Result<InverseResult> start = nominal_joints(target, parts().physics.tools.at(tool).inverse());
-  if (!start) return end(CorrectionStatus::kRefused, start.error().message);
+  if (!start) return end(CorrectionStatus::kRefused, sentence(start.error()));
   context.q = start->q;
   result.X_BT_wanted =
       target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context) : target.X_BT;

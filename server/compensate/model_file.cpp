@@ -373,7 +373,7 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
   if (!cell) return tl::make_unexpected(cell.error());
   Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
-  if (!physics) return refused("{}: {}", where, physics.error().message);
+  if (!physics) return refused("{}: {}", where, sentence(physics.error()));
   CompensatedModel::Parts parts;
   parts.physics = std::move(*physics);
   parts.covariance = matrix_from(content.at("covariance"));
@@ -429,7 +429,7 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
     if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
     if (content.contains("bias_origin")) {
       Result<CompensatedModel::Parts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);
-      if (!origin) return refused("{}: {}", where, origin.error().message);
+      if (!origin) return refused("{}: {}", where, sentence(origin.error()));
       parts.bias_origin = std::move(*origin);
     }
     if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");

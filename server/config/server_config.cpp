@@ -10,7 +10,7 @@
 #include "server/base/near_miss.h"
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
-#include "server/bias/kernel_spelling.h"
+#include "server/bias/kernels/kernel_spelling.h"
 #include "server/error_sources/error_source.h"
 #include "server/error_sources/physical_model.h"
 
@@ -162,16 +162,16 @@ void check_training(const Cell& cell, const std::string& file, std::vector<std::
   const auto note = [&](const char* key, const std::string& why) {
     problems.push_back(fmt::format("{}: model: {}: {}", file, key, why));
   };
-  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error().message);
+  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", sentence(bias.error()));
   bool each_is_known = true;
   for (const std::string& source : cell.model.error_sources) {
     const auto made = make_error_source(source, cell);
-    if (!made) note("error_sources", made.error().message);
+    if (!made) note("error_sources", sentence(made.error()));
     each_is_known = each_is_known && made;
   }
   if (!each_is_known) return;
   const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
-  if (!together) note("error_sources", together.error().message);
+  if (!together) note("error_sources", sentence(together.error()));
 }
 
 void read_cells(const std::string& path, ServerFile& file, std::vector<std::string>& problems) {
@@ -179,7 +179,7 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<std::stri
   for (const std::string& cell_file : file.cell_files) {
     auto cell = read_cell(cell_file);
     if (!cell) {
-      problems.push_back(fmt::format("{}: cells: {}", path, cell.error().message));
+      problems.push_back(fmt::format("{}: cells: {}", path, sentence(cell.error())));
       continue;
     }
     const std::string name = cell->name;
@@ -196,7 +196,7 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<std::stri
 
 ServerReading read_server(const std::string& path) {
   const auto text = read_text_file(path);
-  if (!text) return {{}, {text.error().message}};
+  if (!text) return {{}, {sentence(text.error())}};
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   ServerFile file;
   std::vector<std::string> problems;
@@ -204,7 +204,7 @@ ServerReading read_server(const std::string& path) {
     read_server_map(map, folder, file);
     return true;
   });
-  if (!read) problems.push_back(read.error().message);
+  if (!read) problems.push_back(sentence(read.error()));
   read_cells(path, file, problems);
   return {std::move(file.config), std::move(problems)};
 }

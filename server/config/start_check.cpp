@@ -30,7 +30,7 @@ StartCheck check_start(const ServerReading& server, const std::string& path) {
   if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
   const bool store_held = !store && store.error().code == ErrorCode::kConflict;
   if (store_held && !port && port.error().code == ErrorCode::kConflict) {
-    check.notes.push_back(fmt::format("{}: runs already, it seems: {}", path, store.error().message));
+    check.notes.push_back(fmt::format("{}: runs already, it seems: {}", path, sentence(store.error())));
   } else {
     if (!store) wrong("store", store.error());
     if (!port) wrong(port.error().code == ErrorCode::kConflict ? "dds: port" : "dds: address", port.error());

@@ -3,13 +3,13 @@
 #include <algorithm>
 
 #include "server/base/hash.h"
-#include "server/calibrate/frames.h"
+#include "server/calibrate/frames/frames.h"
 #include "server/calibrate/orientation_check.h"
-#include "server/diagnose/answers.h"
-#include "server/diagnose/dependence.h"
-#include "server/diagnose/more_than_noise.h"
-#include "server/diagnose/next_poses.h"
-#include "server/diagnose/wording.h"
+#include "server/diagnose/evidence/dependence.h"
+#include "server/diagnose/tell/answers.h"
+#include "server/diagnose/tell/more_than_noise.h"
+#include "server/diagnose/tell/next_poses.h"
+#include "server/diagnose/tell/wording.h"
 #include "server/measurement/velocity.h"
 
 namespace trammel {

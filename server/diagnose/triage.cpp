@@ -30,7 +30,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/orientation_check.h"
-#include "server/diagnose/batch_alternatives.h"
+#include "server/diagnose/triage/batch_alternatives.h"
 
 namespace trammel {
 

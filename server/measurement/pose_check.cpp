@@ -32,9 +32,9 @@ Status check_pose(PoseContext& context, const Cell& cell, const std::string& whe
                    joint_text(value < joint.lower ? joint.lower : joint.upper, joint.type));
   }
   Result<std::string> tool = resolve_tool(cell, context.tool);
-  if (!tool) return refused("{}: {}", where, tool.error().message);
+  if (!tool) return refused("{}: {}", where, sentence(tool.error()));
   Result<std::string> payload = resolve_payload(cell, context.payload);
-  if (!payload) return refused("{}: {}", where, payload.error().message);
+  if (!payload) return refused("{}: {}", where, sentence(payload.error()));
   context.tool = std::move(*tool);
   context.payload = std::move(*payload);
   return {};

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/measurement/csv_table.h"
+#include "server/measurement/files/csv_table.h"
 #include "server/robot/chain.h"
 #include "server/robot/pose_context.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/measurement/joint_list.h"
+#include "server/measurement/files/joint_list.h"
 #include "server/plan/separation.h"
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"

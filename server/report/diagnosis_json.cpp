@@ -1,7 +1,7 @@
 #include "server/report/diagnosis_json.h"
 
 #include "server/base/units.h"
-#include "server/diagnose/wording.h"
+#include "server/diagnose/tell/wording.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/figures_json.h"
 

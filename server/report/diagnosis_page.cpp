@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
-#include "server/diagnose/wording.h"
+#include "server/diagnose/tell/wording.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"

@@ -231,7 +231,7 @@ namespace {
 Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml, const std::string& where) {
   return read_yaml(cell_yaml, where, [&](const YamlMap& map) {
     Cell cell = read_cell_map(map);
-    if (!robot) throw YamlRefusal{robot.error().message};
+    if (!robot) throw YamlRefusal{sentence(robot.error())};
     cell.robot = *robot;
     map.attempt([&] { read_joint_ranges(map, cell); });
     cell.cell_yaml = cell_yaml;

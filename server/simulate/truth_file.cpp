@@ -39,7 +39,7 @@ VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& c
   if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
   const YamlMap sources = map.map("error_sources");
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
-  if (!model) map.refuse("error_sources", model.error().message);
+  if (!model) map.refuse("error_sources", sentence(model.error()));
   VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : robot.truth.sources) {

@@ -97,8 +97,8 @@ CREATE TABLE diagnoses (
 )sql";
 
 /// Beside the tables of the schema, so that programs that do not know them can still open the file: when jobs began and
-/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded); which
-/// batches in quarantine a job may train from, and releases if its model goes in force.
+/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded);
+/// which batches in quarantine a job may train from, and releases if its model goes in force.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),

@@ -80,8 +80,8 @@ class Store {
   /// same request with the same content again returns the job it made then. Refuses (kConflict) an id that this cell
   /// already has otherwise.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
-  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may train from
-  /// them in quarantine too: they leave it when its model is put in force, in the same transaction.
+  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may train
+  /// from them in quarantine too: they leave it when its model is put in force, in the same transaction.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false);
   /// Whether the job was added so.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;

@@ -14,12 +14,12 @@
 #include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
-#include "server/bias/kernel_spelling.h"
+#include "server/bias/kernels/kernel_spelling.h"
 #include "server/error_sources/error_source.h"
-#include "server/measurement/batch_file.h"
+#include "server/measurement/files/batch_file.h"
 #include "server/measurement/measurement.h"
 #include "server/measurement/velocity.h"
-#include "server/trainer/extend.h"
+#include "server/trainer/pipeline/extend.h"
 
 namespace trammel {
 namespace {
@@ -173,7 +173,7 @@ Result<std::vector<std::string>> Trainer::take_up() {
   TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
   std::vector<std::string> notices;
   for (const auto& [name, cell] : cells_) {
-    if (auto published = publish_from_store(name); !published) notices.push_back(published.error().message);
+    if (auto published = publish_from_store(name); !published) notices.push_back(sentence(published.error()));
   }
   auto unfinished = store_.unfinished_jobs();
   if (!unfinished) return tl::make_unexpected(unfinished.error());
@@ -464,10 +464,10 @@ void Trainer::run(std::int64_t job, const std::stop_token& stop) {
     progress.stage = JobStage::kQueued;
     return report(progress);
   }
-  const Status failed = store_.set_job_failed(job, outcome.error().message);
+  const Status failed = store_.set_job_failed(job, sentence(outcome.error()));
   if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
   progress.stage = JobStage::kFailed;
-  progress.what = outcome.error().message;
+  progress.what = sentence(outcome.error());
   report(progress);
 }
 

@@ -13,8 +13,8 @@
 #include "server/base/bounded_queue.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
-#include "server/trainer/gate.h"
-#include "server/trainer/train.h"
+#include "server/trainer/acceptance/gate.h"
+#include "server/trainer/pipeline/train.h"
 
 namespace trammel {
 
@@ -82,8 +82,9 @@ class Trainer {
   /// queue is full, everything new (kBusy).
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
-  /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by itself
-  /// or by a person, or when there are too few poses to judge it by; not where it is judged and found not better.
+  /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by
+  /// itself or by a person, or when there are too few poses to judge it by; not where it is judged and found not
+  /// better.
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
   /// and what the model in force has besides. Refuses batches that stay in quarantine.

@@ -5,11 +5,11 @@
 #include "server/base/unix_time.h"
 #include "server/diagnose/diagnose.h"
 #include "server/diagnose/triage.h"
-#include "server/measurement/batch_file.h"
+#include "server/measurement/files/batch_file.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
-#include "server/trainer/extend.h"
-#include "server/trainer/judging.h"
+#include "server/trainer/acceptance/judging.h"
+#include "server/trainer/pipeline/extend.h"
 #include "server/trainer/trainer.h"
 
 // What the trainer does besides training: looks at a batch before it is learned from, and diagnoses one.
@@ -128,7 +128,7 @@ Status Trainer::attempt_diagnosis(const StoredJob& job, const std::shared_ptr<co
   const Status can_apply = check_can_extend(*diagnosis);
   if (!asked->apply || !can_apply) {
     const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
-    return finish(std::move(progress), asked->apply ? "nothing applied: " + can_apply.error().message + stays
+    return finish(std::move(progress), asked->apply ? "nothing applied: " + sentence(can_apply.error()) + stays
                                                     : std::string(to_string(diagnosis->verdict)));
   }
   const auto supported =

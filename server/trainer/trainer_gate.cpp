@@ -5,9 +5,9 @@
 
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
-#include "server/measurement/batch_file.h"
-#include "server/trainer/extend.h"
-#include "server/trainer/gate.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/trainer/acceptance/gate.h"
+#include "server/trainer/pipeline/extend.h"
 #include "server/trainer/trainer.h"
 
 // What the trainer does with a batch that covers little and with a model that is trained: what is learned, what judges

@@ -15,13 +15,13 @@
 #include <numbers>
 #include <sstream>
 
-#include "clients/cli/study_tables.h"
+#include "clients/cli/studies/study_tables.h"
 #include "server/base/check.h"
 #include "server/base/units.h"
 #include "server/bias/bias_model.h"
-#include "server/bias/gaussian_process.h"
-#include "server/bias/hyperparameter_search.h"
-#include "server/trainer/train.h"
+#include "server/bias/process/gaussian_process.h"
+#include "server/bias/search/hyperparameter_search.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/bias/bias_data.h"
 #include "tests/support/outside.h"
 #include "tests/support/temporary_folder.h"

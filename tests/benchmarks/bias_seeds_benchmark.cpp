@@ -8,9 +8,9 @@
 
 #include "server/base/check.h"
 #include "server/bias/bias_model.h"
-#include "server/measurement/batch_file.h"
+#include "server/measurement/files/batch_file.h"
 #include "server/measurement/repeats.h"
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/bias/coupled_posterior.h"
+#include "server/bias/coupled/coupled_posterior.h"
 #include "tests/bias/bias_data.h"
 
 /// An arm of three joints (one turns it, two bend it) with 0.5 m and 0.4 m links, for the tests of coupled processes.

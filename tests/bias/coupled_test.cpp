@@ -3,8 +3,8 @@
 #include <numbers>
 #include <string>
 
-#include "server/bias/coupled_posterior.h"
-#include "server/bias/coupled_search.h"
+#include "server/bias/coupled/coupled_posterior.h"
+#include "server/bias/coupled/coupled_search.h"
 #include "tests/bias/coupled_arm.h"
 
 namespace trammel {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "server/bias/gaussian_process.h"
+#include "server/bias/process/gaussian_process.h"
 #include "tests/bias/bias_data.h"
 
 namespace trammel {

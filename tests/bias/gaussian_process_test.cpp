@@ -1,10 +1,10 @@
-#include "server/bias/gaussian_process.h"
+#include "server/bias/process/gaussian_process.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "server/bias/hyperparameter_search.h"
+#include "server/bias/search/hyperparameter_search.h"
 #include "tests/bias/bias_data.h"
 
 namespace trammel {

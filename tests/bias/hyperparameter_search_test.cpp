@@ -1,4 +1,4 @@
-#include "server/bias/hyperparameter_search.h"
+#include "server/bias/search/hyperparameter_search.h"
 
 #include <gtest/gtest.h>
 

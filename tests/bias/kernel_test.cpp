@@ -1,13 +1,13 @@
-#include "server/bias/kernel.h"
+#include "server/bias/kernels/kernel.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "server/bias/aligned_matrix.h"
-#include "server/bias/gaussian_process.h"
-#include "server/bias/kernel_spelling.h"
-#include "server/bias/numerics.h"
+#include "server/bias/kernels/kernel_spelling.h"
+#include "server/bias/process/gaussian_process.h"
+#include "server/numerics/aligned_matrix.h"
+#include "server/numerics/numerics.h"
 #include "tests/bias/bias_data.h"
 
 namespace trammel {

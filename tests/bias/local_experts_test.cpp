@@ -1,8 +1,8 @@
-#include "server/bias/local_experts.h"
+#include "server/bias/process/local_experts.h"
 
 #include <gtest/gtest.h>
 
-#include "server/bias/hyperparameter_search.h"
+#include "server/bias/search/hyperparameter_search.h"
 #include "tests/bias/bias_data.h"
 
 namespace trammel {

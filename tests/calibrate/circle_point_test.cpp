@@ -1,4 +1,4 @@
-#include "server/calibrate/circle_point.h"
+#include "server/calibrate/instruments/circle_point.h"
 
 #include <gtest/gtest.h>
 

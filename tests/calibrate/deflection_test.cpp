@@ -1,4 +1,4 @@
-#include "server/calibrate/deflection.h"
+#include "server/calibrate/instruments/deflection.h"
 
 #include <gtest/gtest.h>
 

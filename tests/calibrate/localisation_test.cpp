@@ -1,4 +1,4 @@
-#include "server/calibrate/localisation.h"
+#include "server/calibrate/frames/localisation.h"
 
 #include <gtest/gtest.h>
 

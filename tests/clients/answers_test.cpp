@@ -1,11 +1,11 @@
-#include "clients/cli/answers.h"
+#include "clients/cli/service/answers.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "server/base/units.h"
-#include "server/measurement/csv_table.h"
+#include "server/measurement/files/csv_table.h"
 
 namespace trammel::cli {
 namespace {

@@ -1,8 +1,8 @@
-#include "clients/cli/diagnose_text.h"
+#include "clients/cli/text/diagnose_text.h"
 
 #include <gtest/gtest.h>
 
-#include "server/measurement/joint_list.h"
+#include "server/measurement/files/joint_list.h"
 #include "server/report/diagnosis_json.h"
 #include "tests/report/diagnosis_fixture.h"
 

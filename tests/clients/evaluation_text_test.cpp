@@ -1,4 +1,4 @@
-#include "clients/cli/evaluation_text.h"
+#include "clients/cli/text/evaluation_text.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/cli/options.h"
+#include "clients/cli/terminal/options.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/cli/output.h"
+#include "clients/cli/terminal/output.h"
 
 #include <gtest/gtest.h>
 

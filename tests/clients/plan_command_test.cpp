@@ -5,7 +5,7 @@
 
 #include "clients/cli/command_line.h"
 #include "server/base/text_file.h"
-#include "server/measurement/joint_list.h"
+#include "server/measurement/files/joint_list.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel::cli {

@@ -1,4 +1,4 @@
-#include "clients/cli/service_text.h"
+#include "clients/cli/text/service_text.h"
 
 #include <gtest/gtest.h>
 

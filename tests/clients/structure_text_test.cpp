@@ -1,9 +1,9 @@
-#include "clients/cli/structure_text.h"
+#include "clients/cli/text/structure_text.h"
 
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
-#include "server/measurement/csv_table.h"
+#include "server/measurement/files/csv_table.h"
 #include "server/robot/cell.h"
 
 namespace trammel::cli {

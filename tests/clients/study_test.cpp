@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/cli/command_line.h"
-#include "clients/cli/study_text.h"
+#include "clients/cli/text/study_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "tests/support/temporary_folder.h"

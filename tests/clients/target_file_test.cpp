@@ -1,4 +1,4 @@
-#include "clients/cli/target_file.h"
+#include "clients/cli/files/target_file.h"
 
 #include <gtest/gtest.h>
 

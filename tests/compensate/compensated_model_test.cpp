@@ -7,7 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

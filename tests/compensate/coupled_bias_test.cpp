@@ -8,7 +8,7 @@
 #include "server/base/units.h"
 #include "server/compensate/bias_physics.h"
 #include "server/compensate/compensated_model.h"
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

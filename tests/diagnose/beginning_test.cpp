@@ -1,12 +1,12 @@
-#include "server/diagnose/beginning.h"
+#include "server/diagnose/evidence/beginning.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "server/diagnose/candidates.h"
-#include "server/diagnose/scan.h"
+#include "server/diagnose/families/candidates.h"
+#include "server/diagnose/search/scan.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/virtual_robot.h"

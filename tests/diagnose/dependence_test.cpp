@@ -1,4 +1,4 @@
-#include "server/diagnose/dependence.h"
+#include "server/diagnose/evidence/dependence.h"
 
 #include <gtest/gtest.h>
 

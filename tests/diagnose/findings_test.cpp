@@ -1,4 +1,4 @@
-#include "server/diagnose/findings.h"
+#include "server/diagnose/tell/findings.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <set>
 #include <sstream>
 
-#include "server/diagnose/findings.h"
+#include "server/diagnose/tell/findings.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/process.h"

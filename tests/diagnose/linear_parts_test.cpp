@@ -3,11 +3,11 @@
 #include <cmath>
 #include <random>
 
-#include "server/diagnose/background.h"
-#include "server/diagnose/candidates.h"
-#include "server/diagnose/folds.h"
-#include "server/diagnose/product.h"
-#include "server/diagnose/refine.h"
+#include "server/diagnose/evidence/background.h"
+#include "server/diagnose/evidence/refine.h"
+#include "server/diagnose/families/candidates.h"
+#include "server/diagnose/search/folds.h"
+#include "server/numerics/product.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {

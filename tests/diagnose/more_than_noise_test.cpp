@@ -1,4 +1,4 @@
-#include "server/diagnose/more_than_noise.h"
+#include "server/diagnose/tell/more_than_noise.h"
 
 #include <gtest/gtest.h>
 

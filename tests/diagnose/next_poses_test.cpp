@@ -1,4 +1,4 @@
-#include "server/diagnose/next_poses.h"
+#include "server/diagnose/tell/next_poses.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/diagnose.h"
-#include "server/measurement/joint_list.h"
+#include "server/measurement/files/joint_list.h"
 #include "server/measurement/pose_columns.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"

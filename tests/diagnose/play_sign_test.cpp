@@ -1,4 +1,4 @@
-#include "server/diagnose/play_sign.h"
+#include "server/diagnose/evidence/play_sign.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 
 #include "server/diagnose/diagnose.h"
-#include "server/measurement/batch_file.h"
+#include "server/measurement/files/batch_file.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

@@ -1,4 +1,4 @@
-#include "server/diagnose/refine.h"
+#include "server/diagnose/evidence/refine.h"
 
 #include <gtest/gtest.h>
 

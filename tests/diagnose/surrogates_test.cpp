@@ -1,4 +1,4 @@
-#include "server/diagnose/surrogates.h"
+#include "server/diagnose/search/surrogates.h"
 
 #include <gtest/gtest.h>
 

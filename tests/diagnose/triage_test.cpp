@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

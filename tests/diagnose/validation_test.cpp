@@ -1,4 +1,4 @@
-#include "server/diagnose/validation.h"
+#include "server/diagnose/evidence/validation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/diagnose/wording.h"
+#include "server/diagnose/tell/wording.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "server/measurement/csv_table.h"
+#include "server/measurement/files/csv_table.h"
 #include "tests/support/daemon.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"

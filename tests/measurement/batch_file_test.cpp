@@ -1,4 +1,4 @@
-#include "server/measurement/batch_file.h"
+#include "server/measurement/files/batch_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/measurement/csv_table.h"
+#include "server/measurement/files/csv_table.h"
 
 #include <gtest/gtest.h>
 

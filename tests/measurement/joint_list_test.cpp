@@ -1,4 +1,4 @@
-#include "server/measurement/joint_list.h"
+#include "server/measurement/files/joint_list.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/measurement/point_list.h"
+#include "server/measurement/files/point_list.h"
 
 #include <gtest/gtest.h>
 

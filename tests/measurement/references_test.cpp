@@ -1,4 +1,4 @@
-#include "server/measurement/references.h"
+#include "server/measurement/files/references.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel {

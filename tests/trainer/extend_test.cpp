@@ -1,4 +1,4 @@
-#include "server/trainer/extend.h"
+#include "server/trainer/pipeline/extend.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/trainer/extrapolation.h"
+#include "server/trainer/pipeline/extrapolation.h"
 
 #include <gtest/gtest.h>
 

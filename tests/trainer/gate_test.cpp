@@ -1,6 +1,6 @@
 // What may take the place of a good model by itself: batches that would make it worse, and batches that are a gain.
 // Each is measured on the virtual robot, by its true error before and after.
-#include "server/trainer/gate.h"
+#include "server/trainer/acceptance/gate.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 

@@ -1,10 +1,10 @@
-#include "server/trainer/judging.h"
+#include "server/trainer/acceptance/judging.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 

@@ -9,7 +9,7 @@
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

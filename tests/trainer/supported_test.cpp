@@ -1,4 +1,4 @@
-#include "server/trainer/supported.h"
+#include "server/trainer/pipeline/supported.h"
 
 #include <gtest/gtest.h>
 

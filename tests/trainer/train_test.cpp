@@ -1,4 +1,4 @@
-#include "server/trainer/train.h"
+#include "server/trainer/pipeline/train.h"
 
 #include <gtest/gtest.h>
 
@@ -279,7 +279,8 @@ class RealRobot : public testing::Test {
   }
 
   static Figures figures(const std::string& name) {
-    const Evaluation evaluation = *test::demand(train(cell(), series(name), quick("M3", "matern52"))).parts().validation;
+    const Evaluation evaluation =
+        *test::demand(train(cell(), series(name), quick("M3", "matern52"))).parts().validation;
     return {to_mm(evaluation.nominal.rms), to_mm(evaluation.calibrated.rms), to_mm(evaluation.compensated.rms)};
   }
   void SetUp() override {

@@ -12,7 +12,7 @@
 #include "server/base/hash.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
-#include "server/trainer/extend.h"
+#include "server/trainer/pipeline/extend.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,0 +1,264 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/files/target_file.h"
+#include "clients/cli/service/answers.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/measurement/pose_columns.h"
+
+namespace trammel::cli {
+
+namespace {
+
+constexpr std::size_t kItemsOfOneCall = 1000;  // keeps answers of a service small
+
+/// What predict and correct have in common.
+struct ApplyArguments {
+  std::string model, input, tool, payload, output, json;
+  ServiceOptions service;
+  bool covariance = false;
+  bool orientation = false;
+};
+
+/// Tool and payload of each pose: the file's, else the command line's.
+void fill_in(JointList& list, const ApplyArguments& arguments) {
+  for (CommandedPose& pose : list.poses) {
+    if (pose.context.tool.empty()) pose.context.tool = arguments.tool;
+    if (pose.context.payload.empty()) pose.context.payload = arguments.payload;
+  }
+}
+
+/// Asks the service for all items, so many a call, of one model: the later calls name the model that answered the
+/// first.
+template <typename Item, typename Answered, typename Ask>
+Result<std::string> ask_in_parts(const std::vector<Item>& items, client::CallContext context, const char* what,
+                                 const Ask& ask, std::vector<Answered>& answers) {
+  ProgressLine progress;
+  std::string model_id;
+  for (std::size_t from = 0; from < items.size(); from += kItemsOfOneCall) {
+    progress.show(what, static_cast<double>(from) / static_cast<double>(items.size()));
+    const auto first = items.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto count = static_cast<std::ptrdiff_t>(std::min(kItemsOfOneCall, items.size() - from));
+    Result<client::Answer<Answered>> answer = ask(context, std::vector<Item>(first, first + count));
+    if (!answer) return tl::make_unexpected(answer.error());
+    if (answer->items.size() != static_cast<std::size_t>(count)) {
+      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count);
+    }
+    if (from == 0) {
+      model_id = answer->model.id;
+      if (context.model.empty()) context.model = model_id;
+    }
+    answers.insert(answers.end(), answer->items.begin(), answer->items.end());
+  }
+  return model_id;
+}
+
+Result<client::CallContext> call_context(const ApplyArguments& arguments) {
+  const Result<ModelReference> model = parse_model_reference(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  client::CallContext context;
+  context.cell = model->cell;
+  context.tool = arguments.tool;
+  context.payload = arguments.payload;
+  if (model->version > 0) context.model = fmt::format("@{}", model->version);
+  return context;
+}
+
+Result<Predictions> predict_here(JointList& list, const ApplyArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  Result<JointList> checked = check_against_cell(std::move(list), model->cell());
+  if (!checked) return tl::make_unexpected(checked.error());
+  list = std::move(*checked);
+  std::vector<PoseContext> poses;
+  for (const CommandedPose& pose : list.poses) {
+    if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
+      return refused("{} row {}: {}", list.where, pose.row, sentence(known.error()));
+    }
+    PoseContext asked;
+    asked.q = pose.context.q;
+    asked.tool = pose.context.tool;
+    asked.payload = pose.context.payload;
+    asked.served = true;
+    poses.push_back(std::move(asked));
+  }
+  Predictions predictions{model->provenance().id, {}};
+  ProgressLine progress;
+  for (std::size_t from = 0; from < poses.size(); from += kItemsOfOneCall) {
+    progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
+    const std::size_t to = std::min(from + kItemsOfOneCall, poses.size());
+    const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
+    for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
+      predictions.items.push_back(to_wire(prediction));
+      if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
+      if (!arguments.orientation) continue;
+      const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
+      if (!turned) return refused("{}: {}", arguments.model, sentence(turned.error()));
+      predictions.turned.push_back(*turned);
+    }
+  }
+  return predictions;
+}
+
+Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
+  if (arguments.covariance)
+    return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
+  if (arguments.orientation)
+    return failure(ErrorCode::kUsage, "--orientation needs a model file: a service does not send these deviations");
+  Result<client::CallContext> context = call_context(arguments);
+  if (!context) return tl::make_unexpected(context.error());
+  context->tool = list.poses.front().context.tool;
+  context->payload = list.poses.front().context.payload;
+  std::vector<std::vector<double>> joints;
+  for (const CommandedPose& pose : list.poses) {
+    if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
+      return refused("{} row {}: tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
+                     list.where, pose.row, pose.context.tool, pose.context.payload, context->tool, context->payload);
+    }
+    joints.push_back(to_wire(pose.context.q, list.joint_types));
+  }
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  Predictions predictions;
+  const auto ask = [&](const client::CallContext& call, const std::vector<std::vector<double>>& part) {
+    return (*session)->predict_error(call, part);
+  };
+  return ask_in_parts(joints, *context, "predicting", ask, predictions.items).map([&](std::string model_id) {
+    predictions.model_id = std::move(model_id);
+    return predictions;
+  });
+}
+
+Status predict(const ApplyArguments& arguments) {
+  Result<JointList> list = read_joint_csv(arguments.input);
+  if (!list) return tl::make_unexpected(list.error());
+  fill_in(*list, arguments);
+  const Result<Predictions> predictions =
+      arguments.service.service ? predict_by_service(*list, arguments) : predict_here(*list, arguments);
+  if (!predictions) return tl::make_unexpected(predictions.error());
+  if (const Status written = write_output(arguments.output, predictions_csv(*list, *predictions)); !written) {
+    return written;
+  }
+  return write_json(arguments.json, predictions_json(*list, *predictions));
+}
+
+Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  if (const Status fits = check_targets(file, model->cell().robot); !fits) return tl::make_unexpected(fits.error());
+  const Result<std::string> tool = resolve_tool(model->cell(), arguments.tool);
+  if (!tool) return tl::make_unexpected(tool.error());
+  const Result<std::string> payload = resolve_payload(model->cell(), arguments.payload);
+  if (!payload) return tl::make_unexpected(payload.error());
+  if (const Status known = model->check_trained_with(*tool, *payload); !known)
+    return tl::make_unexpected(known.error());
+  Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}};
+  ProgressLine progress;
+  for (const TargetRow& row : file.rows) {
+    progress.show("correcting", static_cast<double>(corrections.items.size()) / static_cast<double>(file.rows.size()));
+    corrections.items.push_back(to_wire(model->correct(row.target, *tool, *payload), corrections.joint_types));
+  }
+  return corrections;
+}
+
+Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArguments& arguments) {
+  const Result<client::CallContext> context = call_context(arguments);
+  if (!context) return tl::make_unexpected(context.error());
+  std::vector<client::TargetMm> targets;
+  for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  Corrections corrections{"", file.joint_types, {}};
+  const auto ask = [&](const client::CallContext& call, const std::vector<client::TargetMm>& part) {
+    return (*session)->correct_targets(call, part);
+  };
+  return ask_in_parts(targets, *context, "correcting", ask, corrections.items).map([&](std::string model_id) {
+    corrections.model_id = std::move(model_id);
+    return corrections;
+  });
+}
+
+/// Whether what could not be corrected counts.
+struct CorrectArguments : ApplyArguments {
+  bool allow_failed = false, strict = false;
+};
+
+Result<Extent> correct(const CorrectArguments& arguments) {
+  if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
+    return failure(ErrorCode::kUsage, "{}: unknown kind of targets '{}'; known: .csv", arguments.input, ending);
+  }
+  const Result<TargetFile> file = read_targets_csv(arguments.input);
+  if (!file) return tl::make_unexpected(file.error());
+  const Result<Corrections> corrections =
+      arguments.service.service ? correct_by_service(*file, arguments) : correct_here(*file, arguments);
+  if (!corrections) return tl::make_unexpected(corrections.error());
+  const std::string left_alone = left_alone_text(*file, *corrections);
+  if (arguments.strict && !left_alone.empty()) {
+    return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
+  }
+  if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
+    return tl::make_unexpected(written.error());
+  }
+  fmt::print(stderr, "{}{}", corrections_summary(*corrections), left_alone);
+  const Status written = write_json(arguments.json, corrections_json(*file, *corrections));
+  if (!written) return tl::make_unexpected(written.error());
+  return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
+}
+
+void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
+  command
+      .add_option("--model", arguments.model,
+                  "Model file; with --service a cell id (its model in force) or cell@version")
+      ->required();
+  add_tool_options(command, arguments.tool, arguments.payload);
+  add_json_option(command, arguments.json);
+  add_service_options(command, arguments.service);
+}
+
+void add_predict(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<ApplyArguments>();
+  CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
+  command->add_option("--joints", arguments->input, "Commanded joints (CSV: deg, rails in mm)")->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Predicted errors, standard deviations and poses in the robot's base (CSV: mm)")
+      ->required();
+  command->add_flag(
+      "--covariance", arguments->covariance,
+      "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
+      "of the true error, without the tracker's own (slx_mm ...)");
+  command->add_flag("--orientation", arguments->orientation,
+                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
+  add_apply_options(*command, *arguments);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
+}
+
+void add_correct(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<CorrectArguments>();
+  CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
+  command->add_option("input", arguments->input, "Targets in the robot's base (CSV: mm, joints in deg)")->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Corrected targets (CSV: mm, deg), each behind the columns of its input; a column named as one of "
+                   "ours comes as input_NAME")
+      ->required();
+  CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
+                                                "Exit with 0, not 1, where targets are left as they were");
+  command
+      ->add_flag("--strict", arguments->strict,
+                 "Write nothing and exit with 3 where any target would be left as it was")
+      ->excludes(allow_failed);
+  add_apply_options(*command, *arguments);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return correct(*arguments); }; });
+}
+
+}  // namespace
+
+void add_apply_commands(CLI::App& app, Action& chosen) {
+  add_predict(app, chosen);
+  add_correct(app, chosen);
+}
+
+}  // namespace trammel::cli

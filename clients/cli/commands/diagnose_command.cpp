@@ -1,0 +1,181 @@
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/service/diagnose_service.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/diagnose_text.h"
+#include "server/base/unix_time.h"
+#include "server/diagnose/diagnose.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/report/diagnosis_json.h"
+#include "server/report/diagnosis_page.h"
+#include "server/robot/cell_sources_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kCellOption = "--cell-out";
+constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
+
+Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                std::uint64_t seed) {
+  ProgressLine progress;
+  DiagnoseOptions options;
+  options.seed = seed;
+  options.progress = [&](const std::string& stage, double share) {
+    progress.show(stage, share);
+    return true;
+  };
+  return diagnose(cell, batch, options);
+}
+
+Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                                const Diagnosis& diagnosis, std::uint64_t seed) {
+  ProgressLine progress;
+  TrainOptions options;
+  options.seed = seed;
+  options.trained_at = unix_now();
+  options.progress = [&](const std::string& stage, double share) {
+    progress.show(stage, share);
+    return true;
+  };
+  return extend(cell, batch, diagnosis, options);
+}
+
+/// Where the extended list goes.
+const std::string& extended_cell(const DiagnoseArguments& arguments) {
+  return arguments.cell_out.empty() ? arguments.cell : arguments.cell_out;
+}
+
+std::string extension_written(const Extension& extension, const DiagnoseArguments& arguments) {
+  const std::string& path = extended_cell(arguments);
+  std::string said = fmt::format("{}: error_sources: [{}]\n", path, fmt::join(extension.lasting, ", "));
+  if (extension.lasting.size() < extension.sources.size()) {
+    said += "  (what began at a pose of this batch is in the model, not in the cell file)\n";
+  }
+  if (const Result<Cell> readable = read_cell(path); !readable) {
+    said += fmt::format("  (it names its robot relative to itself, and is no cell file where it is: {})\n",
+                        sentence(readable.error()));
+  }
+  if (!arguments.model.empty()) {
+    said += fmt::format("model {} in {}\n", extension.after.provenance().id, arguments.model);
+  }
+  return said;
+}
+
+/// Never silently worse: what does not lower the error on poses held out beyond chance goes into no file.
+Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                        const Diagnosis& diagnosis, const DiagnoseArguments& arguments, ordered_json& json,
+                        Outputs& outputs) {
+  Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
+  if (!extension) return extension;
+  json["applied"] = extension_json(*extension);
+  say(extension_text(*extension), arguments);
+  if (!extension->gain.beyond_chance()) {
+    return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
+                   to_string(extension->gain));
+  }
+  Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
+  if (!text) return tl::make_unexpected(text.error());
+  outputs.put(kCellOption, std::move(*text));
+  outputs.put("--model", serialize(extension->after));
+  return extension;
+}
+
+/// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
+Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
+  Result<MeasurementBatch> batch = read_batch(arguments.batch);
+  if (!batch || !arguments.apply) return batch;
+  return with_held_out(std::move(*batch), kHeldOutShare, arguments.seed);
+}
+
+Status diagnose_files(const DiagnoseArguments& arguments) {
+  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
+  Outputs outputs = outputs_of(arguments);
+  if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
+  outputs.add("--model", arguments.model);
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
+  Result<Cell> read = read_cell(arguments.cell);
+  if (!read) return tl::make_unexpected(read.error());
+  const auto cell = std::make_shared<const Cell>(std::move(*read));
+  const Result<MeasurementBatch> batch = batch_to_diagnose(arguments);
+  if (!batch) return tl::make_unexpected(batch.error());
+  const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
+  ordered_json json = diagnosis_json(*diagnosis);
+  say(diagnosis_text(json), arguments);
+  std::optional<Result<Extension>> applied;
+  if (arguments.apply) applied = apply(cell, *batch, *diagnosis, arguments, json, outputs);
+  if (const Status written = write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments); !written) {
+    return written;
+  }
+  if (!applied) return {};
+  if (!*applied) return tl::make_unexpected(applied->error());
+  say(extension_written(**applied, arguments), arguments);
+  return {};
+}
+
+}  // namespace
+
+void say(const std::string& text, const DiagnoseArguments& arguments) {
+  tell(text, {arguments.json, arguments.report, arguments.next_poses, arguments.cell_out});
+}
+
+Outputs outputs_of(const DiagnoseArguments& arguments) {
+  Outputs outputs;
+  outputs.add("--report", arguments.report);
+  outputs.add("--next-poses", arguments.next_poses);
+  outputs.add("--json", arguments.json);
+  return outputs;
+}
+
+Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outputs,
+                       const DiagnoseArguments& arguments) {
+  const bool poses = !json.at("next_poses").empty();
+  if (poses) outputs.put("--next-poses", next_poses_csv(json));
+  outputs.put("--report", std::move(page));
+  outputs.put("--json", json_text(json));
+  if (const Status written = outputs.write(); !written) return written;
+  if (!poses && !arguments.next_poses.empty()) {
+    fmt::print(stderr, "{}: not written, no poses are suggested: {}\n", arguments.next_poses,
+               json.at("next_poses_for").at("none_because").get<std::string>());
+  }
+  return {};
+}
+
+void add_diagnose_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<DiagnoseArguments>();
+  CLI::App* command = app.add_subcommand(
+      "diagnose", "Tell which physical cause the model lacks, how sure that is, and what to measure next");
+  command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
+  command->add_option(
+      "--batch", arguments->batch,
+      "Measurements (CSV: deg, mm); with --service also the id of a batch that it has, else the newest");
+  command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
+  command
+      ->add_option(
+          "--next-poses", arguments->next_poses,
+          "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot; where "
+          "there are none nothing is written, the reason is said on standard error, and the exit code is 0")
+      ->type_name("FILE");
+  add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
+  CLI::Option* apply_flag = command->add_flag(
+      "--apply", arguments->apply,
+      "Add what was found to the cell's error sources and train; nothing is written unless poses held out gain by it");
+  command->add_option("--model", arguments->model, "With --apply: extended model to write")->needs(apply_flag);
+  command->add_option("--cell-out", arguments->cell_out, "With --apply: cell file to write instead of --cell itself")
+      ->needs(apply_flag);
+  add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
+  command->callback([arguments, &chosen] {
+    chosen = [arguments] {
+      return arguments->service.service ? diagnose_at_service(*arguments) : diagnose_files(*arguments);
+    };
+  });
+}
+
+}  // namespace trammel::cli

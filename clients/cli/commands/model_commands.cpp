@@ -1,0 +1,194 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/evaluation_text.h"
+#include "server/diagnose/triage.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/report/model_page.h"
+#include "server/trainer/pipeline/refitted.h"
+#include "server/trainer/pipeline/train.h"
+
+namespace trammel::cli {
+
+namespace {
+
+std::int64_t unix_time() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+struct TrainArguments {
+  std::string from;
+  std::string refit = "base,tool";
+  std::string cell, batch, output, json;
+  std::optional<std::string> level, bias;
+  std::uint64_t seed = 1;
+  double validation_share = 0;
+};
+
+/// As the service does before it learns from a batch: holds it against the model to start from. What is refitted may
+/// differ; anything else would be learned as if it belonged to it.
+Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
+                    const MeasurementBatch& batch) {
+  const Result<MeasurementBatch> checked = check_against_cell(batch, from.cell());
+  const Result<MeasurementBatch> here = check_against_cell(batch, cell);
+  if (!checked || !here) return {};  // its tools are others: nothing to compare
+  if (const Status fits = check_may_start_from(from, cell, *here, refit); !fits) return fits;
+  const bool known = std::all_of(checked->measurements.begin(), checked->measurements.end(), [&](const Measurement& m) {
+    return from.check_trained_with(m.context.tool, m.context.payload).has_value();
+  });
+  if (!known) return {};
+  const Triage seen = triage(from, *checked, with_known_tools(cell, from, refit));
+  const std::map<std::string, std::string> same = {
+      {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
+  const auto named = [&](const std::string& source) {
+    return std::find(refit.begin(), refit.end(), source) != refit.end();
+  };
+  const auto source = same.find(seen.cause.cause);
+  const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
+                        source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
+  if (seen.learn || refitted) return {};
+  return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id, seen.sentence,
+                 fmt::join(refit, ","));
+}
+
+Status train_model(const TrainArguments& arguments) {
+  Result<Cell> cell = read_cell(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<MeasurementBatch> batch = read_batch(arguments.batch);
+  if (!batch) return tl::make_unexpected(batch.error());
+  TrainOptions options;
+  options.level = arguments.level;
+  options.bias = arguments.bias;
+  options.seed = arguments.seed;
+  options.validation_share = arguments.validation_share;
+  options.trained_at = unix_time();
+  if (!arguments.from.empty()) {
+    Result<CompensatedModel> from = load_model(arguments.from);
+    if (!from) return tl::make_unexpected(from.error());
+    options.from = std::move(*from);
+    Result<std::vector<std::string>> refit = parse_level(arguments.refit);
+    if (!refit) return tl::make_unexpected(refit.error());
+    options.refit = std::move(*refit);
+    if (const Status fits = hold_against(*options.from, options.refit, *cell, *batch); !fits) return fits;
+  }
+  const Result<CompensatedModel> model = [&] {
+    ProgressLine progress;
+    options.progress = [&](const std::string& stage, double share) {
+      progress.show(stage, share);
+      return true;
+    };
+    return train(std::make_shared<const Cell>(std::move(*cell)), *batch, options);
+  }();
+  if (!model) return tl::make_unexpected(model.error());
+  if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
+  const auto& parts = model->parts();
+  tell(model_text(*model) +
+           (parts.validation
+                ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
+                : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
+                              parts.training.poses, parts.provenance.figures_batch_id()) +
+                      evaluation_table(parts.training)),
+       {arguments.output, arguments.json});
+  return write_json(arguments.json, model_json(*model));
+}
+
+struct EvaluateArguments {
+  std::string model, batch, json;
+};
+
+/// The batch, ready for the model's cell.
+Result<MeasurementBatch> read_checked_batch(const std::string& path, const CompensatedModel& model) {
+  return read_batch(path).and_then(
+      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), model.cell()); });
+}
+
+Status evaluate(const EvaluateArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Result<MeasurementBatch> batch = read_checked_batch(arguments.batch, *model);
+  if (!batch) return tl::make_unexpected(batch.error());
+  const Evaluation evaluation = model->evaluate(*batch);
+  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id) +
+           evaluation_table(evaluation),
+       {arguments.json});
+  return write_json(arguments.json, evaluation_json(evaluation));
+}
+
+struct ReportArguments {
+  std::string model, batch, output, json;
+};
+
+Status report(const ReportArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  std::optional<MeasurementBatch> batch;
+  if (!arguments.batch.empty()) {
+    Result<MeasurementBatch> checked = read_checked_batch(arguments.batch, *model);
+    if (!checked) return tl::make_unexpected(checked.error());
+    batch = std::move(*checked);
+  }
+  if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
+  tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
+       {arguments.output, arguments.json});
+  return write_json(arguments.json, model_json(*model));
+}
+
+void add_train(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot and learn what calibration leaves over");
+  command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--level", arguments->level,
+                      "What to identify instead of the cell's error sources: M0, M1 (base), M2 (+ geometry), M3 (+ "
+                      "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
+  command->add_option("--bias", arguments->bias,
+                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none or auto");
+  command->add_option("--from", arguments->from,
+                      "Model file of the same robot to start from: all but the sources of --refit stay as they are");
+  command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
+      ->needs("--from")
+      ->capture_default_str();
+  add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
+  command
+      ->add_option("--validation-share", arguments->validation_share,
+                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command->add_option("-o,--output", arguments->output, "Model to write")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
+}
+
+void add_evaluate(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<EvaluateArguments>();
+  CLI::App* command = app.add_subcommand("evaluate", "Compare a model with measurements; errors in mm");
+  command->add_option("--model", arguments->model, "Model file")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
+}
+
+void add_report(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<ReportArguments>();
+  CLI::App* command = app.add_subcommand("report", "Write a model's report as a page that opens offline");
+  command->add_option("--model", arguments->model, "Model file")->required();
+  command->add_option("--batch", arguments->batch, "Measurements to compare it with (CSV: deg, mm)");
+  command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });
+}
+
+}  // namespace
+
+void add_model_commands(CLI::App& app, Action& chosen) {
+  add_train(app, chosen);
+  add_evaluate(app, chosen);
+  add_report(app, chosen);
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,210 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/measurement/files/joint_list.h"
+#include "server/measurement/pose_columns.h"
+#include "server/plan/measuring_program.h"
+#include "server/plan/plan.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct PlanArguments {
+  std::string cell, from, criterion = "lhs", output, rapid, krl, json;
+  PlanOptions options;
+  ProgramOptions program;
+  bool positions_only = false;
+};
+
+/// `lhs`, `observability`, or `separate:CAUSE,CAUSE`; a cause may hold a colon of its own.
+Status read_criterion(const std::string& text, PlanOptions& options) {
+  const std::string separate = "separate:";
+  if (text == "lhs") return {};
+  if (text == "observability") {
+    options.criterion = PlanCriterion::kObservability;
+    return {};
+  }
+  const std::size_t comma = text.find(',');
+  if (!text.starts_with(separate) || comma == std::string::npos) {
+    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text);
+  }
+  options.criterion = PlanCriterion::kSeparation;
+  options.cause = text.substr(separate.size(), comma - separate.size());
+  options.other = text.substr(comma + 1);
+  return {};
+}
+
+std::string as_csv(const Cell& cell, const std::string& where, const Plan& plan) {
+  JointList list{where, joint_types(cell.robot), {}};
+  for (const PlannedPose& planned : plan.poses) {
+    CommandedPose pose;
+    pose.pose_id = planned.id;
+    pose.context = planned.context;
+    if (cell.tools.size() == 1) pose.context.tool.clear();
+    if (cell.payloads.size() == 1) pose.context.payload.clear();
+    list.poses.push_back(std::move(pose));
+  }
+  return to_csv(list);
+}
+
+ProgramOptions program_called_after(const std::string& path, ProgramOptions options) {
+  if (path != "-") options.name = std::filesystem::path(path).stem().string();
+  return options;
+}
+
+/// Texts by where they go; nothing is written before all are known to be right.
+Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& cell, const PlanArguments& arguments,
+                                                                    const Plan& plan) {
+  std::vector<std::pair<std::string, std::string>> outputs = {{arguments.output, as_csv(cell, arguments.output, plan)}};
+  const auto add = [&](const std::string& path, const auto& writer) -> Status {
+    if (path.empty()) return {};
+    Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
+    if (!text) return refused("{}: {}", path, sentence(text.error()));
+    outputs.emplace_back(path, std::move(*text));
+    return {};
+  };
+  if (const Status rapid = add(arguments.rapid, to_rapid); !rapid) return tl::make_unexpected(rapid.error());
+  if (const Status krl = add(arguments.krl, to_krl); !krl) return tl::make_unexpected(krl.error());
+  return outputs;
+}
+
+std::string separation_text(const PlanArguments& arguments, const Plan::Separation& separation) {
+  const PlanOptions& options = arguments.options;
+  std::string text = fmt::format("{} beside {}: strength {:.3g}, of a Latin hypercube {:.3g}\n", options.cause,
+                                 options.other, separation.plan.strength, separation.latin_hypercube.strength);
+  for (std::size_t i = 0; i < separation.plan.parameters.size(); ++i) {
+    const ParameterSeparation& after = separation.plan.parameters[i];
+    const ParameterSeparation& before = separation.latin_hypercube.parameters[i];
+    text += fmt::format("  {}: {:.1f} % of its effect is its own ({:.1f} %), strength {:.3g} ({:.3g})\n",
+                        after.parameter, 100 * after.share, 100 * before.share, after.strength, before.strength);
+  }
+  if (separation.hopeless.empty()) return text;
+  const bool all = separation.hopeless.size() == separation.plan.parameters.size();
+  return text +
+         fmt::format("No pose of this cell separates {} from {} and the cell's other sources; {} would\n",
+                     all ? options.cause : fmt::format("{} of {}", fmt::join(separation.hopeless, ", "), options.cause),
+                     options.other, separation.needs);
+}
+
+std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
+  const DrawCount& draw = plan.draw;
+  if (!arguments.from.empty()) {
+    return fmt::format("{} poses for cell {} in {}\n", plan.poses.size(), cell.name, arguments.output);
+  }
+  std::string text = fmt::format(
+      "{} poses for cell {} in {}\n{} drawn, {} kept: {} outside the workspace, {} out of sight, {} too near to a "
+      "joint limit\n",
+      plan.poses.size(), cell.name, arguments.output, draw.drawn, draw.kept, draw.outside, draw.unseen, draw.no_way);
+  if (arguments.options.criterion == PlanCriterion::kObservability) {
+    text += fmt::format("log det of the information: {:.2f}, of a Latin hypercube {:.2f}\n", plan.criterion,
+                        plan.criterion_of_latin_hypercube);
+  }
+  if (plan.separation) text += separation_text(arguments, *plan.separation);
+  return text;
+}
+
+ordered_json as_json(const Separability& separability) {
+  ordered_json parameters = ordered_json::array();
+  for (const ParameterSeparation& p : separability.parameters) {
+    parameters.push_back({{"parameter", p.parameter}, {"strength", p.strength}, {"share", p.share}});
+  }
+  return {{"strength", separability.strength}, {"parameters", parameters}};
+}
+
+ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
+  const DrawCount& draw = plan.draw;
+  ordered_json json = {{"cell", cell.name},
+                       {"poses", plan.poses.size()},
+                       {"seed", arguments.options.seed},
+                       {"criterion", arguments.criterion},
+                       {"drawn", draw.drawn},
+                       {"kept", draw.kept},
+                       {"outside_workspace", draw.outside},
+                       {"out_of_sight", draw.unseen},
+                       {"near_joint_limit", draw.no_way}};
+  if (arguments.options.criterion != PlanCriterion::kLatinHypercube) {
+    json["log_det"] = plan.criterion;
+    json["log_det_lhs"] = plan.criterion_of_latin_hypercube;
+  }
+  if (plan.separation) {
+    json["separability"] = {{"plan", as_json(plan.separation->plan)},
+                            {"lhs", as_json(plan.separation->latin_hypercube)},
+                            {"all_candidates", as_json(plan.separation->candidates)},
+                            {"not_separable", plan.separation->hopeless},
+                            {"needs", plan.separation->needs}};
+  }
+  return json;
+}
+
+/// Poses that somebody has chosen already: those of `diagnose --next-poses`, for one.
+Result<Plan> plan_from(const Cell& cell, const std::string& path) {
+  return read_joint_csv(path)
+      .and_then([&](JointList list) { return check_against_cell(std::move(list), cell); })
+      .and_then([&](const JointList& list) { return plan_of(cell, list); });
+}
+
+Status plan(PlanArguments arguments) {
+  if (arguments.options.count == 0 && arguments.from.empty()) {
+    return failure(ErrorCode::kUsage, "--count or --from is required");
+  }
+  if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
+  arguments.options.orientation = !arguments.positions_only;
+  Result<Cell> read = read_cell(arguments.cell);
+  if (!read) return tl::make_unexpected(read.error());
+  const auto cell = std::make_shared<const Cell>(std::move(*read));
+  const Result<Plan> planned =
+      arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
+  if (!planned) return tl::make_unexpected(planned.error());
+  const auto outputs = outputs_of(*cell, arguments, *planned);
+  if (!outputs) return tl::make_unexpected(outputs.error());
+  for (const auto& [path, text] : *outputs) {
+    if (const Status written = write_output(path, text); !written) return written;
+  }
+  tell(in_words(*cell, arguments, *planned), {arguments.output, arguments.rapid, arguments.krl, arguments.json});
+  return write_json(arguments.json, as_json(*cell, arguments, *planned));
+}
+
+}  // namespace
+
+void add_plan_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<PlanArguments>();
+  PlanOptions& options = arguments->options;
+  CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell");
+  command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
+  CLI::Option* count = command->add_option("--count", options.count, "Number of poses")->check(CLI::Range(1, 1000000));
+  command
+      ->add_option("--from", arguments->from,
+                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them")
+      ->excludes(count);
+  add_seed_option(*command, options.seed, "Seed of the draw");
+  command
+      ->add_option("--criterion", arguments->criterion,
+                   "How poses are chosen: lhs, a Latin hypercube; observability, for the parameters of the cell's "
+                   "error sources; separate:CAUSE,CAUSE, to tell the first cause from the second")
+      ->capture_default_str();
+  command->add_flag("--bidirectional", options.bidirectional,
+                    "Every pose twice, approached from both sides (else from above)");
+  command->add_flag("--positions-only", arguments->positions_only,
+                    "Choose for a single reflector, which shows no orientations");
+  command->add_option("--tool", options.tools, "Tool id of the cell; several are planned for in turn")->delimiter(',');
+  command->add_option("--payload", options.payloads, "Payload id of the cell; several are planned for in turn")
+      ->delimiter(',');
+  command->add_option("-o,--output", arguments->output, "Plan to write (CSV: joints in deg, rails in mm)")->required();
+  command->add_option("--rapid", arguments->rapid, "Program to write for an ABB controller (.mod)")->type_name("FILE");
+  command->add_option("--krl", arguments->krl, "Program to write for a KUKA controller (.src)")->type_name("FILE");
+  command->add_option("--rapid-tool", arguments->program.rapid_tool, "Tooldata that the ABB controller has")
+      ->capture_default_str();
+  command->add_option("--krl-tool", arguments->program.krl_tool, "Number of the tool in the KUKA controller")
+      ->capture_default_str();
+  command->add_option("--wait", arguments->program.wait_s, "Wait at each pose of a program, s")->capture_default_str();
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return plan(*arguments); }; });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,260 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <type_traits>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/service_text.h"
+#include "server/base/text_file.h"
+#include "server/base/unix_time.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// The options of all these commands; each uses its own part.
+struct ServiceArguments {
+  std::string cell, batch, batch_id, level, bias, model, output, json;
+  std::vector<std::string> batch_ids;
+  std::int64_t job = 0;
+  bool watch = false, release = false;
+  double limit_s = 3600;
+  ServiceOptions service;
+};
+
+/// A job did all that it was to if it made no model, or one that is in force.
+Extent extent_of(const client::JobStatus& job) {
+  return job.model_version == 0 || job.in_force ? Extent::kAll : Extent::kPart;
+}
+
+/// Follows a job to its end; a failed one is an error.
+Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+  const Result<client::JobStatus> end = [&] {
+    ProgressLine progress;
+    return session.wait_for_job(job, std::chrono::milliseconds(static_cast<std::int64_t>(arguments.limit_s * 1e3)),
+                                [&](const client::JobStatus& status) {
+                                  progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
+                                                status.share);
+                                });
+  }();
+  if (!end) return tl::make_unexpected(end.error());
+  if (const Status written = write_json(arguments.json, job_json(*end)); !written) {
+    return tl::make_unexpected(written.error());
+  }
+  const std::string next = next_step(*end);
+  if (end->stage == "failed") {
+    return refused("job {} of cell {} failed: {}{}{}", end->job, end->cell, end->what, next.empty() ? "" : "\n", next);
+  }
+  std::string text = fmt::format("job {} of cell {} {}", end->job, end->cell, end->stage);
+  if (end->model_version > 0) {
+    text += fmt::format(": version {}, {}", end->model_version, end->in_force ? "in force" : "not in force");
+  }
+  text += "\n" + (end->what.empty() ? "" : end->what + "\n") + (next.empty() ? "" : next + "\n");
+  tell(text, {arguments.json});
+  return extent_of(*end);
+}
+
+/// Tells the job's number, or with --watch follows it.
+Result<Extent> started(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
+  if (arguments.watch) return follow(session, job, arguments);
+  tell(fmt::format("job {}\n", job), {arguments.json});
+  return write_json(arguments.json, {{"job", job}}).map([] { return Extent::kAll; });
+}
+
+Result<Extent> submit(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<std::string> csv = read_text_file(arguments.batch);
+  if (!csv) return tl::make_unexpected(csv.error());
+  const std::string id =
+      arguments.batch_id.empty() ? std::filesystem::path(arguments.batch).stem().string() : arguments.batch_id;
+  const Result<std::int64_t> job = session.submit_measurements(*cell, id, *csv);
+  if (!job) return tl::make_unexpected(job.error());
+  return started(session, *job, arguments);
+}
+
+Result<Extent> retrain(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  if (arguments.release && arguments.batch_ids.empty()) {
+    return failure(ErrorCode::kUsage, "--release needs --batch: which one is good");
+  }
+  const Result<std::int64_t> job =
+      arguments.release ? session.release_and_train(*cell, arguments.batch_ids, arguments.level, arguments.bias)
+                        : session.train(*cell, arguments.batch_ids, arguments.level, arguments.bias);
+  if (!job) return tl::make_unexpected(job.error());
+  return started(session, *job, arguments);
+}
+
+Status status(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::vector<client::ServerStatus>> servers = session.servers();
+  if (!servers) return tl::make_unexpected(servers.error());
+  const Result<std::vector<client::ModelInfo>> models = session.model_status();
+  if (!models) return tl::make_unexpected(models.error());
+  const Result<std::vector<client::QuarantinedBatch>> apart = session.quarantine("");
+  if (!apart) return tl::make_unexpected(apart.error());
+  const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  std::string text;
+  ordered_json list = ordered_json::array();
+  for (const client::ServerStatus& server : *servers) {
+    text += server_text(server);
+    list.push_back(server_json(server));
+  }
+  tell(text + models_text(*models, unix_now()) + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
+  return write_json(arguments.json, {{"servers", list},
+                                     {"models", models_json(*models)},
+                                     {"jobs", jobs_json(*jobs)},
+                                     {"quarantine", quarantine_json(*apart)}});
+}
+
+Result<Extent> watch(client::Session& session, const ServiceArguments& arguments) {
+  return follow(session, arguments.job, arguments);
+}
+
+Status list_models(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<std::vector<client::ModelInfo>> models = session.models(*cell);
+  if (!models) return tl::make_unexpected(models.error());
+  tell(models_text(*models, unix_now()), {arguments.json});
+  return write_json(arguments.json, {{"cell", *cell}, {"models", models_json(*models)}});
+}
+
+Status now_in_force(const std::string& cell, const Result<int>& version, const ServiceArguments& arguments) {
+  if (!version) return tl::make_unexpected(version.error());
+  tell(fmt::format("cell {}: version {} in force\n", cell, *version), {arguments.json});
+  return write_json(arguments.json, {{"cell", cell}, {"version", *version}});
+}
+
+Status activate(client::Session& session, const ServiceArguments& arguments) {
+  const Result<ModelReference> model = parse_model_reference(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  if (model->version == 0) {
+    return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model);
+  }
+  return now_in_force(model->cell, session.activate(model->cell, model->version), arguments);
+}
+
+Status rollback(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  return now_in_force(*cell, session.rollback(*cell), arguments);
+}
+
+Status export_model(client::Session& session, const ServiceArguments& arguments) {
+  const Result<ModelReference> model = parse_model_reference(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Result<std::string> text = session.export_model(model->cell, model->version);
+  if (!text) return tl::make_unexpected(text.error());
+  if (const Status written = write_output(arguments.output, *text); !written) return written;
+  tell(fmt::format("model of cell {} in {}\n", model->cell, arguments.output), {arguments.output, arguments.json});
+  return write_json(arguments.json, {{"cell", model->cell}, {"file", arguments.output}, {"bytes", text->size()}});
+}
+
+Status import_model(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<std::string> text = read_text_file(arguments.model);
+  if (!text) return tl::make_unexpected(text.error());
+  const Result<int> version = session.import_model(*cell, *text);
+  if (!version) return tl::make_unexpected(version.error());
+  tell(fmt::format("cell {}: the model is version {}\n", *cell, *version), {arguments.json});
+  return write_json(arguments.json, {{"cell", *cell}, {"version", *version}});
+}
+
+/// Adds commands that talk to a service.
+class ServiceCommands {
+ public:
+  ServiceCommands(CLI::App& app, Action& chosen) : app_(app), chosen_(chosen) {}
+
+  /// A command whose action opens a session and hands it to `talk`, a function of the session and the arguments that
+  /// answers as an Action does. Its options are added by `add_options`.
+  template <typename Talk, typename AddOptions>
+  void add(const char* name, const char* description, Talk talk, AddOptions add_options) {
+    const auto arguments = std::make_shared<ServiceArguments>();
+    CLI::App* command = app_.add_subcommand(name, description);
+    add_options(*command, *arguments);
+    add_json_option(*command, arguments->json);
+    add_service_options(*command, arguments->service);
+    command->callback([arguments, talk, &chosen = chosen_] {
+      chosen = [arguments, talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
+        const auto session = open_session(arguments->service);
+        if (!session) return tl::make_unexpected(session.error());
+        return talk(**session, *arguments);
+      };
+    });
+  }
+
+ private:
+  CLI::App& app_;
+  Action& chosen_;
+};
+
+void add_cell(CLI::App& command, ServiceArguments& arguments) {
+  command.add_option("--cell", arguments.cell, "Cell id, or the cell file that holds it")->required();
+}
+
+void add_watch(CLI::App& command, ServiceArguments& arguments) {
+  command.add_flag("--watch", arguments.watch, "Wait until the training is done");
+  command.add_option("--limit", arguments.limit_s, "Longest time to wait for it, s")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_service_commands(CLI::App& app, Action& chosen) {
+  ServiceCommands commands(app, chosen);
+  commands.add("submit", "Hand measurements to a service, which trains a new model from them", submit,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command.add_option("--batch", arguments.batch, "Measurements (CSV: deg, mm)")->required();
+                 command.add_option("--id", arguments.batch_id,
+                                    "Id of the batch, unique within the cell; else the file's name without its ending");
+                 add_watch(command, arguments);
+               });
+  commands.add("retrain", "Train again from batches that the service has", retrain,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command
+                     .add_option("--batch", arguments.batch_ids,
+                                 "Id of a batch; once for each to train together; else the newest")
+                     ->allow_extra_args(false);
+                 command.add_option("--level", arguments.level, "What to identify instead of the cell's error sources");
+                 command.add_option("--bias", arguments.bias, "Kernel of the learned bias instead of the cell's");
+                 command.add_flag(
+                     "--release", arguments.release,
+                     "The batches named are good: take them out of quarantine, if the training is accepted");
+                 add_watch(command, arguments);
+               });
+  commands.add("status", "Show the servers that answer, the models in force, jobs, and the batches in quarantine",
+               status, [](CLI::App&, ServiceArguments&) {});
+  commands.add("watch", "Follow a training until it is done", watch,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 command.add_option("--job", arguments.job, "Number that submit or retrain gave")->required();
+                 command.add_option("--limit", arguments.limit_s, "Longest time to wait, s")
+                     ->check(CLI::PositiveNumber)
+                     ->capture_default_str();
+               });
+  commands.add("models", "List the history of a cell's models", list_models, add_cell);
+  commands.add("activate", "Put a version of a cell's model in force", activate,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 command.add_option("--model", arguments.model, "cell@version")->required();
+               });
+  commands.add("rollback", "Put the model back in force that was before", rollback, add_cell);
+  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
+    command.add_option("--model", arguments.model, "cell (its model in force) or cell@version")->required();
+    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
+  });
+  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command.add_option("--model", arguments.model, "Model file")->required();
+               });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,83 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/study_text.h"
+
+namespace trammel::cli {
+
+namespace {
+
+struct StudyArguments {
+  std::string name, json;
+  std::string cell, truth;  // empty: what ships
+  std::optional<std::string> bias;
+  std::uint64_t seed = 1;
+};
+
+/// A file that ships: beside the installed program, or in the tree that it was built from.
+std::string shipped_file(const std::string& name) {
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path installed = program.parent_path() / TRAMMEL_DATA_FROM_PROGRAM / name;
+  if (!error && std::filesystem::exists(installed, error)) return installed.lexically_normal().string();
+  return TRAMMEL_SOURCE_DATA "/" + name;
+}
+
+Result<VirtualRobot> robot_to_study(const StudyArguments& arguments) {
+  Result<Cell> cell = read_cell(arguments.cell.empty() ? shipped_file("config/cell-7.yaml") : arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  return read_virtual_robot(arguments.truth.empty() ? shipped_file("models/truth/chapter-5.yaml") : arguments.truth,
+                            std::make_shared<const Cell>(std::move(*cell)));
+}
+
+Result<std::vector<TargetRow>> holes_to_drill(const Chain& robot) {
+  Result<TargetFile> file = read_targets_csv(shipped_file("config/drill-panel.csv"));
+  if (!file) return tl::make_unexpected(file.error());
+  if (const Status fits = check_targets(*file, robot); !fits) return tl::make_unexpected(fits.error());
+  return std::move(file->rows);
+}
+
+Status run(const StudyArguments& arguments) {
+  const Result<VirtualRobot> robot = robot_to_study(arguments);
+  if (!robot) return tl::make_unexpected(robot.error());
+  StudyOptions options;
+  options.seed = arguments.seed;
+  options.bias = arguments.bias;
+  if (arguments.name == "drilling") {
+    Result<std::vector<TargetRow>> holes = holes_to_drill(robot->truth.cell->robot);
+    if (!holes) return tl::make_unexpected(holes.error());
+    options.holes = std::move(*holes);
+  }
+  const Result<Study> study = [&] {
+    ProgressLine progress;
+    options.progress = [&](const std::string& stage, double share) {
+      progress.show(stage, share);
+      return true;
+    };
+    return run_study(arguments.name, *robot, options);
+  }();
+  if (!study) return tl::make_unexpected(study.error());
+  tell(study_text(*study), {arguments.json});
+  return write_json(arguments.json, study_json(*study));
+}
+
+}  // namespace
+
+void add_study_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<StudyArguments>();
+  CLI::App* command = app.add_subcommand(
+      "study", "Repeat a study of the thesis on the shipped virtual robot; its figures beside ours, mm");
+  command->add_option("name", arguments->name, "Which one")->required()->check(CLI::IsMember(study_names()));
+  command->add_option("--cell", arguments->cell, "Cell file (YAML) instead of the shipped one")->type_name("FILE");
+  command->add_option("--truth", arguments->truth, "Virtual robot's true parameters (YAML) instead of the shipped ones")
+      ->type_name("FILE");
+  add_seed_option(*command, arguments->seed, "Seed of all draws: poses, noise, search");
+  command->add_option("--bias", arguments->bias, "Kernel of the learned bias instead of the cell's, see train");
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,289 @@
+#include "clients/cli/service/answers.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
+#include "server/measurement/pose_columns.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kPoseColumns = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
+
+std::string pose_fields(const client::PoseMm& pose) {
+  std::string fields;
+  for (const double value : {pose.x_mm, pose.y_mm, pose.z_mm, pose.qw, pose.qx, pose.qy, pose.qz}) {
+    if (!fields.empty()) fields += ',';
+    fields += csv_number(value);
+  }
+  return fields;
+}
+
+ordered_json pose_json(const client::PoseMm& pose) {
+  return {{"x_mm", pose.x_mm}, {"y_mm", pose.y_mm}, {"z_mm", pose.z_mm}, {"qw", pose.qw},
+          {"qx", pose.qx},     {"qy", pose.qy},     {"qz", pose.qz}};
+}
+
+/// False: there is nothing to command, so no numbers are handed out that a program could take for some.
+bool has_command(const client::CorrectedTarget& target) {
+  return target.status == "ok" || target.status == "out_of_domain";
+}
+
+/// A joint of the wire as its column holds it: deg, of a prismatic joint mm.
+double wire_to_column(double value, JointType type) { return type == JointType::kRevolute ? to_deg(value) : value; }
+
+JointType type_of(const std::vector<JointType>& types, std::size_t joint) {
+  return joint < types.size() ? types[joint] : JointType::kRevolute;
+}
+
+std::size_t joint_count(const Corrections& corrections) {
+  std::size_t joints = corrections.joint_types.size();
+  for (const client::CorrectedTarget& item : corrections.items) joints = std::max(joints, item.q_rad.size());
+  return joints;
+}
+
+}  // namespace
+
+client::PoseMm to_wire(const Pose& X_BT) {
+  const Eigen::Quaterniond R(X_BT.linear());
+  const Vector3 p = X_BT.translation() * to_mm(1);
+  return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
+}
+
+client::PredictedError to_wire(const ErrorPrediction& prediction) {
+  const Vector3 e = prediction.error_B * to_mm(1);
+  const Vector3 s = prediction.stddev_B * to_mm(1);
+  return {to_wire(prediction.X_BT_nominal),
+          to_wire(prediction.X_BT_predicted),
+          e.x(),
+          e.y(),
+          e.z(),
+          s.x(),
+          s.y(),
+          s.z(),
+          prediction.in_domain};
+}
+
+std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types) {
+  std::vector<double> wire;
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    const bool revolute = type_of(joint_types, static_cast<std::size_t>(j)) == JointType::kRevolute;
+    wire.push_back(revolute ? q(j) : to_mm(q(j)));
+  }
+  return wire;
+}
+
+client::CorrectedTarget to_wire(const Correction& correction, const std::vector<JointType>& joint_types) {
+  return {std::string(to_string(correction.status)),
+          to_wire(correction.X_BT_commanded),
+          to_wire(correction.q, joint_types),
+          to_mm(correction.error_before),
+          to_mm(correction.error_after),
+          to_mm(correction.stddev),
+          correction.iterations,
+          correction.message};
+}
+
+client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types) {
+  return {to_wire(target.X_BT), target.seed ? to_wire(*target.seed, joint_types) : std::vector<double>(), target.conf,
+          target.joint_target};
+}
+
+JointUncertainty joint_uncertainty(const ErrorPrediction& prediction) {
+  const Matrix3 covariance_mm2 = to_mm(1) * to_mm(1) * prediction.covariance_B;
+  const Vector3 stddev_mm = to_mm(1) * prediction.true_stddev_B;
+  return {covariance_mm2(0, 1), covariance_mm2(0, 2), covariance_mm2(1, 2),
+          stddev_mm.x(),        stddev_mm.y(),        stddev_mm.z()};
+}
+
+Result<RotationUncertainty> rotation_uncertainty(const ErrorPrediction& prediction) {
+  if (!prediction.rotation_stddev_B)
+    return refused("the model learned no orientations: its training poses did not all have one, or its bias is none");
+  const Vector3& s = *prediction.rotation_stddev_B;
+  return RotationUncertainty{to_deg(s.x()), to_deg(s.y()), to_deg(s.z())};
+}
+
+std::string predictions_csv(const JointList& list, const Predictions& predictions) {
+  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id", kPoseColumns);
+  if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2,slx_mm,sly_mm,slz_mm";
+  if (!predictions.turned.empty()) text += ",srx_deg,sry_deg,srz_deg";
+  text += "\n";
+  for (std::size_t i = 0; i < predictions.items.size(); ++i) {
+    const client::PredictedError& item = predictions.items[i];
+    for (const double value : {item.dx_mm, item.dy_mm, item.dz_mm, item.sx_mm, item.sy_mm, item.sz_mm}) {
+      text += csv_number(value) + ",";
+    }
+    text += fmt::format("{},{},{},{}", item.in_domain ? 1 : 0, pose_fields(item.predicted),
+                        csv_field(list.poses[i].pose_id), predictions.model_id);
+    if (!predictions.together.empty()) {
+      const JointUncertainty& u = predictions.together[i];
+      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2, u.slx_mm, u.sly_mm, u.slz_mm})
+        text += fmt::format(",{:.9g}", value);
+    }
+    if (!predictions.turned.empty()) {
+      const RotationUncertainty& u = predictions.turned[i];
+      for (const double value : {u.srx_deg, u.sry_deg, u.srz_deg}) text += fmt::format(",{:.9g}", value);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+ordered_json predictions_json(const JointList& list, const Predictions& predictions) {
+  ordered_json items = ordered_json::array();
+  for (std::size_t i = 0; i < predictions.items.size(); ++i) {
+    const client::PredictedError& item = predictions.items[i];
+    items.push_back({{"pose_id", list.poses[i].pose_id},
+                     {"dx_mm", item.dx_mm},
+                     {"dy_mm", item.dy_mm},
+                     {"dz_mm", item.dz_mm},
+                     {"sx_mm", item.sx_mm},
+                     {"sy_mm", item.sy_mm},
+                     {"sz_mm", item.sz_mm},
+                     {"in_domain", item.in_domain},
+                     {"nominal", pose_json(item.nominal)},
+                     {"predicted", pose_json(item.predicted)}});
+    if (!predictions.turned.empty()) {
+      const RotationUncertainty& u = predictions.turned[i];
+      items.back().update({{"srx_deg", u.srx_deg}, {"sry_deg", u.sry_deg}, {"srz_deg", u.srz_deg}});
+    }
+    if (predictions.together.empty()) continue;
+    const JointUncertainty& u = predictions.together[i];
+    items.back().update({{"cxy_mm2", u.cxy_mm2},
+                         {"cxz_mm2", u.cxz_mm2},
+                         {"cyz_mm2", u.cyz_mm2},
+                         {"slx_mm", u.slx_mm},
+                         {"sly_mm", u.sly_mm},
+                         {"slz_mm", u.slz_mm}});
+  }
+  return {{"model", predictions.model_id}, {"predictions", items}};
+}
+
+namespace {
+
+/// Of corrections_csv() without the columns of the target file.
+std::vector<std::string> correction_columns(const Corrections& corrections) {
+  std::vector<std::string> columns = {"row", "status", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"};
+  const std::size_t joints = joint_count(corrections);
+  for (std::size_t j = 0; j < joints; ++j) {
+    columns.push_back(joint_column(static_cast<int>(j), type_of(corrections.joint_types, j)));
+  }
+  for (const char* name : {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message"}) {
+    columns.emplace_back(name);
+  }
+  return columns;
+}
+
+std::string in_lower_case(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name;
+}
+
+/// The names of the file's columns where `ours` stand behind them: none is named twice, whatever the case.
+std::vector<std::string> kept_columns(const std::vector<std::string>& columns, const std::vector<std::string>& ours) {
+  std::set<std::string> taken;
+  for (const std::string& name : ours) taken.insert(in_lower_case(name));
+  std::vector<std::string> kept = columns;
+  std::vector<std::size_t> clashing;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (taken.contains(in_lower_case(kept[k]))) clashing.push_back(k);
+  }
+  for (const std::string& name : kept) taken.insert(in_lower_case(name));
+  for (const std::size_t k : clashing) {
+    while (taken.contains(in_lower_case(kept[k]))) kept[k] = "input_" + kept[k];
+    taken.insert(in_lower_case(kept[k]));
+  }
+  return kept;
+}
+
+/// Empty where there is nothing to say.
+std::string field_of(double value) { return std::isfinite(value) ? csv_number(value) : ""; }
+ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+
+}  // namespace
+
+std::string corrections_csv(const TargetFile& file, const Corrections& corrections) {
+  const std::vector<std::string> ours = correction_columns(corrections);
+  std::string text;
+  for (const std::string& name : kept_columns(file.columns, ours)) text += csv_field(name) + ",";
+  text += fmt::format("{}\n", fmt::join(ours, ","));
+  const std::size_t joints = joint_count(corrections);
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    const bool command = has_command(item);
+    for (const std::string& field : file.rows[i].fields) text += csv_field(field) + ",";
+    text += fmt::format("{},{},{}", file.rows[i].row, item.status, command ? pose_fields(item.commanded) : ",,,,,,");
+    for (std::size_t j = 0; j < joints; ++j) {
+      text += ',';
+      if (command && j < item.q_rad.size()) {
+        text += csv_number(wire_to_column(item.q_rad[j], type_of(corrections.joint_types, j)));
+      }
+    }
+    text += fmt::format(",{},{},{},{},{},{}\n", field_of(item.error_before_mm), field_of(item.error_after_mm),
+                        field_of(item.sigma_mm), item.iterations, corrections.model_id, csv_field(item.message));
+  }
+  return text;
+}
+
+ordered_json corrections_json(const TargetFile& file, const Corrections& corrections) {
+  ordered_json items = ordered_json::array();
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    ordered_json json = {{"row", file.rows[i].row}, {"status", item.status}, {"message", item.message}};
+    json["input"] = ordered_json::object();
+    for (std::size_t k = 0; k < file.rows[i].fields.size(); ++k) {
+      json["input"][file.columns[k]] = file.rows[i].fields[k];
+    }
+    if (has_command(item)) {
+      ordered_json joints = ordered_json::object();
+      for (std::size_t j = 0; j < item.q_rad.size(); ++j) {
+        const JointType type = type_of(corrections.joint_types, j);
+        joints[joint_column(static_cast<int>(j), type)] = wire_to_column(item.q_rad[j], type);
+      }
+      json["commanded"] = pose_json(item.commanded);
+      json["joints"] = joints;
+    }
+    json["error_before_mm"] = json_of(item.error_before_mm);
+    json["error_after_mm"] = json_of(item.error_after_mm);
+    json["sigma_mm"] = json_of(item.sigma_mm);
+    json["iterations"] = item.iterations;
+    items.push_back(json);
+  }
+  return {{"model", corrections.model_id}, {"targets", items}};
+}
+
+std::string corrections_summary(const Corrections& corrections) {
+  std::map<std::string, int> counts;
+  for (const client::CorrectedTarget& item : corrections.items) ++counts[item.status];
+  std::string text = fmt::format("{} targets:", corrections.items.size());
+  const char* separator = " ";
+  for (const auto& [status, count] : counts) {
+    text += fmt::format("{}{} {}", separator, count, status);
+    separator = ", ";
+  }
+  return text + "\n";
+}
+
+std::string left_alone_text(const TargetFile& file, const Corrections& corrections) {
+  constexpr std::size_t kLines = 10;
+  std::string lines;
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < corrections.items.size(); ++i) {
+    const client::CorrectedTarget& item = corrections.items[i];
+    if (has_command(item) || ++left > kLines) continue;
+    lines += fmt::format("  {} row {}: {}: {}\n", file.where, file.rows[i].row, item.status, item.message);
+  }
+  if (left == 0) return "";
+  if (left > kLines) lines += fmt::format("  and {} more\n", left - kLines);
+  return fmt::format("{} of {} targets are left as they were:\n{}", left, corrections.items.size(), lines);
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,99 @@
+#include "clients/cli/service/diagnose_service.h"
+
+#include <filesystem>
+
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/diagnose_text.h"
+#include "server/base/json_guard.h"
+#include "server/base/text_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::chrono::hours kLongest{1};
+
+Result<std::int64_t> ask(client::Session& session, const std::string& cell, const DiagnoseArguments& arguments) {
+  if (!std::filesystem::exists(arguments.batch)) return session.diagnose(cell, arguments.batch, "", arguments.apply);
+  const Result<std::string> csv = read_text_file(arguments.batch);
+  if (!csv) return tl::make_unexpected(csv.error());
+  return session.diagnose(cell, "", *csv, arguments.apply);
+}
+
+Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
+  ProgressLine progress;
+  return session.wait_for_job(job, kLongest, [&](const client::JobStatus& status) {
+    progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
+  });
+}
+
+/// What a service found, read and told; its bytes come from outside.
+struct Findings {
+  ordered_json json;
+  std::string text;
+};
+
+Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
+  const std::string what = fmt::format("what job {} found", job);
+  if (const Status small = check_json_limits(bytes, what); !small) return tl::make_unexpected(small.error());
+  Findings findings{ordered_json::parse(bytes, nullptr, false), {}};
+  try {
+    if (findings.json.is_object()) {
+      findings.text = diagnosis_text(findings.json);
+      if (!findings.json.at("next_poses").empty()) static_cast<void>(next_poses_csv(findings.json));
+      return findings;
+    }
+  } catch (const ordered_json::exception& error) {
+    return failure(ErrorCode::kInternal, "{} is no diagnosis: {}", what, error.what());
+  }
+  return failure(ErrorCode::kInternal, "{} is not JSON", what);
+}
+
+}  // namespace
+
+Status diagnose_at_service(const DiagnoseArguments& arguments) {
+  if (!arguments.model.empty() || !arguments.cell_out.empty()) {
+    return failure(ErrorCode::kUsage, "--model and --cell-out are for files; a service keeps its models itself");
+  }
+  Outputs outputs = outputs_of(arguments);
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  const Result<std::int64_t> job = ask(**session, *cell, arguments);
+  if (!job) return tl::make_unexpected(job.error());
+  const Result<client::JobStatus> end = wait(**session, *job);
+  if (!end) return tl::make_unexpected(end.error());
+  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
+  auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
+  if (!found) return tl::make_unexpected(found.error());
+  Result<Findings> findings = findings_of(found->findings_json, *job);
+  if (!findings) return tl::make_unexpected(findings.error());
+  ordered_json& json = findings->json;
+  say(findings->text, arguments);
+  if (arguments.apply) {
+    const int now = found->in_force.version;
+    json["applied"] = {{"job", *job},
+                       {"outcome", end->what},
+                       {"version", end->model_version},
+                       {"in_force", end->in_force},
+                       {"version_in_force", now > 0 ? ordered_json(now) : ordered_json(nullptr)},
+                       {"error_sources_in_force", found->in_force.level}};
+    say(fmt::format("\n{}{}\nin force now: {}\n",
+                    end->model_version > 0 ? fmt::format("version {}: ", end->model_version) : "", end->what,
+                    now > 0 ? fmt::format("version {} ({})", now, found->in_force.level) : "no version"),
+        arguments);
+  }
+  if (!arguments.report.empty() && found->page_html.empty()) {
+    return refused("{}: the service has this page no more", arguments.report);
+  }
+  const Status written = write_diagnosis(json, std::move(found->page_html), outputs, arguments);
+  if (!written) return written;
+  if (!arguments.apply || end->in_force) return {};
+  return refused("cell {}: {}", *cell, end->what);
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+
+namespace trammel::cli {
+
+/// What `trammel diagnose` was asked.
+struct DiagnoseArguments {
+  std::string cell, batch, report, next_poses, json, model, cell_out;
+  std::uint64_t seed = 1;
+  bool apply = false;
+  ServiceOptions service;
+};
+
+/// Text for people, left out where a result goes to standard output.
+void say(const std::string& text, const DiagnoseArguments& arguments);
+
+/// Page, next poses and JSON, where they are asked for.
+[[nodiscard]] Outputs outputs_of(const DiagnoseArguments& arguments);
+/// What was found, with everything else that was put into `outputs`; says why there are no next poses where there are
+/// none.
+[[nodiscard]] Status write_diagnosis(const nlohmann::ordered_json& json, std::string page, Outputs& outputs,
+                                     const DiagnoseArguments& arguments);
+
+/// Has a service diagnose one of its batches (`batch` names it; empty: the newest) or the file `batch`, waits, and
+/// writes what it found. Refuses when what was found was to be put in force and is not.
+[[nodiscard]] Status diagnose_at_service(const DiagnoseArguments& arguments);
+
+}  // namespace trammel::cli

@@ -1,0 +1,83 @@
+#include "clients/cli/terminal/options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+
+#include "server/robot/cell.h"
+
+namespace trammel::cli {
+
+namespace {
+
+constexpr double kLongestTimeout = 3600;  // s
+
+}  // namespace
+
+void add_service_options(CLI::App& command, ServiceOptions& options) {
+  command.add_flag("--service", options.service, "Ask a running trammeld instead of working on files")
+      ->group("Service");
+  command.add_option("--port", options.ports, "UDP port of the service on this host; once a replica")
+      ->allow_extra_args(false)
+      ->capture_default_str()
+      ->group("Service");
+  command.add_option("--domain", options.domain, "DDS domain of the service")
+      ->check(CLI::Range(0, 232))
+      ->capture_default_str()
+      ->group("Service");
+  command.add_option("--timeout", options.timeout_s, "Time to wait for an answer, s")
+      ->check(CLI::Range(0.01, kLongestTimeout))
+      ->capture_default_str()
+      ->group("Service");
+}
+
+Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
+  client::SessionOptions session;
+  session.domain = options.domain;
+  session.server_ports = options.ports;
+  session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
+  return client::Session::open(session);
+}
+
+void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+  // Taken for an unsigned number, -1 would silently be the largest.
+  const CLI::Validator whole(
+      [](const std::string& text) {
+        const bool digits = !text.empty() &&
+                            std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
+        return digits ? std::string() : "--seed " + text + ": expected a whole number from 0";
+      },
+      "");
+  command.add_option("--seed", seed, help)->check(whole)->capture_default_str();
+}
+
+void add_json_option(CLI::App& command, std::string& path) {
+  command.add_option("--json", path, "Write the result for programs to this file ('-': standard output)")
+      ->type_name("FILE");
+}
+
+void add_tool_options(CLI::App& command, std::string& tool, std::string& payload) {
+  command.add_option("--tool", tool, "Tool id of the cell; may be left out where the cell has one tool");
+  command.add_option("--payload", payload, "Payload id of the cell; may be left out where the cell has one payload");
+}
+
+Result<ModelReference> parse_model_reference(const std::string& text) {
+  ModelReference reference;
+  const std::size_t at = text.find('@');
+  reference.cell = text.substr(0, at);
+  if (reference.cell.empty()) return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text);
+  if (at == std::string::npos) return reference;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + at + 1, end, reference.version);
+  if (error != std::errc() || stop != end || reference.version < 1) {
+    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text);
+  }
+  return reference;
+}
+
+Result<std::string> cell_id(const std::string& id_or_file) {
+  if (!id_or_file.ends_with(".yaml") && !id_or_file.ends_with(".yml")) return id_or_file;
+  return read_cell(id_or_file).map([](const Cell& cell) { return cell.name; });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,107 @@
+#include "clients/cli/terminal/output.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "server/base/text_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_standard_output(const std::string& path) { return path == "-" || path == "/dev/stdout"; }
+
+/// Whether writing one would change the other; a device is no file that anybody reads again.
+bool same_file(const std::string& a, const std::string& b) {
+  if (is_standard_output(a) || is_standard_output(b)) return is_standard_output(a) && is_standard_output(b);
+  std::error_code error;
+  if (fs::is_character_file(a, error)) return false;
+  return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+}
+
+}  // namespace
+
+Status write_output(const std::string& path, const std::string& text) {
+  if (path != "-") return write_text_file(path, text);
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (!written) return refused("standard output: cannot be written: {}", std::strerror(errno));
+  return {};
+}
+
+Status write_json(const std::string& path, const nlohmann::ordered_json& value) {
+  if (path.empty()) return {};
+  return write_output(path, json_text(value));
+}
+
+std::string json_text(const nlohmann::ordered_json& value) {
+  return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+void tell(const std::string& text, std::initializer_list<std::string> paths) {
+  if (std::any_of(paths.begin(), paths.end(), is_standard_output)) return;
+  std::fputs(text.c_str(), stdout);
+}
+
+void Outputs::add(const std::string& option, const std::string& path, const std::string& may_replace) {
+  if (!path.empty()) outputs_.push_back({{option, path}, may_replace, {}});
+}
+
+Status Outputs::check(const std::vector<NamedFile>& inputs) const {
+  for (std::size_t k = 0; k < outputs_.size(); ++k) {
+    const auto& [option, path] = outputs_[k].file;
+    for (std::size_t i = 0; i < k; ++i) {
+      if (!same_file(path, outputs_[i].file.path)) continue;
+      return failure(ErrorCode::kUsage, "{} and {} both go to {}", outputs_[i].file.option, option,
+                     is_standard_output(path) ? "standard output" : path);
+    }
+    for (const NamedFile& input : inputs) {
+      if (input.path.empty() || input.option == outputs_[k].may_replace || !same_file(path, input.path)) continue;
+      return failure(ErrorCode::kUsage, "{} {} would overwrite {}", option, path, input.option);
+    }
+    if (is_standard_output(path)) continue;
+    if (const Status writable = check_writable(path); !writable) return writable;
+  }
+  return {};
+}
+
+void Outputs::put(const std::string& option, std::string text) {
+  for (Output& output : outputs_) {
+    if (output.file.option == option) output.text = std::move(text);
+  }
+}
+
+Status Outputs::write() const {
+  std::vector<TextFile> files;
+  for (const Output& output : outputs_) {
+    if (output.text && output.file.path != "-") files.push_back({output.file.path, *output.text});
+  }
+  if (const Status written = write_text_files(files); !written) return written;
+  for (const Output& output : outputs_) {
+    if (output.text && output.file.path == "-") return write_output("-", *output.text);
+  }
+  return {};
+}
+
+ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+
+ProgressLine::~ProgressLine() {
+  if (!shown_.empty()) std::fputs("\r\033[K", stderr);
+}
+
+void ProgressLine::show(const std::string& what, double share) {
+  if (!terminal_) return;
+  const std::string line = fmt::format("{} {:.0f} %", what, 100 * std::clamp(share, 0.0, 1.0));
+  if (line == shown_) return;
+  fmt::print(stderr, "\r\033[K{}", line);
+  std::fflush(stderr);
+  shown_ = line;
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,272 @@
+#include "clients/cli/text/diagnose_text.h"
+
+#include "server/base/units.h"
+#include "server/diagnose/tell/wording.h"
+#include "server/measurement/files/csv_table.h"
+#include "server/report/figures_json.h"
+#include "server/report/html.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kMicrometres = 1000;  // per mm
+
+/// `gear_transmission of joint 3`, `outlier at pose p28`.
+std::string cause_text(const ordered_json& cause) {
+  std::string text = cause.at("cause");
+  if (cause.contains("parameter")) text += fmt::format(" {}", cause.at("parameter").get<std::string>());
+  if (!cause.at("joint").is_null()) text += fmt::format(" of joint {}", cause.at("joint").get<int>());
+  if (cause.contains("pose_id")) text += fmt::format(" at pose {}", cause.at("pose_id").get<std::string>());
+  return text;
+}
+
+std::string causes_text(const ordered_json& causes) {
+  std::string text;
+  for (const ordered_json& cause : causes) text += (text.empty() ? "" : ", ") + cause_text(cause);
+  return text;
+}
+
+std::string words_text(const ordered_json& words, const char* between) {
+  std::string text;
+  for (const ordered_json& word : words) text += (text.empty() ? "" : between) + word.get<std::string>();
+  return text;
+}
+
+std::string micrometres(const ordered_json& millimetres) {
+  return millimetres.is_null() ? "-" : fmt::format("{:.3g} um", kMicrometres * millimetres.get<double>());
+}
+
+std::string parameters_line(const ordered_json& parameters) {
+  std::string text;
+  for (const auto& [name, estimate] : parameters.items()) {
+    const ShownValue shown = show_with_uncertainty(estimate.at("value"), estimate.at("u95"));
+    const std::string unit = estimate.at("unit");
+    text += fmt::format("{}{} = {} ± {}{}{}", text.empty() ? "" : ", ", name, shown.value, shown.expanded,
+                        unit.empty() ? "" : " ", unit);
+  }
+  return text;
+}
+
+std::string beginning_line(const ordered_json& beginning) {
+  const auto place = [](const ordered_json& one) {
+    const ordered_json& time = one.at("time_s");
+    return one.at("pose_id").get<std::string>() +
+           (time.is_null() ? "" : fmt::format(" ({:.0f} s)", time.get<double>()));
+  };
+  return fmt::format("      may have begun at any of {} poses from {} to {} (95 %)\n", beginning.at("pose_ids").size(),
+                     place(beginning.at("earliest")), place(beginning.at("latest")));
+}
+
+/// What is smaller says no more: no test here is that exact.
+std::string p_text(const ordered_json& value) {
+  constexpr double kLeast = 1e-6;
+  const double p = value.get<double>();
+  return p <= kLeast ? "< 1e-6" : fmt::format("{:.2g}", p);
+}
+
+std::string finding_lines(const ordered_json& finding) {
+  std::string text =
+      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding),
+                  kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
+                  p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
+                  finding.at("held_out").at("after").at("rms_mm").get<double>());
+  if (!finding.at("parameters").empty()) text += fmt::format("      {}\n", parameters_line(finding.at("parameters")));
+  if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
+    text += beginning_line(finding.at("may_begin_at"));
+  }
+  if (!finding.at("could_also_be").empty()) {
+    text += fmt::format("      could also be: {}\n", causes_text(finding.at("could_also_be")));
+  }
+  if (const auto action = finding.at("action").get<std::string>(); !action.empty()) {
+    text += fmt::format("      {}\n", action);
+  }
+  return text;
+}
+
+std::string findings_table(const ordered_json& findings) {
+  if (findings.empty()) return "";
+  std::string text =
+      fmt::format("\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
+                  "strength", "p", "held out", "", "cause", "um rms", "lambda", "", "before mm", "after mm");
+  for (const ordered_json& finding : findings) text += finding_lines(finding);
+  return text + "  (± is U(k=2): two standard uncertainties)\n";
+}
+
+std::string figures_line(const char* name, const ordered_json& figures) {
+  if (figures.is_null()) return "";
+  return fmt::format("  {:<18}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", name, figures.at("rms_mm").get<double>(),
+                     figures.at("mean_mm").get<double>(), figures.at("p997_mm").get<double>(),
+                     figures.at("max_mm").get<double>());
+}
+
+std::string figures_table(const ordered_json& diagnosis) {
+  const ordered_json& held_out = diagnosis.at("held_out");
+  std::string text = fmt::format("\n  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+                     figures_line("before", diagnosis.at("before")) + figures_line("after", diagnosis.at("after")) +
+                     figures_line("held out, before", held_out.at("before")) +
+                     figures_line("held out, after", held_out.at("after")) +
+                     figures_line("  but suspects", held_out.at("before_without_suspects")) +
+                     figures_line("  after, but them", held_out.at("after_without_suspects"));
+  if (!held_out.at("before").is_null()) {
+    text += fmt::format("  (held out: {})\n", held_out.at("how").get<std::string>());
+  }
+  return text;
+}
+
+std::string unexplained_text(const ordered_json& unexplained) {
+  if (!unexplained.at("present").get<bool>()) return "";
+  const auto& on = unexplained.at("depends_on");
+  return fmt::format("\nUnexplained: {} rms that depend on {} (p {})\n", micrometres(unexplained.at("rms_mm")),
+                     on.empty() ? "nothing known" : words_text(on, ", "), p_text(unexplained.at("p_value")));
+}
+
+std::string suspects_text(const ordered_json& suspects) {
+  if (suspects.empty()) return "";
+  std::string text = "\nPoses that do not fit the others:\n";
+  for (const ordered_json& pose : suspects) {
+    text += fmt::format("  pose {} (row {}): {} off; {}\n", pose.at("pose_id").get<std::string>(),
+                        pose.at("row").get<int>(), micrometres(pose.at("distance_mm")),
+                        pose.at("reason").get<std::string>());
+  }
+  return text;
+}
+
+/// Causes that needed something else to show, or to be named: a line for all joints of which the same is to be said.
+std::string unseen_lines(const ordered_json& unseen) {
+  std::vector<std::pair<std::string, std::string>> lines;  // cause and what it needs, joints
+  for (const ordered_json& one : unseen) {
+    if (!one.at("smallest_mm").is_null() || one.at("needs").get<std::string>().empty()) continue;
+    const bool by_order = one.value("looked_for_by_order", false);
+    const std::string what =
+        fmt::format("would not have {}: {}: needs {}",
+                    by_order ? "been named for certain (looked for by the order of the poses)" : "shown",
+                    one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
+    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
+    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == what; });
+    if (known == lines.end()) {
+      lines.emplace_back(what, joint);
+    } else {
+      known->second += joint;
+    }
+  }
+  std::string text;
+  for (const auto& [what, joints] : lines) {
+    text += fmt::format("  {}{}\n", what, joints.empty() ? "" : " (joints" + joints + ")");
+  }
+  return text;
+}
+
+/// What a cause would need to show, empty where nothing is said.
+std::string need_of(const ordered_json& unseen, const std::string& name) {
+  for (const ordered_json& one : unseen) {
+    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
+    if (one.at("cause").get<std::string>() + joint == name) return one.at("needs");
+  }
+  return "";
+}
+
+/// A line a cause: all that looks like it, and once what it needs.
+std::string not_separable_lines(const ordered_json& diagnosis) {
+  std::vector<std::pair<std::string, std::string>> lines;
+  for (const ordered_json& group : diagnosis.at("not_separable")) {
+    const auto name = group.front().get<std::string>();
+    std::string others;
+    for (std::size_t k = 1; k < group.size(); ++k) others += (k > 1 ? ", " : "") + group[k].get<std::string>();
+    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == name; });
+    if (known == lines.end()) {
+      lines.emplace_back(name, others);
+    } else {
+      known->second += ", " + others;
+    }
+  }
+  std::string text;
+  for (const auto& [name, others] : lines) {
+    const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
+    text += fmt::format("  not told apart by these poses: {} from {}{}\n", name, others,
+                        need.empty() ? "" : fmt::format(" (needs {})", need));
+  }
+  return text;
+}
+
+std::string limits_text(const ordered_json& diagnosis) {
+  std::string text;
+  for (const ordered_json& limit : diagnosis.at("limits")) text += fmt::format("  {}\n", limit.get<std::string>());
+  text += not_separable_lines(diagnosis);
+  text += unseen_lines(diagnosis.at("could_not_have_seen"));
+  return text.empty() ? "" : "\nWhat this batch could not tell (smallest sizes: --report, --json):\n" + text;
+}
+
+std::string next_poses_text(const ordered_json& diagnosis) {
+  if (diagnosis.at("next_poses").empty()) return "";
+  const ordered_json& worth = diagnosis.at("next_poses_for");
+  std::string text = fmt::format("\nNext poses, to tell apart {} (uncertain by {} now, by {} with them):\n",
+                                 causes_text(worth.at("separate")), uncertain_by(worth.at("stddev_now")),
+                                 uncertain_by(worth.at("stddev_expected")));
+  for (const ordered_json& pose : diagnosis.at("next_poses")) {
+    text += " ";
+    for (const ordered_json& value : pose) text += fmt::format("{:>10.2f}", value.get<double>());
+    text += "\n";
+  }
+  return text;
+}
+
+std::string extended_line(const char* name, const CompensatedModel& model) {
+  return figures_line(name, figures_json(model.parts().validation->compensated));
+}
+
+}  // namespace
+
+std::string diagnosis_text(const ordered_json& diagnosis) {
+  const double noise = diagnosis.at("noise_mm");
+  return fmt::format("{}: {}\n{} poses, {} {} per axis ({})\n", diagnosis.at("verdict").get<std::string>(),
+                     diagnosis.at("sentence").get<std::string>(), diagnosis.at("poses").get<int>(),
+                     noise_name(noise, diagnosis.value("instrument_mm", noise)), micrometres(noise),
+                     diagnosis.at("noise_from").get<std::string>()) +
+         findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
+         unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
+         limits_text(diagnosis) + next_poses_text(diagnosis);
+}
+
+std::string next_poses_csv(const ordered_json& diagnosis) {
+  std::string text = "pose_id";
+  for (const ordered_json& column : diagnosis.at("next_poses_for").at("columns")) {
+    text += "," + column.get<std::string>();
+  }
+  text += "\n";
+  int number = 0;
+  for (const ordered_json& pose : diagnosis.at("next_poses")) {
+    text += fmt::format("n{}", ++number);
+    for (const ordered_json& value : pose) text += "," + csv_number(value.get<double>());
+    text += "\n";
+  }
+  return text;
+}
+
+std::string extension_text(const Extension& extension) {
+  const int poses = extension.after.parts().validation->poses;
+  return fmt::format("\nWith bias, on {} poses held out from diagnosis and training:\n", poses) +
+         fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+         extended_line("before", extension.before) + extended_line("extended", extension.after) +
+         fmt::format("  {}\n", to_string(extension.gain)) +
+         (extension.left_out.empty() ? "" : fmt::format("  {}\n", to_string(extension.left_out)));
+}
+
+ordered_json extension_json(const Extension& extension) {
+  ordered_json left_out = ordered_json::array();
+  for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
+  return {{"better", extension.gain.beyond_chance()},
+          {"z", extension.gain.z()},
+          {"z_limit", PairedGain::kBeyondChance},
+          {"judged_without", extension.gain.left_out},
+          {"error_sources", extension.sources},
+          {"left_out", std::move(left_out)},
+          {"of_the_cell", extension.lasting},
+          {"held_out_poses", extension.after.parts().validation->poses},
+          {"before", figures_json(extension.before.parts().validation->compensated)},
+          {"after", figures_json(extension.after.parts().validation->compensated)}};
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,254 @@
+#include "clients/cli/text/evaluation_text.h"
+
+#include "server/base/coverage.h"
+#include "server/base/units.h"
+#include "server/compensate/model_notes.h"
+#include "server/report/figures_json.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string figures_line(const char* level, const ErrorFigures& figures) {
+  return fmt::format("  {:<12}{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}\n", level, to_mm(figures.rms), to_mm(figures.mean),
+                     to_mm(figures.p997), to_mm(figures.max));
+}
+
+std::string nlpd_line(const Evaluation& evaluation) {
+  if (!evaluation.nlpd) return "";
+  return fmt::format("  {:.3f} nat: mean negative log predictive density of a coordinate, mm, compensated\n",
+                     nlpd_in_mm(*evaluation.nlpd));
+}
+
+std::string doubt_line(const Evaluation& evaluation) {
+  const std::optional<std::string> doubt = doubt_of_bias(evaluation);
+  return doubt ? "  " + *doubt + "\n" : "";
+}
+
+std::string orientation_lines(const std::optional<OrientationFigures>& orientation) {
+  if (!orientation) return "";
+  std::string text = fmt::format(
+      "  orientation, deg rms of {} poses: nominal {:.4f}, calibrated {:.4f}, compensated {:.4f}", orientation->poses,
+      to_deg(orientation->nominal), to_deg(orientation->calibrated), to_deg(orientation->compensated));
+  if (orientation->coverage_95)
+    text += fmt::format("; {:.1f} % of rotations inside their 95 % interval", 100 * *orientation->coverage_95);
+  return text + "\n";
+}
+
+ordered_json orientation_json(const OrientationFigures& orientation) {
+  ordered_json json = {{"poses", orientation.poses}};
+  const auto level = [](double rms) { return ordered_json{{"rms_deg", to_deg(rms)}}; };
+  json["nominal"] = level(orientation.nominal);
+  json["calibrated"] = level(orientation.calibrated);
+  json["compensated"] = level(orientation.compensated);
+  if (orientation.coverage_95) json["coverage_95"] = *orientation.coverage_95;
+  return json;
+}
+
+}  // namespace
+
+std::string evaluation_table(const Evaluation& evaluation) {
+  return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
+         figures_line("nominal", evaluation.nominal) + figures_line("calibrated", evaluation.calibrated) +
+         figures_line("compensated", evaluation.compensated) +
+         fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
+                     evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
+         nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + doubt_line(evaluation);
+}
+
+ordered_json evaluation_json(const Evaluation& evaluation) {
+  ordered_json json = {{"poses", evaluation.poses}};
+  json.update(figures_json(evaluation.compensated));
+  json["levels"] = {{"nominal", figures_json(evaluation.nominal)},
+                    {"calibrated", figures_json(evaluation.calibrated)},
+                    {"compensated", figures_json(evaluation.compensated)}};
+  json["coverage_95"] = evaluation.coverage_95;
+  json["in_domain"] = evaluation.in_domain;
+  if (evaluation.nlpd) json["nlpd"] = nlpd_in_mm(*evaluation.nlpd);
+  if (evaluation.orientation) json["orientation"] = orientation_json(*evaluation.orientation);
+  if (const auto doubt = doubt_of_bias(evaluation)) json["doubt_of_bias"] = *doubt;
+  return json;
+}
+
+namespace {
+
+std::string rotation_text(const CompensatedModel::Parts& parts) {
+  if (parts.rotation_bias) return "the bias corrects orientations too\n";
+  if (!parts.bias || parts.oriented_poses == 0) return "";
+  return fmt::format("the bias corrects positions only: {} of its {} poses have an orientation, all must\n",
+                     parts.oriented_poses, parts.bias->q.rows());
+}
+
+std::string choice_text(const BiasChoice& choice) {
+  std::string text = choice.sentence + "\n";
+  if (choice.candidates.empty()) return text;
+  text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "one by one", "in time",
+                      "in space", "nlpd (mm)");
+  for (const BiasCandidate& c : choice.candidates) {
+    if (c.skipped) {
+      text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
+      continue;
+    }
+    text += fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
+                        to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
+  }
+  text +=
+      "  one by one, nlpd: left out of the bias, not of the physics, so that `none` is its residual; in time, in "
+      "space: "
+      "eighths left out of both\n";
+  return text;
+}
+
+ordered_json choice_json(const BiasChoice& choice) {
+  ordered_json candidates = ordered_json::array();
+  for (const BiasCandidate& c : choice.candidates) {
+    if (c.skipped) {
+      candidates.push_back({{"kernel", c.kernel}, {"verdict", c.verdict}});
+      continue;
+    }
+    candidates.push_back({{"kernel", c.kernel},
+                          {"leave_one_out_rms_mm", to_mm(c.leave_one_out_rms)},
+                          {"leave_one_out_nlpd", nlpd_in_mm(c.leave_one_out_nlpd)},
+                          {"time_block_rms_mm", to_mm(c.time_block_rms)},
+                          {"joint_block_rms_mm", to_mm(c.joint_block_rms)},
+                          {"gain_mm2", to_mm(to_mm(c.gain))},
+                          {"gain_stddev_mm2", to_mm(to_mm(c.gain_stddev))},
+                          {"verdict", c.verdict}});
+  }
+  return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", candidates}};
+}
+
+/// Play that came out with the sign it cannot have.
+std::string negative_play_text(const CompensatedModel::Parts& parts) {
+  std::string text;
+  std::size_t next = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const std::size_t first = next;
+    next += source->parameters().size();
+    if (!source->name().starts_with("backlash:") || next > parts.parameters.size()) continue;
+    const IdentifiedParameter& play = parts.parameters[first];
+    if (play.value + 2 * play.stddev >= 0) continue;
+    text += fmt::format(
+        "{} is {:.0f} urad (U {:.0f}), but play is positive by definition: joints read or measured before they stood "
+        "still, a servo that overshoots or lags, or a dir{} column of the wrong sign?\n",
+        play.parameter.name, 1e6 * play.value, 2e6 * play.stddev, source->joint() + 1);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string model_text(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  std::string text =
+      fmt::format("model {} of cell {}: {}, bias {}\n", provenance.id, model.cell().name,
+                  provenance.level.empty() ? "nominal" : provenance.level, parts.bias ? parts.bias->kernel : "none");
+  text += fmt::format("trained on {} poses of batch {}; {} of {} parameters identified (rank {})\n",
+                      provenance.training_poses, provenance.batch_id,
+                      std::count_if(parts.parameters.begin(), parts.parameters.end(),
+                                    [](const IdentifiedParameter& p) { return p.identified; }),
+                      parts.parameters.size(), parts.rank);
+  for (const RefitRecord& refit : provenance.refits) {
+    text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
+                        fmt::join(refit.sources, ", "), refit.poses, refit.batch_id, refit.model);
+  }
+  for (const std::string& note : notes_of(model)) text += "note: " + note + "\n";
+  text += rotation_text(parts) + negative_play_text(parts);
+  if (parts.bias_choice) text += choice_text(*parts.bias_choice);
+  if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
+  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
+    text += fmt::format("  {}\n", combination.sentence);
+  }
+  if (!parts.suspects.empty())
+    text += "poses that do not fit the others (bounded in their pull; measure them again):\n";
+  for (const SuspectPose& pose : parts.suspects) {
+    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
+                        to_mm(pose.distance), pose.sigmas);
+  }
+  return text;
+}
+
+namespace {
+
+/// Pairs of parameters whose estimates hang together.
+ordered_json correlations_json(const CompensatedModel::Parts& parts) {
+  constexpr double kWorthTelling = 0.9;
+  ordered_json pairs = ordered_json::array();
+  for (std::size_t i = 0; i < parts.parameters.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto a = static_cast<Eigen::Index>(i);
+      const auto b = static_cast<Eigen::Index>(j);
+      const double correlation = parts.covariance(a, b) / std::sqrt(parts.covariance(a, a) * parts.covariance(b, b));
+      if (std::abs(correlation) < kWorthTelling) continue;
+      pairs.push_back({{"parameters", {parts.parameters[j].parameter.name, parts.parameters[i].parameter.name}},
+                       {"correlation", correlation}});
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+ordered_json model_json(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  ordered_json parameters = ordered_json::array();
+  for (const IdentifiedParameter& identified : parts.parameters) {
+    const Parameter& parameter = identified.parameter;
+    parameters.push_back({{"name", parameter.name},
+                          {"unit", parameter.unit},
+                          {"value", parameter.scale * identified.value},
+                          {"u95", kExpanded * parameter.scale * identified.stddev},
+                          {"identified", identified.identified}});
+  }
+  ordered_json combinations = ordered_json::array();
+  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
+    combinations.push_back({{"parameters", combination.parameters},
+                            {"singular_value", combination.singular_value},
+                            {"sentence", combination.sentence}});
+  }
+  ordered_json suspects = ordered_json::array();
+  for (const SuspectPose& pose : parts.suspects) {
+    suspects.push_back(
+        {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"sigmas", pose.sigmas}});
+  }
+  ordered_json json = {
+      {"model", provenance.id},
+      {"hash", provenance.hash},
+      {"cell", model.cell().name},
+      {"level", provenance.level},
+      {"bias", parts.bias ? parts.bias->kernel : "none"},
+      {"batch", provenance.batch_id},
+      {"batch_hash", provenance.batch_hash},
+      {"trained_at_unix_s", provenance.trained_at},
+      {"measured_at_unix_s", provenance.measured_at ? ordered_json(*provenance.measured_at) : ordered_json(nullptr)},
+      {"training_poses", provenance.training_poses},
+      {"seed", provenance.seed},
+      {"rank", parts.rank},
+      {"condition_number", parts.condition_number},
+      {"observability_index", parts.observability_index},
+      {"cost_record", parts.cost_record},
+      {"suspect_poses", suspects},
+      {"correlations", correlations_json(parts)},
+      {"parameters", parameters},
+      {"not_identifiable", combinations},
+      {"training", evaluation_json(parts.training)}};
+  if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
+  for (const RefitRecord& refit : provenance.refits) {
+    json["refits"].push_back({{"sources", refit.sources},
+                              {"batch", refit.batch_id},
+                              {"batch_hash", refit.batch_hash},
+                              {"poses", refit.poses},
+                              {"model", refit.model}});
+  }
+  if (parts.rotation_bias) json["bias_of_orientation"] = true;
+  if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
+  if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);
+  if (parts.validation) json["validation"] = evaluation_json(*parts.validation);
+  return json;
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,154 @@
+#include "clients/cli/text/service_text.h"
+
+#include <cmath>
+#include <ctime>
+#include <map>
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// `2026-11-21 14:03`, UTC; `-`: nobody knows.
+std::string date_text(std::int64_t unix_s) {
+  if (unix_s <= 0) return "-";
+  const std::time_t time = unix_s;
+  std::tm parts{};
+  if (::gmtime_r(&time, &parts) == nullptr) return "-";
+  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday,
+                     parts.tm_hour, parts.tm_min);
+}
+
+ordered_json model_json(const client::ModelInfo& model) {
+  return {{"cell", model.cell},
+          {"version", model.version},
+          {"in_force", model.in_force},
+          {"id", model.id},
+          {"hash", model.hash},
+          {"level", model.level},
+          {"batch", model.batch_id},
+          {"trained_at_unix_s", model.trained_at_unix_s},
+          {"data_age_s", model.data_age_s},
+          {"training_poses", model.training_poses},
+          {"validation_rms_mm", model.validation_rms_mm}};
+}
+
+std::string job_line(const client::DatedJob& job) {
+  const client::JobStatus& status = job.status;
+  std::string text =
+      fmt::format("job {} of cell {} ({}", status.job, status.cell, job.kind == "diagnose" ? "diagnosis" : "training");
+  if (!job.batches.empty()) text += fmt::format(" of {}", fmt::join(job.batches, ", "));
+  text += fmt::format(") {}", status.stage);
+  if (status.stage == "training" || status.stage == "storing") text += fmt::format(" {:.0f} %", 100 * status.share);
+  text += fmt::format(", accepted {}", date_text(job.created_unix_s));
+  if (job.started_unix_s) text += fmt::format(", begun {}", date_text(*job.started_unix_s));
+  if (job.finished_unix_s) text += fmt::format(", ended {}", date_text(*job.finished_unix_s));
+  return text + (status.what.empty() ? "" : ": " + status.what) + "\n";
+}
+
+}  // namespace
+
+ordered_json job_json(const client::JobStatus& job) {
+  return {{"job", job.job},          {"cell", job.cell},   {"stage", job.stage},
+          {"what", job.what},        {"share", job.share}, {"model_version", job.model_version},
+          {"in_force", job.in_force}};
+}
+
+ordered_json jobs_json(const std::vector<client::DatedJob>& jobs) {
+  const auto time = [](const std::optional<std::int64_t>& unix_s) {
+    return unix_s ? ordered_json(*unix_s) : ordered_json(nullptr);
+  };
+  ordered_json list = ordered_json::array();
+  for (const client::DatedJob& job : jobs) {
+    ordered_json one = job_json(job.status);
+    one.update({{"server", job.server},
+                {"kind", job.kind},
+                {"batches", job.batches},
+                {"created_unix_s", job.created_unix_s},
+                {"started_unix_s", time(job.started_unix_s)},
+                {"finished_unix_s", time(job.finished_unix_s)}});
+    list.push_back(std::move(one));
+  }
+  return list;
+}
+
+std::string jobs_text(const std::vector<client::DatedJob>& jobs) {
+  std::map<std::string, std::string> done;
+  std::string unfinished, failed;
+  for (const client::DatedJob& job : jobs) {
+    if (job.status.stage == "done") {
+      done[job.server + "/" + job.status.cell] = job_line(job);
+    } else {
+      (job.status.stage == "failed" ? failed : unfinished) += job_line(job);
+    }
+  }
+  std::string text = unfinished.empty() ? "no job runs or waits\n" : unfinished;
+  for (const auto& [cell, line] : done) text += line;
+  return text + failed;
+}
+
+ordered_json models_json(const std::vector<client::ModelInfo>& models) {
+  ordered_json json = ordered_json::array();
+  for (const client::ModelInfo& model : models) json.push_back(model_json(model));
+  return json;
+}
+
+std::string models_text(const std::vector<client::ModelInfo>& models, std::int64_t now) {
+  if (models.empty()) return "no models\n";
+  std::string text = fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id", "poses",
+                                 "held out mm", "trained", "data of", "level");
+  for (const client::ModelInfo& model : models) {
+    text += fmt::format("{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ', model.cell,
+                        model.version, model.id, model.training_poses,
+                        model.validation_rms_mm > 0 ? fmt::format("{:.4f}", model.validation_rms_mm) : "-",
+                        date_text(model.trained_at_unix_s),
+                        date_text(now - static_cast<std::int64_t>(std::llround(model.data_age_s))),
+                        model.level.empty() ? "nominal" : model.level);
+  }
+  return text + "  (* in force; dates in UTC)\n";
+}
+
+std::string server_text(const client::ServerStatus& server) {
+  return fmt::format("server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
+                     server.server_id, server.version, server.state, server.uptime_s, server.requests, server.refused,
+                     server.queued_jobs,
+                     server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " ")));
+}
+
+ordered_json server_json(const client::ServerStatus& server) {
+  return {{"server", server.server_id},  {"version", server.version},        {"state", server.state},
+          {"cells", server.cells},       {"requests", server.requests},      {"refused", server.refused},
+          {"uptime_s", server.uptime_s}, {"queued_jobs", server.queued_jobs}};
+}
+
+std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches) {
+  std::string text;
+  for (const client::QuarantinedBatch& one : batches) {
+    text +=
+        fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell, one.poses, one.reason);
+  }
+  return text;
+}
+
+ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches) {
+  ordered_json list = ordered_json::array();
+  for (const client::QuarantinedBatch& one : batches) {
+    list.push_back({{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
+  }
+  return list;
+}
+
+std::string next_step(const client::JobStatus& job) {
+  if (job.stage == "failed" && job.what.find("quarantine") != std::string::npos) {
+    return fmt::format(
+        "next: trammel diagnose --service --cell {0} says what the batch differs in; trammel retrain --service --cell "
+        "{0} --batch ID --release learns from it, if it is good",
+        job.cell);
+  }
+  if (job.model_version == 0 || job.in_force) return "";
+  return fmt::format("next: trammel activate --service --model {}@{} puts it in force, if it is wanted", job.cell,
+                     job.model_version);
+}
+
+}  // namespace trammel::cli

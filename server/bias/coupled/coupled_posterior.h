@@ -1,0 +1,85 @@
+#pragma once
+
+#include "server/bias/coupled/coupled_likelihood.h"
+
+namespace trammel {
+
+/// At one joint vector, of D outputs.
+struct CoupledPrediction {
+  Eigen::VectorXd mean;
+  Eigen::VectorXd own_mean;    ///< what of it the outputs' own processes add to H w
+  Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
+  Eigen::VectorXd prior;       ///< their variances before any data
+};
+
+/// What coupled processes know after their data. Immutable, thread-safe.
+/// At a target, with h = H(q) scaled and k_d the covariance of output d with the data: R_d = h_d - k_dᵀ M_d⁻¹ H_d and
+///   mean_d = h_d ŵ + k_dᵀ α_d,  covariance = diag(k_d** - k_dᵀ M_d⁻¹ k_d) + R A⁻¹ Rᵀ.
+/// The parts that do not mix outputs are those of a GaussianProcess conditioned on y_d - H_d ŵ.
+class CoupledPosterior {
+ public:
+  /// Empty when a covariance is not positive definite.
+  [[nodiscard]] static std::optional<CoupledPosterior> condition(std::shared_ptr<const Kernel> kernel,
+                                                                 const LinearBlocks& blocks, const CoupledData& data,
+                                                                 const CoupledHyperparameters& at,
+                                                                 VarianceForm form = VarianceForm::kCompressed);
+
+  /// At the rows of `q`; `columns`: H there, not scaled, as CoupledData has it. Where kExact was not asked for, poses
+  /// whose covariance with the target is too small to matter are passed over: the variance of an output is then off by
+  /// less than 0.003 of its noise's (bound: DECISIONS.md).
+  [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
+                                                       const std::vector<Eigen::MatrixXd>& columns) const;
+  /// What the outputs' own processes add to H w, M x D.
+  [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
+
+  /// p, of the columns as they are (not scaled).
+  [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
+  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
+
+  /// A whole pose left out, all its outputs at once: mean, N x D; variances of the measurement, N x D
+  /// (blocks of C⁻¹ instead of its diagonal in Rasmussen & Williams, eqs. 5.10-5.12).
+  [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
+  [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
+  /// Mean square of the standardised errors of measurements in threefold cross-validation by runs of ten poses, the
+  /// hyperparameters held: 1 where the process is as sure as it may be.
+  [[nodiscard]] double surprise() const { return surprise_; }
+  /// N x D: variances at the data before any.
+  [[nodiscard]] const Eigen::MatrixXd& prior() const { return prior_; }
+
+ private:
+  CoupledPosterior() = default;
+  void leave_out(const CoupledSolution& solution, const CoupledData& data);
+  /// What one output contributes at some targets.
+  struct Part {
+    Eigen::MatrixXd R;      // p x M: R_dᵀ
+    Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
+    Eigen::VectorXd prior;  // of both parts
+  };
+  // Rising: those whose covariance matters; none where no inverse is kept.
+  [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
+  [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
+  // R A⁻¹ Rᵀ of target i.
+  [[nodiscard]] Eigen::MatrixXd shared_covariance(const std::vector<Part>& parts, Eigen::Index i) const;
+  // Of a few targets at once.
+  void predict_few(const Eigen::MatrixXd& q, const std::vector<Eigen::MatrixXd>& columns,
+                   std::vector<CoupledPrediction>* out) const;
+
+  std::shared_ptr<const Kernel> kernel_;
+  Eigen::Index points_ = 0;
+  std::vector<GpHyperparameters> hyperparameters_;
+  std::vector<GaussianProcess> outputs_;  // of y_d - H_d ŵ
+  std::vector<AlignedMatrix> features_;
+  std::vector<Eigen::MatrixXd> explained_;    // D: Hᵀ M⁻¹, p x N
+  std::vector<std::vector<double>> inverse_;  // D: M⁻¹, lower triangle row after row; empty: not needed
+  std::vector<double> passed_over_;           // D: root sum of squares of the covariances that do not matter
+  AlignedMatrix packed_root_;                 // L⁻¹ of A = L Lᵀ, as Numerics packs it
+  Eigen::VectorXd column_scale_;
+  Eigen::VectorXd weights_;
+  double log_likelihood_ = 0;
+  Eigen::MatrixXd leave_one_out_mean_;
+  Eigen::MatrixXd leave_one_out_variance_;
+  double surprise_ = 1;
+  Eigen::MatrixXd prior_;
+};
+
+}  // namespace trammel

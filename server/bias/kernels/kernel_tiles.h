@@ -1,0 +1,76 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/bias/kernels/kernel.h"
+#include "server/numerics/aligned_matrix.h"
+#include "server/numerics/numerics.h"
+
+/// What kernels other than the radial ones share.
+namespace trammel {
+
+using StridedColumns = Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>>;
+using MutableStridedColumns = Eigen::Map<Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>>;
+
+inline StridedColumns columns_of(const FeatureBlock& block, Eigen::Index count) {
+  return {block.data, block.rows, count, Eigen::OuterStride<>(block.ld)};
+}
+inline StridedColumns columns_of(const double* g, Eigen::Index rows, Eigen::Index cols, Eigen::Index ld) {
+  return {g, rows, cols, Eigen::OuterStride<>(ld)};
+}
+inline MutableStridedColumns columns_of(double* k, Eigen::Index rows, Eigen::Index cols, Eigen::Index ld) {
+  return {k, rows, cols, Eigen::OuterStride<>(ld)};
+}
+
+/// How many joints so many parameters are for; 0 when their number does not tell, since all are shared.
+inline Eigen::Index joints_of(const Kernel& kernel, Eigen::Index parameters) {
+  const Eigen::Index shared = kernel.parameter_count(0);
+  const Eigen::Index each = kernel.parameter_count(1) - shared;
+  return each == 0 ? 0 : (parameters - shared) / each;
+}
+
+/// k(i, j) in a matrix of its own, with its padding.
+inline AlignedMatrix tile_of(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& a,
+                             const FeatureBlock& b) {
+  AlignedMatrix k(padded_rows(a.rows), b.rows);
+  kernel.tile(parameters, a, b, k.data(), k.rows());
+  return k;
+}
+
+/// Kernel::weighted_sum by tiles, for kernels that know nothing better.
+inline void weighted_sum_by_tiles(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& a,
+                                  const FeatureBlock& b, const double* weights, double* out) {
+  constexpr Eigen::Index kChunk = 10 * kRowPadding;
+  constexpr Eigen::Index kColumns = 64;
+  std::fill_n(out, b.rows, 0.0);
+  for (Eigen::Index j = 0; j < b.rows; j += kColumns) {
+    const FeatureBlock columns = {b.data + j, std::min(kColumns, b.rows - j), b.ld};
+    for (Eigen::Index i = 0; i < a.rows; i += kChunk) {
+      const Eigen::Index rows = std::min(kChunk, a.rows - i);
+      const AlignedMatrix k = tile_of(kernel, parameters, {a.data + i, rows, a.ld}, columns);
+      const Eigen::Map<const Eigen::VectorXd> w(weights + i, rows);
+      for (Eigen::Index c = 0; c < columns.rows; ++c) out[j + c] += k.map().col(c).head(rows).dot(w);
+    }
+  }
+}
+
+/// Where a search of length scales starts, for values that spread like the columns of `x`.
+inline SearchBox length_scale_box(const Eigen::MatrixXd& x) {
+  const Eigen::RowVectorXd mean = x.colwise().mean();
+  SearchBox box{Eigen::VectorXd(x.cols()), Eigen::VectorXd(x.cols())};
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    const double spread = std::sqrt((x.col(k).array() - mean[k]).square().mean());
+    const double scale = spread > 1e-6 ? spread : 1.0;  // a joint that never moved has no length scale to find
+    box.low[k] = std::log(0.5 * scale);
+    box.high[k] = std::log(10.0 * scale);
+  }
+  return box;
+}
+
+/// z = q / l, a column of the table each; `log_scales` one per column of `q`.
+inline void scaled_joints(const Eigen::VectorXd& log_scales, const Eigen::MatrixXd& q, double* table, Eigen::Index ld) {
+  columns_of(table, q.rows(), q.cols(), ld) = q * (-log_scales).array().exp().matrix().asDiagonal();
+}
+
+}  // namespace trammel

@@ -1,0 +1,250 @@
+#include "server/bias/process/gaussian_process.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "server/base/check.h"
+#include "server/bias/process/inducing_points.h"
+#include "server/numerics/numerics.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kTile = 64;
+constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
+constexpr double kLogParameterMax = 40.0;
+constexpr double kLogRatioMin = -20.0;  // below it thousands of smooth points are no longer positive
+                                        // definite in doubles
+
+// Of the compressed variance: what may stay unexplained at any of the data, relative to the noise; where it pays.
+constexpr double kUnexplained = 1e-3;
+constexpr double kMostKept = 0.75;
+constexpr Index kMostPoints = 2000;
+constexpr Index kFewestToCompress = 200;
+
+const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
+
+// Of an AlignedMatrix or of a MatrixXd.
+template <typename Table>
+FeatureBlock rows_of(const Table& features, Index first, Index count) {
+  return {features.data() + first, count, features.rows()};
+}
+
+// Leading dimensions that are multiples of 4 KiB would put whole rows into the same few cache sets.
+Index leading_dimension(Index rows) { return rows % 64 == 0 ? rows + kTargetBlock : rows; }
+
+// [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
+void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
+                        const VectorXd& noise_shape, const MatrixXd& y, AlignedMatrix* matrix) {
+  const Index n = noise_shape.size();
+  const Index ld = matrix->rows();
+  for (Index j = 0; j < n; j += kTile) {
+    const Index cols = std::min(kTile, n - j);
+    for (Index i = j; i < n; i += 4 * kTile) {
+      kernel.tile(parameters, rows_of(features, i, std::min(4 * kTile, n - i)), rows_of(features, j, cols),
+                  matrix->data() + i + j * ld, ld);
+    }
+  }
+  for (Index j = 0; j < n; ++j) {
+    (*matrix)(j, j) += ratio * noise_shape[j];
+    matrix->map().col(j).segment(n, y.cols()) = y.row(j);
+    matrix->map().col(j).tail(ld - n - y.cols()).setZero();
+  }
+  matrix->map().rightCols(matrix->cols() - n).setZero();
+}
+
+AlignedMatrix augmented_storage(Index n, Index outputs) {
+  const Index rows = padded_rows(n + outputs);
+  return {leading_dimension(rows), rows};
+}
+
+AlignedMatrix feature_table(const Kernel& kernel, const MatrixXd& q) {
+  return {padded_rows(q.rows()), kernel.feature_count(q.cols())};
+}
+
+// Targets need no padding: their rows are taken one by one.
+MatrixXd target_features(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
+  MatrixXd table(q.rows(), kernel.feature_count(q.cols()));
+  kernel.features(parameters, q, table.data(), table.rows());
+  return table;
+}
+
+}  // namespace
+
+ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior)
+    : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)) {
+  TRAMMEL_CHECK(data_.y.rows() == size() && data_.noise_shape.size() == size());
+  matrix_ = augmented_storage(size(), data_.y.cols());
+  features_ = feature_table(*kernel_, data_.q);
+  alpha_ = {padded_rows(size()), data_.y.cols()};
+  work_ = {numerics().work_size(size() + data_.y.cols()), 1};
+}
+
+bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* out) {
+  const Index n = size();
+  const Index outputs = data_.y.cols();
+  const Index count = parameters.size() - 1;
+  if (!parameters.allFinite() || parameters.cwiseAbs().maxCoeff() > kLogParameterMax) return false;
+  if (parameters[count] < kLogRatioMin) return false;
+  const double log_ratio = parameters[count];
+  const double ratio = std::exp(log_ratio);
+
+  const VectorXd kernel_parameters = parameters.head(count);
+  kernel_->features(kernel_parameters, data_.q, features_.data(), features_.rows());
+  assemble_augmented(*kernel_, kernel_parameters, features_, ratio, data_.noise_shape, data_.y, &matrix_);
+  double log_det = 0;
+  if (!numerics().sweep(n, outputs, matrix_.data(), matrix_.rows(), work_.data(), &log_det)) return false;
+
+  alpha_.map().topRows(n) = matrix_.map().block(n, 0, outputs, n).transpose();
+  const auto points = static_cast<double>(n);
+  signal_variance_.resize(outputs);
+  VectorXd weights(outputs);
+  out->value = 0.5 * static_cast<double>(outputs) * log_det;
+  double noise_slope = 0;  // of the noise prior, along log η at fixed σ_f²
+  for (Index d = 0; d < outputs; ++d) {
+    const double quadratic = data_.y.col(d).dot(alpha_.map().col(d).head(n));
+    const double variance = std::max(quadratic, 0.0) / points + kSmallestSignal * kSmallestSignal;
+    signal_variance_[d] = variance;
+    out->value += 0.5 * points * (std::log(variance) + 1.0 + kLogTwoPi);
+    // The noise prior sees log σ_n = ½ (log η + log σ_f²), and σ_f² moves with the parameters too.
+    const double below = std::min(0.5 * (log_ratio + std::log(variance)) - std::log(prior_.noise_stddev), 0.0);
+    out->value += 0.5 * std::pow(below / prior_.noise_spread, 2);
+    const double slope = below / (prior_.noise_spread * prior_.noise_spread);
+    noise_slope += 0.5 * slope;
+    weights[d] = (1.0 + slope / points) / variance;
+  }
+
+  out->gradient = contract(kernel_parameters, ratio, weights);
+  out->gradient[count] += noise_slope;
+  for (Index p = 0; p <= count; ++p) {
+    const double centre = p < count ? prior_.parameter_centre[p] : prior_.log_ratio_centre;
+    const double spread = p < count ? prior_.parameter_spread : prior_.log_ratio_spread;
+    const double away = (parameters[p] - centre) / spread;
+    out->value += 0.5 * away * away;
+    out->gradient[p] += away / spread;
+  }
+  return std::isfinite(out->value) && out->gradient.allFinite();
+}
+
+// ½ tr(G dM), G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, over the lower triangle: off the diagonal once, on it half.
+VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, const VectorXd& output_weights) {
+  const Index n = size();
+  const Index ld = matrix_.rows();
+  const auto outputs = static_cast<double>(data_.y.cols());
+  VectorXd gradient = VectorXd::Zero(parameters.size() + 1);
+  AlignedMatrix tile(kTile, kTile);
+  Eigen::Map<MatrixXd> g = tile.map();
+  VectorXd column_weights(output_weights.size());
+  for (Index j = 0; j < n; j += kTile) {
+    const Index cols = std::min(kTile, n - j);
+    for (Index i = j; i < n; i += kTile) {
+      const Index rows = std::min(kTile, n - i);
+      for (Index c = 0; c < cols; ++c) {
+        column_weights = output_weights.cwiseProduct(alpha_.map().row(j + c).transpose());
+        numerics().weight_column(rows, -outputs, matrix_.data() + i + (j + c) * ld, column_weights.size(),
+                                 alpha_.data() + i, alpha_.rows(), column_weights.data(), g.col(c).data());
+        g.col(c).tail(kTile - rows).setZero();
+        if (i > j) continue;
+        g.col(c).head(c).setZero();
+        g(c, c) *= 0.5;
+        gradient[parameters.size()] += ratio * data_.noise_shape[j + c] * g(c, c);
+      }
+      kernel_->tile_gradient(parameters, rows_of(features_, i, rows), rows_of(features_, j, cols), g.data(), kTile,
+                             gradient.data());
+    }
+  }
+  return gradient;
+}
+
+double ProfiledLikelihood::leave_one_out_rms() const {
+  double total = 0;
+  for (Index i = 0; i < size(); ++i) total += alpha_.map().row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
+  return std::sqrt(total / static_cast<double>(size()));
+}
+
+std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const Kernel> kernel, const MatrixXd& q,
+                                                          const VectorXd& y, const VectorXd& noise_shape,
+                                                          const GpHyperparameters& hyperparameters, VarianceForm form) {
+  const Index n = q.rows();
+  GaussianProcess gp;
+  gp.kernel_ = std::move(kernel);
+  gp.parameters_ = hyperparameters.kernel;
+  gp.size_ = n;
+  gp.features_ = feature_table(*gp.kernel_, q);
+  gp.kernel_->features(gp.parameters_, q, gp.features_.data(), gp.features_.rows());
+  gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
+  gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
+  const double ratio = gp.noise_variance_ / gp.signal_variance_;
+  gp.y_ = y;
+  gp.noise_ = ratio * noise_shape;
+
+  AlignedMatrix matrix = augmented_storage(n, 1);
+  AlignedMatrix work(numerics().work_size(n + 1), 1);
+  assemble_augmented(*gp.kernel_, gp.parameters_, gp.features_, ratio, noise_shape, y, &matrix);
+  if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &gp.log_det_)) return std::nullopt;
+
+  gp.weights_ = {padded_rows(n), 1};
+  gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
+  gp.inverse_diagonal_.resize(n);  // of M⁻¹ = L⁻ᵀ L⁻¹
+  for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
+  gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
+  gp.finish(form);
+  return gp;
+}
+
+void GaussianProcess::finish(VarianceForm form) {
+  const auto weights = weights_.map().col(0).head(size_);
+  log_likelihood_ = -0.5 * (y_.dot(weights) / signal_variance_ + log_det_ +
+                            static_cast<double>(size_) * (std::log(signal_variance_) + kLogTwoPi));
+  VectorXd prior(size_);
+  kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
+  leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
+  leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
+  if (form == VarianceForm::kCompressed) compress();
+}
+
+void GaussianProcess::compress() {
+  if (size_ < kFewestToCompress) return;
+  const Index most = std::min(kMostPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
+  const double tolerance = kUnexplained * noise_.minCoeff();
+  const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
+  if (static_cast<Index>(points.size()) == most) return;
+  auto few = InducingPoints::at(*kernel_, parameters_, features_, points);
+  if (!few) return;
+  const FeatureBlock all = rows_of(features_, 0, size_);
+  few->learn(*kernel_, parameters_, all, noise_, y_);
+  auto posterior = few->posterior();
+  if (!posterior) return;
+  // Widened to the exact variance at the data, D - D² diag(M⁻¹).
+  const VectorXd known = noise_ - noise_.cwiseAbs2().cwiseProduct(inverse_diagonal_);
+  VectorXd share(size_);
+  VectorXd prior(size_);
+  posterior->variance.shares(*kernel_, parameters_, all, share.data(), prior.data());
+  posterior->variance.widen(std::max(1.0, known.cwiseQuotient(share).maxCoeff()));
+  compressed_ = std::move(posterior->variance);
+}
+
+void GaussianProcess::mean(const MatrixXd& q, double* out) const {
+  const MatrixXd targets = target_features(*kernel_, parameters_, q);
+  kernel_->weighted_sum(parameters_, rows_of(features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(), out);
+}
+
+std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) const {
+  const MatrixXd targets = target_features(*kernel_, parameters_, q);
+  VectorXd posterior(q.rows());
+  VectorXd prior(q.rows());
+  const VarianceTable& table = compressed_ ? *compressed_ : exact_;
+  table.shares(*kernel_, parameters_, rows_of(targets, 0, q.rows()), posterior.data(), prior.data());
+  std::vector<PosteriorVariance> variances(static_cast<std::size_t>(q.rows()));
+  for (Index i = 0; i < q.rows(); ++i)
+    variances[static_cast<std::size_t>(i)] = {signal_variance_ * posterior[i], signal_variance_ * prior[i]};
+  return variances;
+}
+
+}  // namespace trammel

@@ -1,0 +1,47 @@
+#include "server/bias/process/halves.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "server/base/check.h"
+
+namespace trammel {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+void halve(const MatrixXd& table, std::size_t most, std::vector<Index> part, std::vector<std::vector<Index>>* parts) {
+  if (part.size() <= most) {
+    std::sort(part.begin(), part.end());
+    parts->push_back(std::move(part));
+    return;
+  }
+  Index widest = 0;
+  double width = -1;
+  for (Index k = 0; k < table.cols(); ++k) {
+    const auto column = table.col(k)(part);
+    const double spread = column.maxCoeff() - column.minCoeff();
+    if (spread > width) widest = k;
+    width = std::max(width, spread);
+  }
+  const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
+  std::nth_element(part.begin(), middle, part.end(), [&](Index a, Index b) {
+    return table(a, widest) != table(b, widest) ? table(a, widest) < table(b, widest) : a < b;
+  });
+  halve(table, most, {part.begin(), middle}, parts);
+  halve(table, most, {middle, part.end()}, parts);
+}
+
+}  // namespace
+
+std::vector<std::vector<Index>> halved(const MatrixXd& table, Index most) {
+  TRAMMEL_CHECK(most > 0);
+  std::vector<Index> all(static_cast<std::size_t>(table.rows()));
+  std::iota(all.begin(), all.end(), Index{0});
+  std::vector<std::vector<Index>> parts;
+  halve(table, static_cast<std::size_t>(most), std::move(all), &parts);
+  return parts;
+}
+
+}  // namespace trammel

@@ -1,0 +1,57 @@
+#include "server/bias/process/variance_table.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/numerics/numerics.h"
+
+namespace trammel {
+
+using Eigen::Index;
+
+// From the last rows up: columns to the right of a row are not needed above it, so that never more than one triangle
+// and one matrix are there.
+VarianceTable::VarianceTable(AlignedMatrix features, Index size, AlignedMatrix root)
+    : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
+  const Numerics& n = numerics();
+  for (Index first = (size - 1) / n.packed_rows * n.packed_rows; first >= 0; first -= n.packed_rows) {
+    n.pack_lower(size, first, root.data(), root.rows(), packed_root_.data() + n.packed_size(first));
+    root.forget_columns_from(first);
+  }
+}
+
+VarianceTable::VarianceTable(AlignedMatrix features, Index size, const std::vector<double>& rows)
+    : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
+  numerics().pack_triangle(size, rows.data(), packed_root_.data());
+}
+
+std::vector<double> VarianceTable::rows(Index more) const {
+  std::vector<double> rows;
+  rows.reserve(static_cast<std::size_t>((size_ + more) * (size_ + more + 1) / 2));
+  rows.resize(static_cast<std::size_t>(size_ * (size_ + 1) / 2));
+  numerics().unpack_triangle(size_, packed_root_.data(), rows.data());
+  return rows;
+}
+
+void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets,
+                           double* posterior, double* prior) const {
+  const Index block = targets.rows == 1 ? 1 : kTargetBlock;
+  const Index ld = padded_rows(size_);
+  AlignedMatrix cross(ld, block);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> interleaved(size_, block);
+  kernel.diagonal(parameters, targets, prior);
+  for (Index first = 0; first < targets.rows; first += block) {
+    const Index count = std::min(block, targets.rows - first);
+    kernel.tile(parameters, {features_.data(), size_, features_.rows()}, {targets.data + first, count, targets.ld},
+                cross.data(), ld);
+    interleaved = cross.map().topRows(size_);
+    double explained[kTargetBlock];
+    numerics().square_norms(size_, packed_root_.data(), block, interleaved.data(), explained);
+    for (Index j = 0; j < count; ++j) {
+      const double k = prior[first + j];
+      posterior[first + j] = std::clamp(factor_ * (k - explained[j]), 0.0, k);
+    }
+  }
+}
+
+}  // namespace trammel

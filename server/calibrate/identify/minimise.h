@@ -1,0 +1,13 @@
+#pragma once
+
+#include "server/calibrate/identify/gauss_newton.h"
+
+namespace trammel {
+
+/// The most probable parameters under `weights`, from `start` (P, in units of the priors): by full Gauss-Newton steps
+/// where they lead downhill, else by guarded ones from any start. Refuses where the solver fails.
+[[nodiscard]] Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParameters& s,
+                                       const Weights& weights, const CalibrateOptions& options,
+                                       const Eigen::VectorXd& start);
+
+}  // namespace trammel

@@ -1,0 +1,138 @@
+#include "server/calibrate/identify/order_search.h"
+
+#include <algorithm>
+
+#include "server/calibrate/identify/identify.h"
+#include "server/calibrate/identify/weighting.h"
+
+namespace trammel {
+
+namespace {
+
+/// An order, and what a sine and a cosine of it explain of a joint's share of the residuals.
+struct FoundOrder {
+  double order = 0;  // cycles a turn of the joint
+  double gain = 0;   // weighted sum of squares explained
+};
+
+/// `q`: joint angles, rad; `along`: weighted residual along the joint's Jacobian column; `square`: weighted square of
+/// that column. All of size N.
+FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
+                     double order) {
+  const Eigen::ArrayXd sine = (order * q.array()).sin();
+  const Eigen::ArrayXd cosine = (order * q.array()).cos();
+  Eigen::Matrix2d normal;
+  normal(0, 0) = (square.array() * sine * sine).sum();
+  normal(0, 1) = normal(1, 0) = (square.array() * sine * cosine).sum();
+  normal(1, 1) = (square.array() * cosine * cosine).sum();
+  // A hair of damping: near order 0, or with few poses, the two columns are alike.
+  normal += 1e-9 * normal.trace() * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d right((along.array() * sine).sum(), (along.array() * cosine).sum());
+  const Eigen::Vector2d amplitude = normal.inverse() * right;
+  return {order, amplitude.dot(right)};
+}
+
+/// Periodogram in joint space with unequal weights: over `search`, then refined to a hundredth of its step.
+FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, const Eigen::VectorXd& square,
+                        const ErrorSource::Search& search) {
+  FoundOrder best;
+  const auto consider = [&](double order) {
+    const FoundOrder candidate = fit_order(q, along, square, std::max(order, search.from));
+    if (candidate.gain > best.gain) best = candidate;
+  };
+  for (double order = search.from; order <= search.to; order += search.step) consider(order);
+  for (double step = search.step / 4; step > search.step / 100; step /= 2) {
+    const double centre = best.order;
+    for (int k = -4; k <= 4; ++k) consider(centre + k * step);
+  }
+  return best;
+}
+
+/// First value index of each source.
+std::vector<Eigen::Index> first_values(const PhysicalModel& model) {
+  std::vector<Eigen::Index> first;
+  Eigen::Index next = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    first.push_back(next);
+    next += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  return first;
+}
+
+/// `model` without the sources in `left_out` (indices).
+PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>& left_out) {
+  PhysicalModel less = model;
+  less.sources.clear();
+  std::vector<double> values;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (std::find(left_out.begin(), left_out.end(), k) != left_out.end()) continue;
+    less.sources.push_back(model.sources[k]);
+    for (std::size_t i = 0; i < model.sources[k]->parameters().size(); ++i) {
+      values.push_back(model.values(first[k] + static_cast<Eigen::Index>(i)));
+    }
+  }
+  less.values = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return less;
+}
+
+/// The order of `source` that explains most of the residuals through its joint's Jacobian column.
+FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, const MeasurementBatch& batch,
+                      const Residuals& r, const Weights& weights) {
+  const auto n = r.position.cols();
+  Eigen::VectorXd q(n);
+  Eigen::VectorXd along(n);   // weighted residual along the column
+  Eigen::VectorXd square(n);  // weighted square of the column
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
+    const Pose X_FT = model.tools.at(context.tool);
+    const Vector3 column =
+        model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(source.joint()).head<3>();
+    const double weight = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
+    q(i) = context.q(source.joint());
+    along(i) = weight * column.dot(r.position.col(i));
+    square(i) = weight * column.squaredNorm();
+  }
+  return search_order(q, along, square, *source.search());
+}
+
+}  // namespace
+
+Status search_orders(CalibrationProblem& problem, const CalibrateOptions& options) {
+  PhysicalModel& model = problem.model;
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    if (model.sources[k]->search()) open.push_back(k);
+  }
+  const std::vector<Eigen::Index> first = first_values(model);
+  while (!open.empty()) {
+    const Result<CalibrationResult> found = identify({without(model, open), problem.batch}, options);
+    if (!found) return tl::make_unexpected(found.error());
+    const Residuals r = residuals_of(found->model, problem.batch, found->model.values);
+    const Weights weights{found->discrepancy, found->discrepancy_rotation, true};
+    FoundOrder best;
+    std::size_t strongest = open.front();
+    for (const std::size_t k : open) {
+      const FoundOrder candidate = best_order(*model.sources[k], found->model, problem.batch, r, weights);
+      if (candidate.gain > best.gain) {
+        best = candidate;
+        strongest = k;
+      }
+    }
+    model.values(first[strongest]) = best.order;
+    open.erase(std::find(open.begin(), open.end(), strongest));
+  }
+  return {};
+}
+
+std::map<std::string, std::string> found_orders(const PhysicalModel& model) {
+  std::map<std::string, std::string> found;
+  const std::vector<Eigen::Index> first = first_values(model);
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const ErrorSource& source = *model.sources[k];
+    if (source.search()) found[source.name()] = fmt::format("{}@{:.4f}", source.name(), model.values(first[k]));
+  }
+  return found;
+}
+
+}  // namespace trammel

@@ -1,0 +1,38 @@
+#include "server/calibrate/identify/scaled_parameters.h"
+
+#include "server/calibrate/frames/frames.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
+
+}  // namespace
+
+Eigen::VectorXd ScaledParameters::lower() const {
+  Eigen::VectorXd bounds(scale.size());
+  for (Eigen::Index i = 0; i < bounds.size(); ++i) bounds(i) = parameters[static_cast<std::size_t>(i)].lower / scale(i);
+  return bounds;
+}
+
+ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held) {
+  const Eigen::Index P = model.parameter_count();
+  ScaledParameters s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P), held};
+  Eigen::Index k = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const bool unknown = (source->name() == "base" && (!model.cell->X_WB || !held.empty())) ||
+                         (source->name() == "tool" && has_unknown_tool(*model.cell));
+    for (std::size_t i = 0; i < source->parameters().size(); ++i, ++k) {
+      Parameter& parameter = s.parameters[static_cast<std::size_t>(k)];
+      s.typical(k) = parameter.prior_scale;
+      parameter.prior = model.values(k);
+      parameter.prior_scale *= unknown ? kUnknownWidening : 1;
+      s.scale(k) = parameter.prior_scale;
+      s.prior(k) = parameter.prior / parameter.prior_scale;
+    }
+  }
+  return s;
+}
+
+}  // namespace trammel

@@ -1,0 +1,61 @@
+#include "server/calibrate/identify/weighted_pose.h"
+
+#include <cmath>
+
+namespace trammel {
+
+namespace {
+
+constexpr double kHuberPosition = 4.03;  // 3 normal axes
+constexpr double kHuberPose = 4.74;      // 6 axes
+
+Matrix3 right_jacobian_inverse(const Vector3& w) {
+  const double angle = w.norm();
+  const Matrix3 W = skew(w);
+  const double c =
+      angle < 1e-4 ? 1.0 / 12 : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
+  return Matrix3::Identity() + 0.5 * W + c * W * W;
+}
+
+}  // namespace
+
+WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
+                           const Weights& weights)
+    : model_(model),
+      scale_(s.scale),
+      held_(s.held),
+      measurement_(measurement),
+      weight_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
+      rotation_weight_(1 / std::hypot(model.cell->tracker.sigma_rotation, weights.discrepancy_rotation)) {}
+
+bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
+  const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(x, scale_.size()).cwiseProduct(scale_);
+  Eigen::MatrixXd J;
+  const Pose X_WT = model_.pose_W(measurement_.context, values, jacobian != nullptr ? &J : nullptr);
+  Eigen::Map<Eigen::VectorXd> r(residuals, size());
+  r.head<3>() = weight_ * (measurement_.p_W - X_WT.translation());
+  Vector3 turn = Vector3::Zero();
+  if (measurement_.R_WT) {
+    turn = rotation_log(*measurement_.R_WT * X_WT.linear().transpose());
+    r.tail<3>() = rotation_weight_ * turn;
+  }
+  if (jacobian != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(jacobian, size(),
+                                                                                           scale_.size());
+    // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
+    const Matrix3 by_turn = -rotation_weight_ * right_jacobian_inverse(turn);
+    for (Eigen::Index k = 0; k < scale_.size(); ++k) {
+      if (!held_.empty() && held_[static_cast<std::size_t>(k)]) {
+        out.col(k).setZero();
+        continue;
+      }
+      out.col(k).head<3>() = -weight_ * scale_(k) * J.col(k).head<3>();
+      if (measurement_.R_WT) out.col(k).tail<3>() = scale_(k) * (by_turn * J.col(k).tail<3>());
+    }
+  }
+  return X_WT.translation().allFinite();
+}
+
+double WeightedPose::huber_limit() const { return measurement_.R_WT ? kHuberPose : kHuberPosition; }
+
+}  // namespace trammel

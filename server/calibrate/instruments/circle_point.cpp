@@ -1,0 +1,221 @@
+#include "server/calibrate/instruments/circle_point.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/coverage.h"
+#include "server/base/units.h"
+#include "server/calibrate/instruments/axis_fit.h"
+#include "server/calibrate/instruments/links_from_axes.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kLengthDeviation = 0.1;  // m, beyond it is another robot
+constexpr double kAngleDeviation = from_deg(10);
+
+struct NamedMember {
+  int joint;
+  double LinkGeometry::*member;
+  const char* symbol;
+  bool length;
+};
+
+std::vector<NamedMember> members_of(const Chain& robot) {
+  std::vector<NamedMember> members;
+  for (int i = 0; i < robot.size(); ++i) {
+    members.push_back({i, &LinkGeometry::theta, "q", false});
+    if (!robot.joint(i).hayati) members.push_back({i, &LinkGeometry::d, "d", true});
+    members.push_back({i, &LinkGeometry::a, "a", true});
+    members.push_back({i, &LinkGeometry::alpha, "alpha", false});
+    if (robot.joint(i).hayati) members.push_back({i, &LinkGeometry::beta, "beta", false});
+  }
+  return members;
+}
+
+std::string why_not_measured(const NamedMember& member, const Chain& robot) {
+  if (member.joint == robot.size() - 1) return "the last link: nothing marks the flange";
+  if (member.joint != 0) return {};
+  if (member.member == &LinkGeometry::theta) return "nothing marks the base's azimuth: x0 is conventional";
+  if (member.member == &LinkGeometry::d) return "nothing marks the base's height: the origin on axis 1 is conventional";
+  return {};
+}
+
+Eigen::VectorXd deviations(const Chain& robot, const std::vector<NamedMember>& members,
+                           const std::vector<LinkGeometry>& links) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(members.size()));
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const auto link = static_cast<std::size_t>(members[k].joint);
+    values(static_cast<Eigen::Index>(k)) =
+        links[link].*members[k].member - robot.joint(members[k].joint).link.*members[k].member;
+  }
+  return values;
+}
+
+/// Everything measured at its posture, with the variance of each joint's residuals.
+struct Fits {
+  std::vector<AxisFit> axes;
+  std::vector<double> variance;  ///< m^2, of one coordinate
+  std::vector<double> widening;  ///< of a covariance whose variance was itself estimated
+};
+
+std::vector<AxisLine> lines_of(const Fits& fits) {
+  std::vector<AxisLine> lines;
+  for (const AxisFit& fit : fits.axes) lines.push_back({fit.n, fit.c});
+  return lines;
+}
+
+/// Covariance of the deviations: first derivatives by central differences, a step of one standard deviation each way.
+Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointArcs>& groups, const Fits& fits,
+                                   const std::vector<NamedMember>& members) {
+  const auto size = static_cast<Eigen::Index>(members.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
+  for (std::size_t i = 0; i < fits.axes.size(); ++i) {
+    const AxisFit& fit = fits.axes[i];
+    const Eigen::Matrix4d small = fit.normal_inverse.topLeftCorner<4, 4>() * (fits.variance[i] * fits.widening[i]);
+    const auto uv = across(fit.n);
+    Eigen::MatrixXd J(size, 4);
+    for (int k = 0; k < 4; ++k) {
+      const double step = std::max(std::sqrt(small(k, k)), 1e-9);
+      Eigen::VectorXd sides[2];
+      for (const int side : {0, 1}) {
+        std::vector<AxisLine> lines = lines_of(fits);
+        const Vector3 move = uv.col(k % 2) * (side == 0 ? -step : step);
+        if (k < 2) {
+          lines[i].n = (fit.n + move).normalized();
+        } else {
+          lines[i].c += move;
+        }
+        const Result<Links> links = links_of(robot, at_zero(robot, groups, lines));
+        if (!links) return tl::make_unexpected(links.error());
+        sides[side] = deviations(robot, members, links->links);
+      }
+      J.col(k) = (sides[1] - sides[0]) / (2 * step);
+    }
+    covariance += J * small * J.transpose();
+  }
+  return covariance;
+}
+
+/// Worst direction's U(k=2) of a symmetric covariance.
+double worst_u(const Eigen::MatrixXd& covariance) {
+  return kExpanded *
+         std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().maxCoeff()));
+}
+
+void describe_circles(const JointArcs& group, const AxisFit& fit, double variance, std::vector<CircleFit>& circles) {
+  const Linearised last = linearised(fit, group);
+  const auto uv = across(fit.n);
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < group.arcs.size(); ++k) {
+    const auto& arc = group.arcs[k];
+    CircleFit circle;
+    circle.joint = group.joint;
+    circle.reflector = arc.front()->reflector;
+    circle.points = static_cast<int>(arc.size());
+    circle.centre_W = fit.centre(k);
+    circle.radius = fit.radius[k];
+    const auto by_angle = [&](const ArcPoint* a, const ArcPoint* b) { return a->q(group.joint) < b->q(group.joint); };
+    const auto [low, high] = std::minmax_element(arc.begin(), arc.end(), by_angle);
+    circle.span = (*high)->q(group.joint) - (*low)->q(group.joint);
+    for (std::size_t p = 0; p < arc.size(); ++p, row += 2) {
+      circle.plane_rms += last.residual(row) * last.residual(row);
+      circle.circle_rms += last.residual(row + 1) * last.residual(row + 1);
+    }
+    circle.plane_rms = std::sqrt(circle.plane_rms / circle.points);
+    circle.circle_rms = std::sqrt(circle.circle_rms / circle.points);
+    Eigen::MatrixXd to_centre = Eigen::MatrixXd::Zero(3, fit.normal_inverse.cols());  // c + height n
+    to_centre.leftCols<2>() = fit.height[k] * uv;
+    to_centre.middleCols<2>(2) = uv;
+    to_centre.col(4 + 2 * static_cast<Eigen::Index>(k)) = fit.n;
+    circle.centre_u = worst_u(variance * to_centre * fit.normal_inverse * to_centre.transpose());
+    circles.push_back(circle);
+  }
+}
+
+/// The same robot with other links.
+Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& links) {
+  std::vector<Joint> joints;
+  std::vector<Coupling> couplings;
+  for (int i = 0; i < robot.size(); ++i) {
+    Joint joint = robot.joint(i);
+    joint.link = links[static_cast<std::size_t>(i)];
+    joints.push_back(joint);
+    for (int j = 0; j < robot.size(); ++j) {
+      if (i != j && robot.transmission()(i, j) != 0) couplings.push_back({i, j, robot.transmission()(i, j)});
+    }
+  }
+  return Chain::make(robot.name(), std::move(joints), std::move(couplings));
+}
+
+}  // namespace
+
+Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
+                                                const CirclePointOptions& options) {
+  const Result<std::vector<JointArcs>> groups = sorted_by_joint(robot, arcs, options.sigma.has_value());
+  if (!groups) return tl::make_unexpected(groups.error());
+  CirclePointResult result;
+  Fits fits;
+  for (const JointArcs& group : *groups) {
+    Result<AxisFit> fit = axis_fit(group, arcs.where);
+    if (!fit) return tl::make_unexpected(fit.error());
+    const Result<double> angle_rms = orient(*fit, group, arcs.where);
+    if (!angle_rms) return tl::make_unexpected(angle_rms.error());
+    const double seen = fit->freedom > 0 ? fit->cost / fit->freedom : 0;
+    const double stated = options.sigma.value_or(0) * options.sigma.value_or(0);
+    fits.variance.push_back(std::max(seen, stated));
+    // Student's t with f degrees of freedom has the variance f / (f - 2).
+    const bool estimated = seen > stated && fit->freedom > 2;
+    fits.widening.push_back(estimated ? fit->freedom / (fit->freedom - 2.0) : 1);
+    const double variance = fits.variance.back() * fits.widening.back();
+    JointAxis axis;
+    axis.sigma = std::sqrt(fits.variance.back());
+    axis.freedom = fit->freedom;
+    axis.angle_rms = *angle_rms;
+    axis.direction_u = worst_u(variance * fit->normal_inverse.topLeftCorner<2, 2>());
+    result.axes.push_back(axis);
+    describe_circles(group, *fit, variance, result.circles);
+    fits.axes.push_back(std::move(*fit));
+  }
+  const std::vector<AxisLine> lines = at_zero(robot, *groups, lines_of(fits));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    result.axes[i].direction_W = lines[i].n;
+    result.axes[i].point_W = lines[i].c;
+  }
+  const Result<Links> links = links_of(robot, lines);
+  if (!links) return tl::make_unexpected(links.error());
+  const std::vector<NamedMember> members = members_of(robot);
+  const Eigen::VectorXd deviation = deviations(robot, members, links->links);
+  const Result<Eigen::MatrixXd> covariance = propagated(robot, *groups, fits, members);
+  if (!covariance) return tl::make_unexpected(covariance.error());
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const NamedMember& member = members[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    MeasuredParameter parameter;
+    parameter.name = fmt::format("{}{}", member.symbol, member.joint + 1);
+    parameter.length = member.length;
+    parameter.nominal = robot.joint(member.joint).link.*member.member;
+    parameter.note = why_not_measured(member, robot);
+    parameter.measured = parameter.note.empty();
+    if (parameter.measured) {
+      parameter.deviation = deviation(at);
+      parameter.u = kExpanded * std::sqrt(std::max(0.0, (*covariance)(at, at)));
+      const double limit = member.length ? kLengthDeviation : kAngleDeviation;
+      if (!(std::abs(deviation(at)) < limit)) {
+        return refused("{}: {} is {:.3f} {} from that of robot {}, limit {:.0f}; another robot, joint or posture?",
+                       arcs.where, parameter.name, member.length ? to_mm(deviation(at)) : to_deg(deviation(at)),
+                       member.length ? "mm" : "deg", robot.name(), member.length ? to_mm(limit) : to_deg(limit));
+      }
+    }
+    result.parameters.push_back(std::move(parameter));
+  }
+  result.covariance = *covariance;
+  result.X_WB = links->X_WB;
+  Result<Chain> measured = with_links(robot, links->links);
+  if (!measured) return tl::make_unexpected(measured.error());
+  result.robot = std::move(*measured);
+  return result;
+}
+
+}  // namespace trammel

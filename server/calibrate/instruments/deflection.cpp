@@ -1,0 +1,405 @@
+#include "server/calibrate/instruments/deflection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "server/base/coverage.h"
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kSignificant = 0.01;
+constexpr double kSameLoad = 1e-6;  // N
+
+}  // namespace
+
+Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::string& where) {
+  const Result<CsvTable> table = CsvTable::parse(text, where);
+  if (!table) return tl::make_unexpected(table.error());
+  std::map<std::string, std::size_t> columns;
+  for (const char* name : {"element", "load_n", "x_mm", "dx_mm", "dz_mm", "theta_deg", "length_mm", "lever_mm"}) {
+    const Result<std::size_t> column = table->require(name);
+    if (!column) return tl::make_unexpected(column.error());
+    columns[name] = *column;
+  }
+  const std::optional<std::size_t> sigma = table->find("sigma_mm");
+  const std::optional<std::size_t> set = table->find("set");
+  std::map<int, DeflectionElement> elements;
+  DeflectionData data{where, {}, {}};
+  for (std::size_t row = 0; row < table->size(); ++row) {
+    std::map<std::string, double> value;
+    for (const auto& [name, column] : columns) {
+      const Result<double> number = table->number(row, column);
+      if (!number) return tl::make_unexpected(number.error());
+      value[name] = *number;
+    }
+    const Result<int> element = table->integer(row, columns["element"], 1, 100);
+    if (!element) return tl::make_unexpected(element.error());
+    const DeflectionElement stands{*element, from_deg(value["theta_deg"]), from_mm(value["length_mm"]),
+                                   from_mm(value["lever_mm"])};
+    if (!(stands.length > 0)) return table->refuse(row, "length_mm is {}, must be above 0", value["length_mm"]);
+    const DeflectionElement& first = elements.emplace(*element, stands).first->second;
+    if (first.theta != stands.theta || first.length != stands.length || first.lever != stands.lever) {
+      return table->refuse(row, "element {} stands or hangs otherwise than in its first row", *element);
+    }
+    DeflectionReading reading;
+    reading.element = *element;
+    reading.load = value["load_n"];
+    reading.x = from_mm(value["x_mm"]);
+    reading.moved = Eigen::Vector2d(from_mm(value["dx_mm"]), from_mm(value["dz_mm"]));
+    reading.row = table->line(row);
+    if (sigma && !table->field(row, *sigma).empty()) {
+      const Result<double> number = table->number(row, *sigma);
+      if (!number) return tl::make_unexpected(number.error());
+      if (!(*number > 0)) return table->refuse(row, "sigma_mm is {}, must be above 0", *number);
+      reading.sigma = from_mm(*number);
+    }
+    if (set && !table->field(row, *set).empty()) {
+      const std::string& name = table->field(row, *set);
+      if (name != "train" && name != "validation") {
+        return table->refuse(row, "set is '{}', expected train or validation", name);
+      }
+      reading.validation = name == "validation";
+    }
+    data.readings.push_back(reading);
+  }
+  for (const auto& [number, element] : elements) data.elements.push_back(element);
+  return data;
+}
+
+Result<DeflectionData> read_deflection_csv(const std::string& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_deflection_csv(text, path); });
+}
+
+namespace {
+
+/// Force and moments of a load on an element, Figure 4.8.
+struct Moments {
+  double w = 0;         ///< N, across the link at its far end
+  double end = 0;       ///< M, Nm
+  double reaction = 0;  ///< M_R, Nm
+};
+
+Moments moments_of(const DeflectionElement& element, double load) {
+  const double w = load * std::cos(element.theta);
+  const double end = load * element.lever;
+  return {w, end, end + w * element.length};
+}
+
+/// Deflection across the link per 1/EI, eq. (4.2), and its slope.
+double beam(const DeflectionElement& element, const Moments& load, double x) {
+  return load.w * x * x * (3 * element.length - x) / 6 + load.end * x * x / 2;
+}
+double beam_slope(const DeflectionElement& element, const Moments& load, double x) {
+  return load.w * (element.length * x - x * x / 2) + load.end * x;
+}
+
+Eigen::Vector2d along(const DeflectionElement& element) { return {std::cos(element.theta), std::sin(element.theta)}; }
+/// Where a point at `r` goes per radian that its joint gives way, downward for a link that points outward.
+Eigen::Vector2d swung(const Eigen::Vector2d& r) { return {r.y(), -r.x()}; }
+
+/// Which columns the linear model has; where each element's begin.
+struct Layout {
+  struct Columns {
+    int compliance = 0, flexibility = -1, offset = 0, load_bias = -1;
+  };
+  std::vector<Columns> elements;
+  int size = 0;
+};
+
+Layout layout_of(const DeflectionData& data, const std::set<int>& beams, const std::set<int>& load_biases) {
+  Layout layout;
+  for (const DeflectionElement& element : data.elements) {
+    Layout::Columns columns;
+    columns.compliance = layout.size++;
+    if (beams.contains(element.element)) columns.flexibility = layout.size++;
+    columns.offset = layout.size;
+    layout.size += 2;
+    if (load_biases.contains(element.element)) {
+      columns.load_bias = layout.size;
+      layout.size += 2;
+    }
+    layout.elements.push_back(columns);
+  }
+  return layout;
+}
+
+/// 2 x parameters: dx, dz of one reading per unit of each parameter.
+Eigen::MatrixXd rows_of(const DeflectionReading& reading, const DeflectionData& data, const Layout& layout,
+                        bool chained) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(2, layout.size);
+  std::size_t own = 0;
+  while (data.elements[own].element != reading.element) ++own;
+  Eigen::Vector2d from_end = Eigen::Vector2d::Zero();  // from the end of element e to the reflector
+  for (std::size_t e = own + 1; e-- > 0;) {
+    const DeflectionElement& element = data.elements[e];
+    const Layout::Columns& columns = layout.elements[e];
+    const Moments load = moments_of(element, reading.load);
+    const bool itself = e == own;
+    if (!itself && !chained) break;
+    const double x = itself ? reading.x : element.length;
+    const Eigen::Vector2d across = swung(along(element));
+    rows.col(columns.compliance) += load.reaction * (x * across + swung(from_end));
+    if (columns.flexibility >= 0) {
+      rows.col(columns.flexibility) += beam(element, load, x) * across;
+      rows.col(columns.flexibility) += beam_slope(element, load, x) * swung(from_end);
+    }
+    if (itself) rows.middleCols<2>(columns.offset).setIdentity();
+    if (columns.load_bias >= 0) {
+      rows.middleCols<2>(columns.load_bias) = load.reaction * Eigen::Matrix2d::Identity();
+    }
+    from_end += x * along(element);
+  }
+  return rows;
+}
+
+struct Solved {
+  Layout layout;
+  Eigen::VectorXd values;
+  Eigen::MatrixXd unscaled;  ///< covariance for residuals of the stated sigma
+  double cost = 0;           ///< weighted sum of squares
+  int equations = 0;
+
+  [[nodiscard]] int freedom() const { return equations - layout.size; }
+  [[nodiscard]] double factor() const { return cost / std::max(1, freedom()); }
+  [[nodiscard]] double u(int column) const {
+    return kExpanded * std::sqrt(unscaled(column, column) * std::max(1.0, factor()));
+  }
+};
+
+double sigma_of(const DeflectionReading& reading, const DeflectionOptions& options) {
+  return reading.sigma.value_or(options.sigma);
+}
+
+Result<Solved> solve(const DeflectionData& data, const std::vector<const DeflectionReading*>& readings,
+                     const DeflectionOptions& options, const std::set<int>& beams, const std::set<int>& load_biases) {
+  Solved solved;
+  solved.layout = layout_of(data, beams, load_biases);
+  solved.equations = 2 * static_cast<int>(readings.size());
+  if (solved.freedom() < 1) {
+    return refused("{}: {} training readings, {} parameters need at least {}", data.where, readings.size(),
+                   solved.layout.size, solved.layout.size / 2 + 1);
+  }
+  Eigen::MatrixXd A(solved.equations, solved.layout.size);
+  Eigen::VectorXd b(solved.equations);
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const auto row = 2 * static_cast<Eigen::Index>(k);
+    const double weight = 1 / sigma_of(*readings[k], options);
+    A.middleRows<2>(row) = weight * rows_of(*readings[k], data, solved.layout, options.chained);
+    b.segment<2>(row) = weight * readings[k]->moved;
+  }
+  const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(1e-9);
+  qr.compute(A * scale.cwiseInverse().asDiagonal());
+  if (qr.rank() < solved.layout.size) {
+    return refused("{}: the readings separate {} of {} parameters; more loads or reflectors at other distances would",
+                   data.where, qr.rank(), solved.layout.size);
+  }
+  solved.values = qr.solve(b).cwiseQuotient(scale);
+  solved.cost = (A * solved.values - b).squaredNorm();
+  const Eigen::MatrixXd scaled = A * scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd inverse =
+      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(solved.layout.size, solved.layout.size));
+  solved.unscaled = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
+  return solved;
+}
+
+/// Two-sided p of Student's t, by the integral of cos^(freedom - 1) that it is.
+double p_of_t(double t, int freedom) {
+  constexpr int kSteps = 4000;  // even
+  const auto tail = [&](double from) {
+    const double step = (kPi / 2 - from) / kSteps;
+    double sum = 0;
+    for (int k = 0; k <= kSteps; ++k) {
+      const double weight = k == 0 || k == kSteps ? 1 : (k % 2 == 1 ? 4 : 2);
+      sum += weight * std::pow(std::max(0.0, std::cos(from + k * step)), freedom - 1);
+    }
+    return sum * step / 3;
+  };
+  return tail(std::atan(std::abs(t) / std::sqrt(freedom))) / tail(0);
+}
+
+/// p of an F with 2 and `freedom` degrees of freedom.
+double p_of_f2(double f, int freedom) { return std::pow(1 + 2 * f / freedom, -freedom / 2.0); }
+
+struct Split {
+  std::vector<const DeflectionReading*> train, validation;
+  std::vector<double> training_loads, validation_loads;
+};
+
+Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& options) {
+  std::set<double> all;
+  bool stated = false;
+  for (const DeflectionReading& reading : data.readings) {
+    all.insert(reading.load);
+    stated = stated || reading.validation.has_value();
+  }
+  const std::vector<double> loads(all.begin(), all.end());
+  std::set<double> held_out;
+  for (const double wanted : options.validation_loads) {
+    const auto found = std::find_if(loads.begin(), loads.end(),
+                                    [&](double load) { return std::abs(load - wanted) < 0.5e-3 + kSameLoad; });
+    if (found == loads.end()) return refused("{}: no readings under the validation load {} N", data.where, wanted);
+    held_out.insert(*found);
+  }
+  const bool by_load = !options.validation_loads.empty() || !stated;
+  if (options.validation_loads.empty() && !stated && loads.size() >= 4) {
+    for (std::size_t k = 1; k + 1 < loads.size(); k += 3)
+      held_out.insert(loads[k]);  // Table 4.7: second and fifth of six
+  }
+  Split split;
+  std::set<double> training, validation;
+  for (const DeflectionReading& reading : data.readings) {
+    const bool out = by_load ? held_out.contains(reading.load) : reading.validation.value_or(false);
+    (out ? split.validation : split.train).push_back(&reading);
+    (out ? validation : training).insert(reading.load);
+  }
+  if (training.size() < 2) {
+    return refused("{}: {} training loads, at least 2 are needed to tell a joint from an offset", data.where,
+                   training.size());
+  }
+  split.training_loads.assign(training.begin(), training.end());
+  split.validation_loads.assign(validation.begin(), validation.end());
+  return split;
+}
+
+/// rms of |dp| of `element`'s readings (0: of all). Nothing predicted when `solved` is null.
+double rms_of(const std::vector<const DeflectionReading*>& readings, const DeflectionData& data, const Solved* solved,
+              bool chained, int element) {
+  double sum = 0;
+  int count = 0;
+  for (const DeflectionReading* reading : readings) {
+    if (element != 0 && reading->element != element) continue;
+    Eigen::Vector2d left = reading->moved;
+    if (solved != nullptr) left -= rows_of(*reading, data, solved->layout, chained) * solved->values;
+    sum += left.squaredNorm();
+    ++count;
+  }
+  return count == 0 ? 0 : std::sqrt(sum / count);
+}
+
+DeflectionFit fit_of(const Solved& solved, std::size_t e, const DeflectionData& data, const Split& split,
+                     bool chained) {
+  const Layout::Columns& columns = solved.layout.elements[e];
+  const int element = data.elements[e].element;
+  DeflectionFit fit;
+  fit.compliance = solved.values(columns.compliance);
+  fit.compliance_u = solved.u(columns.compliance);
+  if (columns.flexibility >= 0) {
+    fit.flexibility = solved.values(columns.flexibility);
+    fit.flexibility_u = solved.u(columns.flexibility);
+  }
+  fit.offset = solved.values.segment<2>(columns.offset);
+  fit.offset_u = {solved.u(columns.offset), solved.u(columns.offset + 1)};
+  if (columns.load_bias >= 0) {
+    fit.load_bias = solved.values.segment<2>(columns.load_bias);
+    fit.load_bias_u = {solved.u(columns.load_bias), solved.u(columns.load_bias + 1)};
+  }
+  fit.rms_train = rms_of(split.train, data, &solved, chained, element);
+  fit.rms_validation = rms_of(split.validation, data, &solved, chained, element);
+  return fit;
+}
+
+/// The beam term's tests and what they let one say.
+void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data, double largest_load, double sigma,
+                ElementResult& result) {
+  const int column = solved.layout.elements[e].flexibility;
+  const DeflectionElement& element = data.elements[e];
+  if (column < 0) {
+    result.sentence = fmt::format(
+        "element {}: reflectors at one distance only; they cannot tell a bent link from a "
+        "joint that gives way",
+        element.element);
+    return;
+  }
+  const double value = solved.values(column);
+  const double bending = beam(element, moments_of(element, largest_load), element.length);
+  result.f = value * value / (solved.unscaled(column, column) * solved.factor());
+  result.p_value = p_of_t(std::sqrt(result.f), solved.freedom());
+  result.aic_gain = solved.equations * std::log1p(result.f / solved.freedom()) - 2;
+  result.end_bending = value * bending;
+  result.end_bending_u = solved.u(column) * std::abs(bending);
+  const double unseen = std::abs(result.end_bending) + result.end_bending_u;
+  if (result.p_value < kSignificant && result.aic_gain > 0 && value > 0) {
+    result.verdict = LinkVerdict::kBends;
+    result.sentence =
+        fmt::format("element {}: the link bends, {:.3f} mm at its end under {:.0f} N (U {:.3f} mm)", element.element,
+                    to_mm(result.end_bending), largest_load, to_mm(result.end_bending_u));
+  } else if (unseen < 3 * sigma) {
+    result.verdict = LinkVerdict::kRigid;
+    result.sentence = fmt::format("element {}: rigid link; more than {:.3f} mm at its end would have been seen",
+                                  element.element, to_mm(unseen));
+  } else {
+    result.sentence = fmt::format(
+        "element {}: cannot tell; a link that bends up to {:.3f} mm at its end fits as well "
+        "as a softer joint",
+        element.element, to_mm(unseen));
+  }
+}
+
+}  // namespace
+
+Result<DeflectionResult> fit_deflection(const DeflectionData& data, const DeflectionOptions& options) {
+  const Result<Split> split = split_of(data, options);
+  if (!split) return tl::make_unexpected(split.error());
+  std::map<int, std::set<double>> distances;
+  for (const DeflectionReading* reading : split->train) distances[reading->element].insert(reading->x);
+  std::set<int> beams;
+  for (const DeflectionElement& element : data.elements) {
+    if (distances[element.element].size() >= 2) beams.insert(element.element);
+  }
+  const std::set<int> load_biases(options.load_bias.begin(), options.load_bias.end());
+  for (const int element : load_biases) {
+    if (!distances.contains(element)) return refused("{}: no training readings of element {}", data.where, element);
+  }
+  const Result<Solved> with = solve(data, split->train, options, beams, load_biases);
+  if (!with) return tl::make_unexpected(with.error());
+  const Result<Solved> without = solve(data, split->train, options, {}, load_biases);
+  if (!without) return tl::make_unexpected(without.error());
+
+  DeflectionResult result;
+  result.training_loads = split->training_loads;
+  result.validation_loads = split->validation_loads;
+  result.freedom = with->freedom();
+  result.variance_factor = with->factor();
+  const double largest =
+      std::max(split->training_loads.back(), split->validation_loads.empty() ? 0.0 : split->validation_loads.back());
+  for (std::size_t e = 0; e < data.elements.size(); ++e) {
+    ElementResult element;
+    element.element = data.elements[e].element;
+    element.rigid = fit_of(*without, e, data, *split, options.chained);
+    if (beams.contains(element.element)) element.beam = fit_of(*with, e, data, *split, options.chained);
+    double sigma = 0;
+    for (const DeflectionReading* reading : split->train) {
+      if (reading->element == element.element) sigma = std::max(sigma, sigma_of(*reading, options));
+    }
+    judge_beam(*with, e, data, largest, sigma * std::sqrt(std::max(1.0, with->factor())), element);
+    if (beams.contains(element.element) && !load_biases.contains(element.element)) {
+      std::set<int> more = load_biases;
+      more.insert(element.element);
+      if (const Result<Solved> moved = solve(data, split->train, options, beams, more)) {
+        const double f = (with->cost - moved->cost) / 2 / moved->factor();
+        element.load_bias_p_value = p_of_f2(std::max(0.0, f), moved->freedom());
+        if (element.load_bias_p_value < kSignificant) {
+          element.sentence += fmt::format("; its foot moves with the load (p = {:.1g}): fit again with a load bias",
+                                          element.load_bias_p_value);
+        }
+      }
+    }
+    result.elements.push_back(std::move(element));
+  }
+  const auto& shown = split->validation.empty() ? split->train : split->validation;
+  result.rms_still = rms_of(shown, data, nullptr, options.chained, 0);
+  result.rms_beam = rms_of(shown, data, &*with, options.chained, 0);
+  result.rms_rigid = rms_of(shown, data, &*without, options.chained, 0);
+  return result;
+}
+
+}  // namespace trammel

@@ -1,0 +1,212 @@
+#include "server/diagnose/evidence/dependence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <random>
+
+#include "server/base/check.h"
+#include "server/base/units.h"
+#include "server/robot/arm_state.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kMostPoses = 200;  // distances are quadratic; evenly drawn beyond
+constexpr int kPermutations = 999;
+constexpr int kAsLarge = 10;           // permutations at least as large: then their share is known well enough
+constexpr double kLeastChance = 1e-6;  // no tail is known further
+constexpr double kNegligible = 1e-4;   // of the largest weight
+constexpr double kNarrow = 1e-6;       // of a saddlepoint near the mean
+constexpr double kLeastSpread = 1e-9;
+
+/// Distances between rows, less row and column means.
+MatrixXd centred_distances(const MatrixXd& rows) {
+  const Index n = rows.rows();
+  MatrixXd d(n, n);
+  for (Index i = 0; i < n; ++i) d.col(i) = (rows.rowwise() - rows.row(i)).rowwise().norm();
+  const VectorXd mean = d.rowwise().mean();
+  const double whole = mean.mean();
+  d = (d.colwise() - mean).rowwise() - mean.transpose();
+  d.array() += whole;
+  return d;
+}
+
+double permuted_product(const MatrixXd& a, const MatrixXd& b, const std::vector<Index>& order) {
+  double sum = 0;
+  for (Index j = 0; j < a.cols(); ++j) {
+    const auto& column = b.col(order[static_cast<std::size_t>(j)]);
+    for (Index i = 0; i < a.rows(); ++i) sum += a(i, j) * column(order[static_cast<std::size_t>(i)]);
+  }
+  return sum;
+}
+
+/// Positive eigenvalues of what centred distances are the negative of, largest first.
+std::vector<double> spectrum(const MatrixXd& centred) {
+  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(-centred, Eigen::EigenvaluesOnly).eigenvalues();
+  std::vector<double> positive;
+  for (Index k = values.size() - 1; k >= 0 && values(k) > kNegligible * values(values.size() - 1); --k)
+    positive.push_back(values(k));
+  return positive;
+}
+
+/// The upper tail of sum w_k z_k^2, z_k standard normal.
+class WeightedChiSquare {
+ public:
+  WeightedChiSquare(const std::vector<double>& one, const std::vector<double>& other) {
+    const double largest = one.front() * other.front();
+    for (const double a : one) {
+      for (const double b : other) {
+        if (a * b < kNegligible * largest) break;
+        weight_.push_back(a * b);
+      }
+    }
+    mean_ = std::accumulate(weight_.begin(), weight_.end(), 0.0);
+    largest_ = largest;
+  }
+
+  /// log P(sum > x), beyond the mean.
+  double log_tail(double x) const {
+    if (x <= mean_) return std::log(0.5);
+    double low = 0;
+    double high = 0.5 / largest_;
+    for (int k = 0; k < 200; ++k) {
+      const double middle = 0.5 * (low + high);
+      (slope(middle) < x ? low : high) = middle;
+    }
+    const double t = 0.5 * (low + high);
+    const double distance = t * x - cumulant(t);
+    const double r = std::sqrt(2 * std::max(0.0, distance));
+    const double u = t * std::sqrt(curvature(t));
+    if (r < kNarrow) return std::log(0.5);
+    // 1 - Phi(r) + phi(r) (1/u - 1/r), with phi(r) taken out.
+    const double mills = r < 30 ? 0.5 * std::erfc(r / std::sqrt(2.0)) * std::sqrt(2 * kPi) * std::exp(0.5 * r * r)
+                                : 1 / r - 1 / (r * r * r);
+    return -distance - 0.5 * std::log(2 * kPi) + std::log(mills + 1 / u - 1 / r);
+  }
+
+ private:
+  double cumulant(double t) const {
+    double sum = 0;
+    for (const double w : weight_) sum -= 0.5 * std::log1p(-2 * t * w);
+    return sum;
+  }
+  double slope(double t) const {
+    double sum = 0;
+    for (const double w : weight_) sum += w / (1 - 2 * t * w);
+    return sum;
+  }
+  double curvature(double t) const {
+    double sum = 0;
+    for (const double w : weight_) sum += 2 * std::pow(w / (1 - 2 * t * w), 2);
+    return sum;
+  }
+
+  std::vector<double> weight_;
+  double mean_ = 0, largest_ = 0;
+};
+
+/// Of two centred distance matrices.
+double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Index> order(static_cast<std::size_t>(a.rows()));
+  std::iota(order.begin(), order.end(), Index{0});
+  const double observed = permuted_product(a, b, order);
+  std::vector<double> drawn;
+  int above = 0;
+  while (static_cast<int>(drawn.size()) < kPermutations) {
+    for (std::size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    drawn.push_back(permuted_product(a, b, order));
+    if (drawn.back() >= observed && ++above == kAsLarge) return kAsLarge / static_cast<double>(drawn.size());
+  }
+  std::nth_element(drawn.begin(), drawn.begin() + kAsLarge - 1, drawn.end(), std::greater<>());
+  const double tenth = drawn[kAsLarge - 1];
+  const WeightedChiSquare null(spectrum(a), spectrum(b));
+  const double scale = static_cast<double>(a.rows() - 1);  // a product of unit vectors varies by 1 / (n - 1)
+  const double beyond = null.log_tail(scale * observed) - null.log_tail(scale * tenth);
+  const double share = kAsLarge / static_cast<double>(kPermutations);
+  return std::max(kLeastChance, share * std::exp(std::min(0.0, beyond)));
+}
+
+/// Each pose's position part, of unit covariance if nothing but the background's noise is there: of S^-1 y the
+/// covariance is S^-1 = 1 - U U'.
+MatrixXd standardised(const LinearProblem& problem, const Background& background, const VectorXd& left,
+                      const std::vector<Index>& poses) {
+  MatrixXd rows(static_cast<Index>(poses.size()), 3);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Index row = problem.first_row(poses[i]);
+    const auto U = background.root().middleRows(row, 3);
+    const Matrix3 covariance = Matrix3::Identity() - U * U.transpose();
+    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(covariance);
+    const Vector3 scale = eigen.eigenvalues().cwiseMax(kLeastSpread).cwiseSqrt().cwiseInverse();
+    const Matrix3& V = eigen.eigenvectors();
+    rows.row(static_cast<Index>(i)) = (V * scale.asDiagonal() * V.transpose() * left.segment<3>(row)).transpose();
+  }
+  return rows;
+}
+
+struct Question {
+  std::string on;
+  MatrixXd distances;
+};
+
+std::vector<Question> questions(const LinearProblem& problem, const std::vector<Index>& poses) {
+  const auto n = static_cast<Index>(poses.size());
+  const int joints = problem.model().cell->robot.size();
+  MatrixXd q(n, joints), torque(n, joints);
+  VectorXd time(n);
+  for (Index i = 0; i < n; ++i) {
+    const Measurement& m = problem.batch().measurements[static_cast<std::size_t>(poses[static_cast<std::size_t>(i)])];
+    q.row(i) = m.context.q.transpose();
+    torque.row(i) = ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
+    time(i) = static_cast<double>(m.context.index);
+  }
+  std::vector<Question> all;
+  const auto ask = [&](std::string on, const MatrixXd& x) {
+    if ((x.rowwise() - x.colwise().mean()).norm() < kLeastSpread) return;
+    all.push_back({std::move(on), centred_distances(x)});
+  };
+  for (int joint = 0; joint < joints; ++joint) ask(fmt::format("q{}", joint + 1), q.col(joint));
+  const VectorXd largest = torque.cwiseAbs().colwise().maxCoeff().cwiseMax(1e-12).transpose();
+  ask("torque", torque * largest.cwiseInverse().asDiagonal());
+  ask("time", time);
+  return all;
+}
+
+}  // namespace
+
+double independence_p_value(const MatrixXd& x, const MatrixXd& y, std::uint64_t seed) {
+  TRAMMEL_CHECK(x.rows() == y.rows() && x.rows() >= 4);
+  return p_value(centred_distances(x), centred_distances(y), seed);
+}
+
+std::vector<Dependence> dependence_of(const LinearProblem& problem, const Background& background, const VectorXd& left,
+                                      std::uint64_t seed) {
+  const Index n = std::min(kMostPoses, problem.poses());
+  if (n < 20) return {};
+  std::vector<Index> poses(static_cast<std::size_t>(n));
+  for (Index i = 0; i < n; ++i) poses[static_cast<std::size_t>(i)] = i * problem.poses() / n;
+  const MatrixXd residual = standardised(problem, background, left, poses);
+  const MatrixXd by_residual = centred_distances(residual);
+  const MatrixXd by_size = centred_distances(residual.rowwise().norm());
+  std::vector<Dependence> found;
+  for (const Question& question : questions(problem, poses)) {
+    found.push_back({question.on, false, p_value(by_residual, question.distances, seed + found.size())});
+    found.push_back({question.on, true, p_value(by_size, question.distances, seed + found.size())});
+  }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+  double highest = 0;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    highest = std::max(highest, std::min(1.0, found[k].p_value * static_cast<double>(found.size() - k)));
+    found[k].p_value = highest;
+  }
+  return found;
+}
+
+}  // namespace trammel

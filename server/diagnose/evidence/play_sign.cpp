@@ -1,0 +1,63 @@
+#include "server/diagnose/evidence/play_sign.h"
+
+#include <cmath>
+
+#include "server/base/coverage.h"
+#include "server/diagnose/evidence/effect.h"
+#include "server/robot/arm_state.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kSure = 1.645;    // standard deviations, of the mean: one side, 95 %
+constexpr double kSureOfPose = 2;  // the same of one pose
+constexpr double kPartOfPoses = 0.25;
+
+}  // namespace
+
+PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint, const Eigen::VectorXd& change,
+                      const Eigen::MatrixXd& covariance) {
+  const std::vector<Eigen::Index> places = places_of_source(problem.model(), source);
+  Eigen::Vector2d value, scale;
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const Eigen::Index place = places[static_cast<std::size_t>(k)];
+    scale(k) = problem.nuisance_parameters()[static_cast<std::size_t>(place)].prior_scale;
+    value(k) = problem.model().values(place) + scale(k) * change(place);
+  }
+  const Eigen::Matrix2d own = scale.asDiagonal() * Eigen::Matrix2d(covariance(places, places)) * scale.asDiagonal();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double directed = 0;
+  double negative = 0;
+  for (const Measurement& m : problem.batch().measurements) {
+    if (m.context.direction.empty() || m.context.direction[static_cast<std::size_t>(joint)] == 0) continue;
+    const double torque = ArmKinematics(problem.model().state(m.context)).gravity_torque()(joint);
+    const Eigen::Vector2d by_value(1, std::abs(torque));
+    mean += by_value;
+    ++directed;
+    if (by_value.dot(value) < -kSureOfPose * std::sqrt(by_value.dot(own * by_value))) ++negative;
+  }
+  if (directed == 0) return {joint, 0, 0, false};
+  mean /= directed;
+  PlaySign sign{joint, mean.dot(value), std::sqrt(mean.dot(own * mean)), false};
+  sign.negative = sign.mean < -kSure * sign.stddev || negative > kPartOfPoses * directed;
+  return sign;
+}
+
+std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, bool every) {
+  std::vector<std::string> joints;
+  for (const PlaySign& one : negative) {
+    joints.push_back(
+        fmt::format("joint {} ({:.0f} ± {:.0f} urad)", one.joint + 1, 1e6 * one.mean, 1e6 * kExpanded * one.stddev));
+  }
+  const std::string text = fmt::format(
+      "coming from its side of approach {} runs ahead where play would hang back: this is no play, and no gear is to "
+      "be "
+      "adjusted; were joints read or measured before they stood still, does a servo overshoot or lag, or ",
+      fmt::join(joints, " as well as "));
+  if (!every || negative.size() < 2)
+    return text + fmt::format("is the dir{} column of the wrong sign?", negative.front().joint + 1);
+  return text + "are the dir columns reversed? So it is in every joint that shows anything";
+}
+
+}  // namespace trammel

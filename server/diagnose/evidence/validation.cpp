@@ -1,0 +1,84 @@
+#include "server/diagnose/evidence/validation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/diagnose/evidence/background.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kFamilywise = 0.01;
+
+/// The value that chi-square of three degrees of freedom exceeds with that chance.
+double chi_square_3(double chance) {
+  const auto beyond = [](double x) {
+    return std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
+  };
+  double low = 0;
+  double high = 400;
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    (beyond(middle) > chance ? low : high) = middle;
+  }
+  return high;
+}
+
+struct Judged {
+  Eigen::Matrix3Xd error_B;  ///< m
+  VectorXd distance;         ///< squared, in expected deviations
+};
+
+Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
+  const PhysicalModel& model = fitted.model();
+  const MatrixXd covariance = Background(fitted.nuisance()).covariance();
+  VectorXd scale(covariance.cols());
+  for (Index k = 0; k < scale.size(); ++k) {
+    scale(k) = fitted.nuisance_parameters()[static_cast<std::size_t>(k)].prior_scale;
+  }
+  const auto n = static_cast<Index>(rows.measurements.size());
+  Judged result{Eigen::Matrix3Xd(3, n), VectorXd(n)};
+  MatrixXd J;
+  for (Index i = 0; i < n; ++i) {
+    const Measurement& m = rows.measurements[static_cast<std::size_t>(i)];
+    const Vector3 error = m.p_W - model.pose_W(m.context, model.values, &J).translation();
+    const MatrixXd scaled = J.topRows<3>() * scale.asDiagonal();
+    const double sigma = std::max(fitted.noise(), m.sigma.value_or(0));
+    const Matrix3 expected = scaled * covariance * scaled.transpose() + sigma * sigma * Matrix3::Identity();
+    result.error_B.col(i) = model.X_WB.linear().transpose() * error;
+    result.distance(i) = error.dot(expected.llt().solve(error));
+  }
+  return result;
+}
+
+}  // namespace
+
+Validation validate(const LinearProblem& before, const LinearProblem& after, const MeasurementBatch& rows) {
+  const Judged first = judged(before, rows);
+  const Judged last = judged(after, rows);
+  const double limit = chi_square_3(kFamilywise / static_cast<double>(rows.measurements.size()));
+  Validation validation{figures_of(first.error_B), figures_of(last.error_B), {}, {}, {}};
+  std::vector<Index> fit;
+  for (Index i = 0; i < first.distance.size(); ++i) {
+    if (std::min(first.distance(i), last.distance(i)) <= limit) {
+      fit.push_back(i);
+      continue;
+    }
+    const Measurement& m = rows.measurements[static_cast<std::size_t>(i)];
+    validation.fit_neither.push_back(
+        {m.pose_id, m.row, last.error_B.col(i).norm(), "held-out pose that fits neither model: repeat it", true});
+  }
+  if (!validation.fit_neither.empty() && !fit.empty()) {
+    validation.before_without = figures_of(first.error_B(Eigen::all, fit));
+    validation.after_without = figures_of(last.error_B(Eigen::all, fit));
+  }
+  return validation;
+}
+
+}  // namespace trammel

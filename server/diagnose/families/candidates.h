@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/diagnose/families/family.h"
+
+namespace trammel {
+
+/// The error sources whose effect on the poses is wanted: all that `cell` can have and `batch` can show. What a batch
+/// does not record rules causes out: those are added to `unseen`, with what they would need.
+[[nodiscard]] std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBatch& batch,
+                                                         std::vector<Unseen>* unseen);
+
+/// Every cause that may be lacking, and its anonymous rivals: a smooth function of each joint, of each pair of joints
+/// and of time. `problem` was made with candidate_sources() and outlives them.
+[[nodiscard]] std::vector<FamilyPtr> make_families(const LinearProblem& problem);
+
+/// The cause that a source in a model's list stands for.
+[[nodiscard]] Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch);
+
+}  // namespace trammel

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/diagnose/diagnosis.h"
+#include "server/diagnose/evidence/background.h"
+#include "server/diagnose/evidence/linear_problem.h"
+
+/// Candidates for what a model lacks: groups of whitened columns. A family is one cause (of one joint), with whatever
+/// must be searched for within it: an order, the pose at which it begins, a length scale.
+namespace trammel {
+
+/// The member of a family that explains a data vector best.
+struct Best {
+  double evidence = 0;  ///< nat: log marginal likelihood against none of it, its size chosen by the data
+  double strength = 0;  ///< squared whitened size of what it explains
+  int freedom = 0;      ///< how many numbers it needs for that
+  double at = 0;        ///< which member: order, index of a pose, number of a length scale
+  double size = 1;      ///< of a smooth function: its standard deviation in SI
+};
+
+/// What a scan sees. With `keep` (R ones and zeros), the rows that are left in.
+struct View {
+  const Background& background;  ///< its columns have zeros where `keep` has
+  const Eigen::VectorXd* keep = nullptr;
+};
+
+/// What a column g that is multiplied by a function of the pose, g(row) f(pose), needs of a scan: pose by pose instead
+/// of row by row.
+struct Shares {
+  Eigen::MatrixXd along;   ///< N x k: g's rows of each pose times those of the projected data
+  Eigen::MatrixXd root;    ///< N x p: the same with the background's root
+  Eigen::VectorXd square;  ///< N: g's own
+};
+[[nodiscard]] Shares shares_of(const LinearProblem& problem, const View& view, const Eigen::VectorXd& g,
+                               const Eigen::MatrixXd& projected);
+
+/// nat: of `freedom` numbers of equal prior variance, chosen by the data, that explain `strength`.
+[[nodiscard]] double log_evidence(double strength, double freedom);
+/// The strength at which log_evidence() is `evidence`.
+[[nodiscard]] double strength_for(double evidence, double freedom);
+
+class Family {
+ public:
+  virtual ~Family() = default;
+  Family() = default;
+  Family(const Family&) = delete;
+  Family& operator=(const Family&) = delete;
+
+  [[nodiscard]] virtual Cause cause(const Best& best) const = 0;
+  /// As a cell file spells it; empty where no error source describes it.
+  [[nodiscard]] virtual std::string source(const Best&) const { return {}; }
+  /// False: a function of some joints that no physics stands behind.
+  [[nodiscard]] virtual bool named() const { return true; }
+  /// What an anonymous one depends on: `q4`, `time`.
+  [[nodiscard]] virtual std::vector<std::string> depends_on() const { return {}; }
+  /// False where it says nothing of other poses.
+  [[nodiscard]] virtual bool predicts() const { return true; }
+  /// What it is called among the others: the same on every background.
+  [[nodiscard]] std::string label() const;
+  /// nat: how much less it is to be expected than other causes.
+  [[nodiscard]] virtual double surprise() const { return 0; }
+  /// The best member for each column of `projected` (R x k: S⁻¹ y).
+  [[nodiscard]] virtual std::vector<Best> scan(const View& view, const Eigen::MatrixXd& projected) const = 0;
+  /// R x m: in units of priors (of the fitted size, where that is known).
+  [[nodiscard]] virtual Eigen::MatrixXd columns(const Best& best) const = 0;
+  /// A member to speak of where none was found.
+  [[nodiscard]] virtual Best typical() const { return {}; }
+};
+
+using FamilyPtr = std::unique_ptr<Family>;
+
+/// A cause whose effect is a fixed set of columns; `chosen` of the effect's.
+[[nodiscard]] FamilyPtr make_fixed_family(const LinearProblem& problem, const Effect& effect, Cause cause,
+                                          const std::vector<Eigen::Index>& chosen, double surprise = 0);
+/// A gear: a sine and a cosine of one joint's angle, of any order. Null where the joint hardly moves.
+[[nodiscard]] FamilyPtr make_gear_family(const LinearProblem& problem, int joint);
+/// A cause that begins at a pose; `effect` is that of one that began before the first. `spec` without its @pose.
+[[nodiscard]] FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, Cause cause,
+                                         std::string spec);
+/// One pose that does not belong.
+[[nodiscard]] FamilyPtr make_outlier_family(const LinearProblem& problem);
+/// An error of one joint's angle by a smooth function of that angle.
+[[nodiscard]] FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint);
+/// A displacement of the tool, any in three axes, by a smooth function of the joints (one or two) or, where `joints` is
+/// empty, of the order in time.
+[[nodiscard]] FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints);
+
+/// The lambda of every order of a joint's gear and the orders, for its periodogram.
+[[nodiscard]] Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background);
+
+}  // namespace trammel

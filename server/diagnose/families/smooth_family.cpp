@@ -1,0 +1,234 @@
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/diagnose/families/family.h"
+#include "server/numerics/product.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kBox = 1.2;             // half width of the box that the basis lives in; data lie in [-1, 1]
+constexpr double kSmallestSpan = 0.035;  // rad
+constexpr Index kFunctionsOfOne = 16;
+constexpr Index kFunctionsOfEach = 7;                      // of two
+constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
+constexpr double kTelling = 1e-4;                  // of the largest deviation: what a function may have and be left out
+constexpr int kSizes = 17;                         // a quarter of a decade apart
+constexpr double kSizeRatio = 1.7782794100389228;  // 10^(1/4)
+
+/// Angular frequency of a sine of the box.
+double frequency(Index k) { return kPi * static_cast<double>(k + 1) / (2 * kBox); }
+
+/// N x count: sines in a box. Weighed by deviations() their random sums are a Gaussian process with a squared
+/// exponential kernel of unit variance (Solin and Särkkä 2020).
+MatrixXd sines(const VectorXd& x, Index count) {
+  MatrixXd functions(x.size(), count);
+  for (Index k = 0; k < count; ++k) functions.col(k) = (frequency(k) * (x.array() + kBox)).sin() / std::sqrt(kBox);
+  return functions;
+}
+VectorXd deviations(Index count, double length_scale) {
+  VectorXd spectrum(count);
+  for (Index k = 0; k < count; ++k) {
+    spectrum(k) = std::sqrt(2 * kPi) * length_scale * std::exp(-0.5 * std::pow(length_scale * frequency(k), 2));
+  }
+  return spectrum.cwiseSqrt();
+}
+
+/// [-1, 1] over the poses; empty where it hardly changes.
+VectorXd spread(const VectorXd& x, double smallest) {
+  const double low = x.minCoeff();
+  const double high = x.maxCoeff();
+  if (high - low < smallest) return {};
+  return 2 * (x.array() - low) / (high - low) - 1;
+}
+
+VectorXd angles(const LinearProblem& problem, int joint) {
+  VectorXd q(problem.poses());
+  for (Index i = 0; i < q.size(); ++i)
+    q(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint);
+  return q;
+}
+
+/// A random smooth function of the pose, times one or more columns g: numbers are wanted for every g and every
+/// function. Its length scale and its size are chosen by the data.
+class SmoothFamily : public Family {
+ public:
+  explicit SmoothFamily(const LinearProblem& problem) : problem_(problem) {}
+
+  std::vector<Best> scan(const View& view, const MatrixXd& projected) const final {
+    const std::size_t scales = looked_for_ > 0 ? looked_for_ : deviations_.size();
+    const Index each = deviations_[scales - 1].size();
+    const Index count = static_cast<Index>(g_.size()) * each;
+    const MatrixXd functions = functions_.leftCols(each);
+    MatrixXd information = MatrixXd::Zero(count, count);
+    MatrixXd along(count, projected.cols());
+    MatrixXd root(count, view.background.root().cols());
+    for (std::size_t s = 0; s < g_.size(); ++s) {
+      const Index first = static_cast<Index>(s) * each;
+      const Shares shares = shares_of(problem_, view, g_[s], projected);
+      along.middleRows(first, each) = transposed_product(functions, shares.along);
+      root.middleRows(first, each) = transposed_product(functions, shares.root);
+      information.block(first, first, each, each).noalias() =
+          functions.transpose() * shares.square.asDiagonal() * functions;
+    }
+    const MatrixXd across = root.transpose();
+    information -= transposed_product(across, across);
+    std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
+    for (std::size_t scale = 0; scale < scales; ++scale) choose(information, along, scale, best);
+    return best;
+  }
+
+  MatrixXd columns(const Best& best) const final {
+    const VectorXd& deviation = deviations_[static_cast<std::size_t>(best.at)];
+    const Index each = deviation.size();
+    MatrixXd all(problem_.rows(), static_cast<Index>(g_.size()) * each);
+    for (Index i = 0; i < problem_.poses(); ++i) {
+      const Index row = problem_.first_row(i);
+      for (std::size_t s = 0; s < g_.size(); ++s) {
+        all.block(row, static_cast<Index>(s) * each, problem_.row_count(i), each) =
+            best.size * g_[s].segment(row, problem_.row_count(i)) *
+            functions_.row(i).head(each).cwiseProduct(deviation.transpose());
+      }
+    }
+    return all;
+  }
+  Best typical() const final { return {0, 0, 1, static_cast<double>(deviations_.size() - 1), typical_}; }
+
+ protected:
+  const LinearProblem& problem_;
+  std::vector<VectorXd> g_;           // R each
+  MatrixXd functions_;                // N x k
+  std::size_t looked_for_ = 0;        // how many of the length scales; 0: all
+  std::vector<VectorXd> deviations_;  // one for every length scale, of the functions that it takes: the first ones
+  double smallest_ = 1e-6;
+  double typical_ = 1e-4;
+
+ private:
+  void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
+    std::vector<Index> telling;
+    for (Index k = 0; k < deviations_[scale].size(); ++k) {
+      if (deviations_[scale](k) > kTelling * deviations_[scale].maxCoeff()) telling.push_back(k);
+    }
+    std::vector<Index> taken;
+    const Index apart = information.cols() / static_cast<Index>(g_.size());
+    for (Index first = 0; first < information.cols(); first += apart) {
+      for (const Index k : telling) taken.push_back(first + k);
+    }
+    const VectorXd deviation = VectorXd(deviations_[scale](telling)).replicate(static_cast<Index>(g_.size()), 1);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(deviation.asDiagonal() * information(taken, taken) *
+                                                        deviation.asDiagonal());
+    const VectorXd seen = eigen.eigenvalues().cwiseMax(0);
+    const MatrixXd square = transposed_product(eigen.eigenvectors(), deviation.asDiagonal() * along(taken, Eigen::all))
+                                .array()
+                                .square()
+                                .matrix();
+    double size = smallest_;
+    for (int step = 0; step < kSizes; ++step, size *= kSizeRatio) {
+      const VectorXd gain = (size * size) * (1 + size * size * seen.array()).inverse();
+      const double cost = (1 + size * size * seen.array()).log().sum();
+      const double freedom = (gain.array() * seen.array()).sum();
+      const VectorXd strength = square.transpose() * gain;
+      for (Index d = 0; d < strength.size(); ++d) {
+        Best& one = best[static_cast<std::size_t>(d)];
+        const double evidence = 0.5 * (strength(d) - cost);
+        if (evidence > one.evidence)
+          one = {evidence, strength(d), static_cast<int>(std::ceil(freedom)), static_cast<double>(scale), size};
+      }
+    }
+  }
+};
+
+class JointMapFamily final : public SmoothFamily {
+ public:
+  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& q) : SmoothFamily(problem), joint_(joint) {
+    const Index most = std::end(kHarmonics)[-1];
+    g_.emplace_back(problem.by_joint().col(joint));
+    functions_ = MatrixXd(q.size(), 2 * most);
+    for (Index h = 1; h <= most; ++h) {
+      functions_.col(2 * h - 2) = (static_cast<double>(h) * q.array()).sin();
+      functions_.col(2 * h - 1) = (static_cast<double>(h) * q.array()).cos();
+    }
+    for (const Index harmonics : kHarmonics) {
+      deviations_.emplace_back(VectorXd::Constant(2 * harmonics, 1 / std::sqrt(static_cast<double>(harmonics))));
+      if (deviations_.size() == 1 || harmonics <= problem.poses() / 10) looked_for_ = deviations_.size();
+    }
+    smallest_ = 1e-7;
+    typical_ = 5e-5;
+  }
+  Cause cause(const Best&) const override { return {"joint_map", joint_, "", "", {}}; }
+  std::string source(const Best& best) const override {
+    return fmt::format("joint_map:{}@{}", joint_ + 1, kHarmonics[static_cast<std::size_t>(best.at)]);
+  }
+
+ private:
+  int joint_;
+};
+
+class AnonymousFamily final : public SmoothFamily {
+ public:
+  AnonymousFamily(const LinearProblem& problem, std::vector<std::string> on, const std::vector<VectorXd>& x)
+      : SmoothFamily(problem), on_(std::move(on)) {
+    const Index count = x.size() == 1 ? kFunctionsOfOne : kFunctionsOfEach;
+    functions_ = sines(x[0], count);
+    if (x.size() == 2) functions_ = products(functions_, sines(x[1], count));
+    // What is the same at all poses depends on nothing: a shifted base is no function of a joint.
+    functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
+    for (const double length_scale : {0.2, 0.45, 1.0}) {
+      MatrixXd deviation = deviations(count, length_scale).transpose();
+      if (x.size() == 2) deviation = products(deviation, deviation);
+      deviations_.emplace_back(deviation.transpose());
+    }
+    for (Index axis = 0; axis < 3; ++axis) {
+      VectorXd g = VectorXd::Zero(problem.rows());
+      for (Index i = 0; i < problem.poses(); ++i) {
+        const Index row = problem.first_row(i) + axis;
+        g(row) = problem.weight()(row);
+      }
+      g_.push_back(std::move(g));
+    }
+  }
+  bool named() const override { return false; }
+  Cause cause(const Best&) const override { return {"unknown", -1, "", "", {}}; }
+  std::vector<std::string> depends_on() const override { return on_; }
+
+ private:
+  static MatrixXd products(const MatrixXd& a, const MatrixXd& b) {
+    MatrixXd all(a.rows(), a.cols() * b.cols());
+    for (Index k = 0; k < a.cols(); ++k) {
+      all.middleCols(k * b.cols(), b.cols()) = (b.array().colwise() * a.col(k).array()).matrix();
+    }
+    return all;
+  }
+  std::vector<std::string> on_;
+};
+
+}  // namespace
+
+FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint) {
+  const VectorXd q = angles(problem, joint);
+  if (q.maxCoeff() - q.minCoeff() < kSmallestSpan) return nullptr;
+  return std::make_unique<JointMapFamily>(problem, joint, q);
+}
+
+FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints) {
+  std::vector<std::string> on;
+  std::vector<VectorXd> x;
+  for (const int joint : joints) {
+    on.push_back(fmt::format("q{}", joint + 1));
+    x.push_back(spread(angles(problem, joint), kSmallestSpan));
+  }
+  if (joints.empty()) {
+    on.emplace_back("time");
+    x.push_back(VectorXd::LinSpaced(problem.poses(), -1, 1));
+  }
+  if (std::any_of(x.begin(), x.end(), [](const VectorXd& one) { return one.size() == 0; })) return nullptr;
+  return std::make_unique<AnonymousFamily>(problem, std::move(on), x);
+}
+
+}  // namespace trammel

@@ -1,0 +1,88 @@
+#include "server/diagnose/search/folds.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "server/numerics/product.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kFolds = 8;
+constexpr Index kRunsPerFold = 5;
+
+VectorXd ones_without(Index rows, const std::vector<Index>& held) {
+  VectorXd keep = VectorXd::Ones(rows);
+  keep(held).setZero();
+  return keep;
+}
+
+}  // namespace
+
+Folds::Folds(const LinearProblem& problem, MatrixXd columns) : columns_(std::move(columns)) {
+  const Index folds = std::min(kFolds, problem.poses());
+  const Index run = std::max<Index>(1, problem.poses() / (folds * kRunsPerFold));
+  held_.resize(static_cast<std::size_t>(folds));
+  for (Index i = 0; i < problem.poses(); ++i) {
+    std::vector<Index>& rows = held_[static_cast<std::size_t>((i / run) % folds)];
+    for (Index k = 0; k < problem.row_count(i); ++k) rows.push_back(problem.first_row(i) + k);
+  }
+  total_ = MatrixXd::Identity(columns_.cols(), columns_.cols());
+  for (const std::vector<Index>& rows : held_) {
+    const MatrixXd Z = columns_(rows, Eigen::all);
+    information_.push_back(transposed_product(Z, Z));
+    total_ += information_.back();
+  }
+}
+
+MatrixXd Folds::information_without(std::size_t fold) const { return total_ - information_[fold]; }
+
+VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>& chosen) const {
+  std::vector<Index> all(static_cast<std::size_t>(columns_.cols()));
+  std::iota(all.begin(), all.end(), Index{0});
+  const std::vector<Index>& places = chosen.empty() ? all : chosen;
+  const VectorXd right = columns_.transpose() * data;
+  VectorXd left = data;
+  for (std::size_t fold = 0; fold < held_.size(); ++fold) {
+    const MatrixXd Z = columns_(held_[fold], Eigen::all);
+    const VectorXd known = right - Z.transpose() * data(held_[fold]);
+    const VectorXd numbers = information_without(fold)(places, places).llt().solve(VectorXd(known(places)));
+    left(held_[fold]) -= Z(Eigen::all, places) * numbers;
+  }
+  return left;
+}
+
+Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<FamilyPtr>& families, const Chance& chance,
+                                     const std::function<bool(std::size_t)>& admitted) const {
+  Gain gain;
+  for (std::size_t fold = 0; fold < held_.size(); ++fold) {
+    const std::vector<Index>& held = held_[fold];
+    const VectorXd keep = ones_without(data.size(), held);
+    const Background background(keep.asDiagonal() * columns_, information_without(fold));
+    const Scan seen = scan(families, {background, &keep}, data, chance, admitted);
+    const VectorXd known = keep.cwiseProduct(data);
+    const VectorXd left = data - columns_ * background.estimate(known);
+    gain.before += VectorXd(left(held)).squaredNorm();
+    const auto chosen = seen.strongest([](std::size_t) { return true; });
+    if (!chosen) {
+      gain.after += VectorXd(left(held)).squaredNorm();
+      continue;
+    }
+    // Beside the fold's background the chosen columns are fitted to what it leaves; the background follows.
+    const MatrixXd C = families[*chosen]->columns(seen.best[*chosen]);
+    const MatrixXd kept = keep.asDiagonal() * C;
+    const MatrixXd information = kept.transpose() * background.project(kept) + MatrixXd::Identity(C.cols(), C.cols());
+    const VectorXd numbers = information.llt().solve(kept.transpose() * background.project(known));
+    const VectorXd rest = known - kept * numbers;
+    const VectorXd after = data - C * numbers - columns_ * background.estimate(rest);
+    gain.after += VectorXd(after(held)).squaredNorm();
+  }
+  return gain;
+}
+
+}  // namespace trammel

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "server/diagnose/search/scan.h"
+
+namespace trammel {
+
+/// Poses held out in turn: short runs of poses that were measured one after the other, dealt to a few folds, so that
+/// what creeps along with time does not leak from the poses next to a held-out one. Every fold fits `columns` (R x p,
+/// whitened, in units of priors) to the rows of all others.
+class Folds {
+ public:
+  Folds(const LinearProblem& problem, Eigen::MatrixXd columns);
+
+  [[nodiscard]] std::size_t count() const { return held_.size(); }
+
+  /// R: every row less what the other folds' poses say of it by the columns in `chosen` (empty: all).
+  [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data,
+                                                  const std::vector<Eigen::Index>& chosen = {}) const;
+
+  /// Sum of squares of the held-out rows, without and with the best of `families` as each fold by itself chooses it (of
+  /// those `admitted`).
+  struct Gain {
+    double before = 0, after = 0;
+  };
+  [[nodiscard]] Gain gain_of_selection(const Eigen::VectorXd& data, const std::vector<FamilyPtr>& families,
+                                       const Chance& chance, const std::function<bool(std::size_t)>& admitted) const;
+
+ private:
+  [[nodiscard]] Eigen::MatrixXd information_without(std::size_t fold) const;
+
+  Eigen::MatrixXd columns_;
+  std::vector<std::vector<Eigen::Index>> held_;  // rows
+  std::vector<Eigen::MatrixXd> information_;     // of the held rows: what a fold does not know
+  Eigen::MatrixXd total_;                        // of all rows, priors included
+};
+
+}  // namespace trammel

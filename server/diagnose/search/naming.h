@@ -1,0 +1,29 @@
+#pragma once
+
+#include "server/diagnose/search/scan.h"
+
+namespace trammel {
+
+/// Whether `whole` is `step` from the first pose on: a base that is elsewhere for a tracker that moved, and so on. A
+/// step near the first pose looks like it, and is the less likely of the two.
+[[nodiscard]] bool is_whole_of(const Cause& whole, const Cause& step);
+
+/// Whether `general` is only a more general description of `special`, not another cause.
+[[nodiscard]] bool is_description_of(const Cause& general, const Cause& special);
+
+/// How sure the name of a cause is.
+struct Naming {
+  double frequency = 1;              ///< share of repetitions of the batch, the effect as fitted, that name it
+  std::vector<Cause> could_also_be;  ///< explain the data as well
+};
+
+/// Causes that the batch records nothing to test by, and that would look like `cause`.
+[[nodiscard]] std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch);
+
+/// Doubts the family at `place` in `seen`: by repeating the batch in simulation with the effect as it was fitted, and
+/// by what other named causes explain of the data and of that effect.
+[[nodiscard]] Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
+                                   const Background& background, const Scan& seen, const Chance& chance,
+                                   std::size_t place, std::uint64_t seed);
+
+}  // namespace trammel

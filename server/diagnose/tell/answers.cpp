@@ -1,0 +1,273 @@
+#include "server/diagnose/tell/answers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/diagnose/evidence/effect.h"
+#include "server/diagnose/evidence/validation.h"
+#include "server/diagnose/search/folds.h"
+#include "server/diagnose/search/naming.h"
+#include "server/diagnose/search/recovery.h"
+#include "server/diagnose/tell/findings.h"
+#include "server/diagnose/tell/separability.h"
+#include "server/diagnose/tell/wording.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kPeriodogramLine = 0.01;
+constexpr std::size_t kRecoveries = 3;
+
+LinearProblem problem_of(const Cell& cell, const PriorModel& model, const MeasurementBatch& batch) {
+  return {model.model, batch, model.priors, candidate_sources(cell, batch, nullptr)};
+}
+
+LinearProblem by_itself(const SearchResult& found) {
+  PriorModel extended = found.after;
+  if (!found.unnamed.empty()) refine(extended, found.batch, {});
+  return {extended.model, found.batch, extended.priors, {}};
+}
+
+Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all) {
+  if (found.unnamed.empty()) return {};
+  const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
+                                               [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
+  Unexplained unexplained{true, {}, 0, strongest.p_value, {}};
+  for (const Unnamed& one : found.unnamed) {
+    for (const std::string& on : one.depends_on) {
+      auto& list = unexplained.depends_on;
+      if (std::find(list.begin(), list.end(), on) == list.end()) list.push_back(on);
+    }
+  }
+  if (!found.negative_play.empty()) {
+    const bool every = std::none_of(found.accepted.begin(), found.accepted.end(),
+                                    [](const Accepted& one) { return one.cause.cause == "backlash"; });
+    unexplained.hint = what_negative_play_may_be(found.negative_play, every);
+  }
+  const Index P = problem.nuisance().cols();
+  const VectorXd numbers = all.estimate(problem.residual());
+  const Index count = numbers.size() - P;
+  // Of it, what the model's own parameters cannot do.
+  const VectorXd function = all.columns().rightCols(count) * numbers.tail(count);
+  unexplained.rms = problem.position_rms(Background(problem.nuisance()).project(function));
+  return unexplained;
+}
+
+Verdict verdict_of(const Diagnosis& diagnosis) {
+  if (diagnosis.findings.empty()) return diagnosis.unexplained.present ? Verdict::kUnknown : Verdict::kNothing;
+  const bool doubt = std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                                 [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  return doubt ? Verdict::kAmbiguous : Verdict::kNamed;
+}
+
+/// What is left after the nominal chain, the cell's own sources and each finding in turn; at last what none explains.
+std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
+                                        const LinearProblem& after, double noise) {
+  std::vector<WaterfallStep> steps;
+  Eigen::Matrix3Xd nominal(3, before.poses());
+  for (Index i = 0; i < before.poses(); ++i) {
+    const Measurement& m = before.batch().measurements[static_cast<std::size_t>(i)];
+    nominal.col(i) = m.p_W - found.before.model.nominal_pose_W(m.context).translation();
+  }
+  steps.push_back({"nominal", figures_of(nominal).rms});
+  steps.push_back({"calibrated", before.position_rms(before.residual())});
+  // Each finding in turn, everything else refitted: the later ones' effects are put back into what is left.
+  VectorXd data = after.residual();
+  std::vector<Index> chosen(static_cast<std::size_t>(after.nuisance().cols()));
+  std::iota(chosen.begin(), chosen.end(), Index{0});
+  std::vector<WaterfallStep> tail;
+  for (auto finding = found.accepted.rbegin(); finding != found.accepted.rend(); ++finding) {
+    if (finding->source.empty()) continue;
+    const Background fitted(after.nuisance()(Eigen::all, chosen));
+    tail.push_back({to_string(finding->cause), after.position_rms(data - fitted.columns() * fitted.estimate(data))});
+    data += effect_of_source(after, finding->in_model);
+    const std::vector<Index> own = places_of_source(after.model(), finding->in_model);
+    std::erase_if(chosen, [&](Index k) { return std::find(own.begin(), own.end(), k) != own.end(); });
+  }
+  steps.insert(steps.end(), tail.rbegin(), tail.rend());
+  steps.push_back({noise_name(noise, after.instrument()), std::sqrt(3.0) * noise});
+  return steps;
+}
+
+/// Which number of a cause it is may stay open: the cause as a whole is identified anyway. And a more general
+/// description does the same to the poses.
+bool is_sure(const Finding& finding) {
+  return std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
+    return (other.cause == finding.cause.cause && other.joint == finding.cause.joint) ||
+           is_description_of(other, finding.cause);
+  });
+}
+
+}  // namespace
+
+Explained::Explained(const Cell& cell, SearchResult search)
+    : found(std::move(search)),
+      before(problem_of(cell, found.before, found.batch)),
+      after(problem_of(cell, found.after, found.batch)),
+      all(background_columns(after, found.unnamed)),
+      served(by_itself(found)) {}
+
+void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
+  const LinearProblem& after = explained.after;
+  diagnosis.poses = static_cast<int>(explained.found.all.measurements.size());
+  diagnosis.noise = after.noise();
+  diagnosis.instrument = after.instrument();
+  diagnosis.noise_from =
+      fmt::format("{}{:.1f} um stated for a pose, {:.1f} um beyond it",
+                  prepared.repeats.degrees_of_freedom > 0
+                      ? fmt::format("one measurement {:.1f} um by {} poses measured repeatedly; ",
+                                    1e6 * prepared.repeats.sigma, prepared.repeats.groups)
+                      : "",
+                  1e6 * after.instrument(),
+                  1e6 * std::sqrt(std::max(0.0, std::pow(after.noise(), 2) - std::pow(after.instrument(), 2))));
+  const LinearProblem& before = explained.before;
+  const LinearProblem& served = explained.served;
+  diagnosis.before = figures_of(before.positions(before.residual()));
+  diagnosis.after = figures_of(served.positions(served.residual()));
+  diagnosis.waterfall = waterfall_of(explained.found, before, served, after.noise());
+  const Matrix3 R_BW = explained.found.before.model.X_WB.linear().transpose();
+  diagnosis.residual_after_B = R_BW * served.positions(served.residual());
+  diagnosis.residual_before_B = R_BW * before.positions(before.residual());
+}
+
+void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
+                   Diagnosis& diagnosis) {
+  const SearchResult& found = explained.found;
+  diagnosis.findings = findings_of(found, explained.after);
+  if (prepared.surrogates.time) {
+    for (Finding& finding : diagnosis.findings) {
+      for (PossibleBeginning& place : finding.may_begin_at) place.time.reset();
+    }
+  }
+  doubt_what_was_not_recorded(prepared.surrogates, recorded, diagnosis.findings);
+  diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
+  doubt_beside(diagnosis.unexplained, diagnosis.findings);
+  doubt_single_orders(diagnosis.findings);
+  diagnosis.verdict = verdict_of(diagnosis);
+  for (const Accepted& one : found.accepted) {
+    if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
+  }
+}
+
+void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) {
+  for (const ErrorSourcePtr& source : found.before.model.sources) diagnosis.sources_before.push_back(source->name());
+  diagnosis.sources_after = diagnosis.sources_before;
+  for (const Finding& finding : diagnosis.findings) {
+    // A list of sources says by its row where a cause begins; in a batch whose rows were moved that row is another.
+    const bool at_a_row = !sorted || finding.cause.pose_id.empty();
+    if (!finding.source.empty() && is_sure(finding) && at_a_row) diagnosis.sources_after.push_back(finding.source);
+  }
+  if (!found.reformed_from.empty() && diagnosis.sources_after.size() > diagnosis.sources_before.size())
+    std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), found.reformed_from,
+                 found.reformed_to);
+}
+
+void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
+  if (prepared.validation.measurements.empty()) {
+    const HeldOut held_out = held_out_of(explained.before, explained.served);
+    diagnosis.held_out_before = held_out.before;
+    diagnosis.held_out_after = held_out.after;
+    diagnosis.held_out_how =
+        fmt::format("{} folds, each predicted from the others; the causes were chosen on all poses",
+                    Folds(explained.after, explained.after.nuisance()).count());
+    return;
+  }
+  Validation validation = validate(explained.before, explained.served, prepared.validation);
+  diagnosis.held_out_before = validation.before;
+  diagnosis.held_out_after = validation.after;
+  diagnosis.held_out_before_without = validation.before_without;
+  diagnosis.held_out_after_without = validation.after_without;
+  std::move(validation.fit_neither.begin(), validation.fit_neither.end(), std::back_inserter(diagnosis.suspects));
+  diagnosis.held_out_how = fmt::format("{} validation rows", prepared.validation.measurements.size());
+}
+
+void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families, const Cell& cell,
+                    const Surrogates& surrogates, const MeasurementBatch& recorded, Diagnosis& diagnosis) {
+  Blindness blind = blindness(explained.after, families, explained.all, explained.found.chance);
+  diagnosis.could_not_have_seen = std::move(blind.unseen);
+  std::erase_if(diagnosis.could_not_have_seen,
+                [&](const Unseen& unseen) { return is_by_surrogate(surrogates, unseen.cause); });
+  std::erase_if(diagnosis.could_not_have_seen, [&](const Unseen& unseen) {  // seen, with a sign that has no name
+    const std::vector<PlaySign>& seen = explained.found.negative_play;
+    return unseen.cause.cause == "backlash" &&
+           std::any_of(seen.begin(), seen.end(), [&](const PlaySign& one) { return one.joint == unseen.cause.joint; });
+  });
+  static_cast<void>(candidate_sources(cell, recorded, &diagnosis.could_not_have_seen));
+  diagnosis.not_separable = std::move(blind.inseparable);
+  for (Inseparable& pair : hidden_by_constancy(explained.found.before.model, recorded))
+    diagnosis.not_separable.push_back(std::move(pair));
+}
+
+void tell_periodograms(const Explained& explained, Diagnosis& diagnosis) {
+  const LinearProblem& before = explained.before;
+  const Chance& chance = explained.found.chance;
+  const Background first(before.nuisance());
+  const auto& robot = before.model().cell->robot;
+  for (int joint = 0; joint < robot.size(); ++joint) {
+    if (robot.joint(joint).type != JointType::kRevolute) continue;
+    const FamilyPtr gears = make_gear_family(before, joint);
+    if (!gears) continue;
+    Periodogram lines = periodogram(before, joint, first);
+    lines.limit = strength_for(chance.limit_at(kPeriodogramLine) + chance.penalty_of(*gears), 2);
+    diagnosis.periodograms.push_back(std::move(lines));
+  }
+}
+
+void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,
+                   Diagnosis& diagnosis) {
+  std::vector<std::size_t> places;
+  const auto add = [&](const std::string& cause, int joint) {
+    for (std::size_t f = 0; f < families.size() && places.size() < kRecoveries; ++f) {
+      const Cause one = families[f]->cause(families[f]->typical());
+      if (!families[f]->named() || one.cause != cause || (joint >= 0 && one.joint != joint)) continue;
+      if (std::find(places.begin(), places.end(), f) == places.end()) places.push_back(f);
+      break;
+    }
+  };
+  for (const Finding& finding : diagnosis.findings) add(finding.cause.cause, finding.cause.joint);
+  add("gear_transmission", -1);
+  add("encoder_eccentricity", 1);
+  add("tracker_moved", -1);
+  diagnosis.recovery = recovery_of(explained.after, families, explained.all, explained.found.chance, places, seed);
+}
+
+void tell_limits(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
+                 Diagnosis& diagnosis) {
+  std::vector<std::string>& limits = diagnosis.limits;
+  const auto recorded_of = [&](bool (*has)(const Measurement&), std::string_view what, std::string_view of_none,
+                               std::string_view of_some) {
+    const auto count = std::count_if(recorded.measurements.begin(), recorded.measurements.end(), has);
+    const auto all = static_cast<std::ptrdiff_t>(recorded.measurements.size());
+    if (count == 0) limits.push_back(fmt::format("no {}: {}", what, of_none));
+    if (count > 0 && count < all)
+      limits.push_back(fmt::format("{} of {} of {} poses only: {}", what, count, all, of_some));
+  };
+  recorded_of([](const Measurement& m) { return m.R_WT.has_value(); }, "orientations",
+              "several geometry parameters and all of the tool's rotation stay unseen",
+              "the others count with their positions");
+  recorded_of([](const Measurement& m) { return m.context.time.has_value(); }, "times",
+              "a drift, and what warms up, can only be told by the order of the poses", "no drift was looked for");
+  recorded_of([](const Measurement& m) { return m.context.temperature.has_value(); }, "temperatures",
+              "thermal growth was looked for by the order of the poses, and cannot be told from a drift",
+              "thermal growth was not looked for");
+  recorded_of([](const Measurement& m) { return !m.context.direction.empty(); }, "approach directions",
+              "backlash was looked for as if each joint came from where it was at the row before, and cannot be named "
+              "for certain",
+              "backlash was not looked for");
+  if (prepared.repeats.degrees_of_freedom == 0)
+    limits.emplace_back("no repeated poses: the noise is taken from the tracker and from what is left");
+  if (prepared.sorted)
+    limits.emplace_back(
+        "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
+        "applied");
+  if (explained.found.too_many_outliers)
+    limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
+}
+
+}  // namespace trammel

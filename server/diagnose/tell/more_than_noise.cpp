@@ -1,0 +1,98 @@
+#include "server/diagnose/tell/more_than_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kNote = 1.1;  // times the stated sigma, which is known to a tenth
+constexpr double kMore = 1.3;
+constexpr double kOneInHundred = 2.326;  // standard deviations
+constexpr double kLeastChance = 1e-6;
+
+double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / left.stated : 1; }
+
+/// What chance exceeds in 1 of 100 batches, of noise `times` as large as stated.
+double by_chance(const LeftOver& left, double times) {
+  return times * (1 + kOneInHundred / std::sqrt(2 * left.freedom));
+}
+
+LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
+
+std::string micrometres(double m) { return fmt::format("{:.3g} um", 1e6 * m); }
+std::string degrees(double rad) { return fmt::format("{:.2g} deg", to_deg(rad)); }
+
+/// "41 um an axis of the positions where 13 um are stated".
+std::string figures(const LeftOver& position, const LeftOver& rotation, NoiseVerdict least) {
+  std::string text;
+  const auto add = [&](const LeftOver& left, const char* of, std::string (*words)(double)) {
+    if (judge_noise(left) < least) return;
+    text += fmt::format("{}{} an axis are left of the {} where {} are stated ({:.1f} times)", text.empty() ? "" : ", ",
+                        words(left.left), of, words(left.stated), ratio_of(left));
+  };
+  add(position, "positions", micrometres);
+  add(rotation, "orientations", degrees);
+  return text;
+}
+
+/// What would show more, given what repeated poses say.
+std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& position) {
+  if (prepared.repeats.degrees_of_freedom == 0)
+    return "measure some poses repeatedly, which tells a noisy measurement from something that the model lacks, and "
+           "see that the cell's tracker sigma is right";
+  if (prepared.repeats.sigma > kMore * position.stated)
+    return fmt::format("poses measured repeatedly scatter by {} as well: the measurement is noisier than the cell says",
+                       micrometres(prepared.repeats.sigma));
+  return fmt::format(
+      "poses measured repeatedly scatter by {} only: the model lacks something that more poses, with "
+      "times, temperatures and approach directions, may show",
+      micrometres(prepared.repeats.sigma));
+}
+
+}  // namespace
+
+NoiseVerdict judge_noise(const LeftOver& left) {
+  const double ratio = ratio_of(left);
+  if (left.freedom <= 0 || ratio <= std::max(kNote, by_chance(left, 1))) return NoiseVerdict::kAsStated;
+  return ratio > std::max(kMore, by_chance(left, kNote)) ? NoiseVerdict::kMoreThanNoise : NoiseVerdict::kLarger;
+}
+
+double chance_of_noise(const LeftOver& left) {
+  if (left.freedom <= 0) return 1;
+  // Wilson and Hilferty: the cube root of chi-square over its degrees of freedom is nearly normal.
+  const double square = std::pow(ratio_of(left) / kNote, 2);
+  const double spread = 2 / (9 * left.freedom);
+  const double z = (std::cbrt(square) - (1 - spread)) / std::sqrt(spread);
+  return std::max(kLeastChance, 0.5 * std::erfc(z / std::sqrt(2.0)));
+}
+
+void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
+  const LeftOver position = diagnosis.left_position = left_of(explained.after.position_spread());
+  const LeftOver rotation = diagnosis.left_rotation = left_of(explained.after.rotation_spread());
+  const NoiseVerdict worst = std::max(judge_noise(position), judge_noise(rotation));
+  if (worst == NoiseVerdict::kAsStated) return;
+  const std::string more = what_shows_more(prepared, position);
+  if (worst == NoiseVerdict::kLarger) {
+    diagnosis.limits.push_back(
+        fmt::format("a little more than noise: {}; {}", figures(position, rotation, NoiseVerdict::kLarger), more));
+    return;
+  }
+  const std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
+  Unexplained& unexplained = diagnosis.unexplained;
+  if (unexplained.present) {
+    diagnosis.limits.push_back(fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
+    return;
+  }
+  const double beyond = std::max(0.0, position.left * position.left - position.stated * position.stated);
+  unexplained.present = true;
+  unexplained.rms = std::sqrt(3 * beyond);
+  unexplained.p_value = std::min(chance_of_noise(position), chance_of_noise(rotation));
+  unexplained.hint = fmt::format("more than noise: {}, and it depends on nothing I know; {}", what, more);
+  if (diagnosis.verdict == Verdict::kNothing) diagnosis.verdict = Verdict::kUnknown;
+}
+
+}  // namespace trammel

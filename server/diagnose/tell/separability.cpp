@@ -1,0 +1,152 @@
+#include "server/diagnose/tell/separability.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/diagnose/families/candidates.h"
+#include "server/diagnose/search/naming.h"
+#include "server/diagnose/tell/wording.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kPower = 1.2816;        // standard deviations: nine of ten
+constexpr double kAbsorbedShare = 0.05;  // of an effect's length is left: nothing to go by
+constexpr double kSameEffect = 0.95;     // canonical correlation
+constexpr double kMarginStrength = 20;   // between a cause and its imitator, for one to be told from the other
+constexpr Index kMostSingles = 8;
+constexpr double kLeastAlignment = 0.9;  // of an effect with one parameter, to say that it is that one
+
+/// A family's effect, on average over the sizes that its priors allow.
+struct Average {
+  MatrixXd columns;      // R x m, whitened, per prior
+  MatrixXd information;  // m x m, beside the background
+  double strength = 0;   // what stands out of it
+  double share = 0;      // of its length
+  double rms = 0;        // m
+};
+
+Average average_of(const LinearProblem& problem, const MatrixXd& columns, const Background& background) {
+  Average average{columns, columns.transpose() * background.project(columns), 0, 0, 0};
+  average.strength = std::max(0.0, average.information.trace());
+  average.share = std::sqrt(average.strength / std::max(1e-300, columns.squaredNorm()));
+  for (Index k = 0; k < columns.cols(); ++k)
+    average.rms = std::hypot(average.rms, problem.position_rms(columns.col(k)));
+  return average;
+}
+
+/// How much of one family's effect, on average, another makes as well: a correlation.
+double imitation(const Average& own, const Average& other, const Background& background) {
+  const MatrixXd shared = other.columns.transpose() * background.project(own.columns);
+  const MatrixXd information =
+      other.information + MatrixXd::Identity(other.information.rows(), other.information.cols());
+  return std::sqrt(std::clamp((shared.transpose() * information.llt().solve(shared)).trace() / own.strength, 0.0, 1.0));
+}
+
+/// The model's own parameter that an effect is most like, if any.
+std::optional<Cause> absorbing(const LinearProblem& problem, const VectorXd& effect) {
+  Index best = -1;
+  double highest = kLeastAlignment;
+  for (Index k = 0; k < problem.nuisance().cols(); ++k) {
+    const VectorXd column = problem.nuisance().col(k);
+    const double length = column.norm() * effect.norm();
+    const double alignment = length > 0 ? std::abs(column.dot(effect)) / length : 0;
+    if (alignment > highest) {
+      highest = alignment;
+      best = k;
+    }
+  }
+  Index next = 0;
+  for (const ErrorSourcePtr& source : problem.model().sources) {
+    for (const Parameter& parameter : source->parameters()) {
+      if (next++ != best) continue;
+      Cause cause = cause_of(*source, problem.batch());
+      cause.parameter = parameter.name;
+      return cause;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Once a pair, in whichever order it is met.
+void add_pair(std::vector<Inseparable>& pairs, const Cause& one, const Cause& other, double correlation) {
+  for (Inseparable& known : pairs) {
+    const auto& causes = known.causes;
+    if (causes != std::vector<Cause>{one, other} && causes != std::vector<Cause>{other, one}) continue;
+    known.correlation = std::max(known.correlation, correlation);
+    return;
+  }
+  pairs.push_back({{one, other}, correlation});
+}
+
+/// Single numbers of a cause that the model's own parameters take over whole.
+void add_absorbed(const LinearProblem& problem, const Background& background, const MatrixXd& columns,
+                  const Cause& cause, std::vector<Inseparable>& inseparable) {
+  if (columns.cols() > kMostSingles) return;
+  for (Index k = 0; k < columns.cols(); ++k) {
+    const VectorXd column = columns.col(k);
+    const double whole = std::max(1e-300, column.squaredNorm());
+    const double left = column.dot(background.project(column).col(0)) / whole;
+    if (left > kAbsorbedShare * kAbsorbedShare) continue;
+    const std::optional<Cause> absorber = absorbing(problem, column);
+    if (absorber) add_pair(inseparable, cause, *absorber, std::sqrt(1 - std::clamp(left, 0.0, 1.0)));
+  }
+}
+
+}  // namespace
+
+Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
+                    const Chance& chance) {
+  Blindness result;
+  std::vector<std::size_t> places;
+  std::vector<Average> averages;
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    const Cause cause = families[f]->cause(families[f]->typical());
+    if (!families[f]->named() || !families[f]->predicts() || !cause.parameter.empty()) continue;
+    const MatrixXd columns = families[f]->columns(families[f]->typical());
+    if (columns.squaredNorm() == 0) continue;
+    add_absorbed(problem, background, columns, cause, result.inseparable);
+    places.push_back(f);
+    averages.push_back(average_of(problem, columns, background));
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Average& own = averages[i];
+    const Cause cause = families[places[i]]->cause(families[places[i]]->typical());
+    Unseen unseen{cause, own.share, {}, {}, ""};
+    if (own.strength < 1 || own.share < kAbsorbedShare) {
+      unseen.needs = what_it_needs(cause);
+      result.unseen.push_back(std::move(unseen));
+      continue;
+    }
+    double imitated = 0;
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      const Cause other = families[places[j]]->cause(families[places[j]]->typical());
+      if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
+      const double correlation = imitation(own, averages[j], background);
+      imitated = std::max(imitated, correlation);
+      if (correlation > kSameEffect) add_pair(result.inseparable, cause, other, correlation);
+    }
+    const int freedom = std::max(1, families[places[i]]->typical().freedom);
+    const double needed =
+        std::pow(std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) + kPower, 2);
+    const auto size_for = [&](double strength) { return own.rms * std::sqrt(strength / own.strength); };
+    unseen.detectable = size_for(needed);
+    if (imitated < kSameEffect)
+      unseen.identifiable = size_for(std::max(needed, kMarginStrength / (1 - imitated * imitated)));
+    else
+      unseen.needs = what_it_needs(cause);
+    const bool partly = std::any_of(result.inseparable.begin(), result.inseparable.end(),
+                                    [&](const Inseparable& pair) { return pair.causes.front() == cause; }) ||
+                        imitated > kSameEffect;
+    if (partly && unseen.needs.empty()) unseen.needs = what_it_needs(cause);
+    result.unseen.push_back(std::move(unseen));
+  }
+  return result;
+}
+
+}  // namespace trammel

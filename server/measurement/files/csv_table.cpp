@@ -1,0 +1,271 @@
+#include "server/measurement/files/csv_table.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+
+namespace trammel {
+
+namespace {
+
+constexpr double kQuaternionLimit = 1e-3;
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+/// Length of the UTF-8 sequence that starts `text`, 0 when there is none (RFC 3629; NUL is no text either).
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  if (lead != 0 && lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xC2 && lead < 0xE0   ? 2
+                             : lead >= 0xE0 && lead < 0xF0 ? 3
+                             : lead >= 0xF0 && lead < 0xF5 ? 4
+                                                           : 0;
+  if (length == 0 || length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  const bool overlong = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
+  const bool surrogate_or_beyond = (lead == 0xED && byte(1) >= 0xA0) || (lead == 0xF4 && byte(1) >= 0x90);
+  return overlong || surrogate_or_beyond ? 0 : length;
+}
+
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
+
+/// Takes one record after the other off the text.
+class Scanner {
+ public:
+  Scanner(std::string_view text, const std::string& where) : text_(text), where_(where) {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+  }
+
+  /// The next record that is neither empty nor a comment; no fields at the end of the text.
+  Result<CsvTable::Row> next() {
+    skip_comments();
+    CsvTable::Row record;
+    record.line = line_;
+    while (!text_.empty()) {
+      Result<std::string> field = trimmed_start() == '"' ? quoted() : plain();
+      if (!field) return tl::make_unexpected(field.error());
+      if (!is_utf8(*field)) return refused("{} row {}: not UTF-8 text", where_, record.line);
+      record.fields.push_back(std::move(*field));
+      if (text_.empty()) break;
+      const char separator = text_.front();
+      text_.remove_prefix(1);
+      if (separator == '\n') {
+        ++line_;
+        break;
+      }
+      if (text_.empty()) record.fields.emplace_back();  // the file ends with a separator
+    }
+    return record;
+  }
+
+ private:
+  void skip_comments() {
+    while (!text_.empty()) {
+      const std::size_t end = std::min(text_.find('\n'), text_.size());
+      const std::string_view line = trimmed(text_.substr(0, end));
+      if (!line.empty() && line.front() != '#') return;
+      text_.remove_prefix(std::min(end + 1, text_.size()));
+      ++line_;
+    }
+  }
+
+  [[nodiscard]] char trimmed_start() const {
+    const auto at = text_.find_first_not_of(" \t");
+    return at == std::string_view::npos ? '\n' : text_[at];
+  }
+
+  Result<std::string> plain() {
+    const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
+    std::string field(trimmed(text_.substr(0, end)));
+    text_.remove_prefix(end);
+    return field;
+  }
+
+  Result<std::string> quoted() {
+    const int first_line = line_;
+    text_.remove_prefix(text_.find('"') + 1);
+    std::string field;
+    while (!text_.empty()) {
+      const char c = text_.front();
+      text_.remove_prefix(1);
+      if (c == '"' && !text_.starts_with('"')) return rest_after_quote(first_line, std::move(field));
+      if (c == '"') text_.remove_prefix(1);
+      if (c == '\n') ++line_;
+      field += c;
+    }
+    return refused("{} row {}: a quote is not closed", where_, first_line);
+  }
+
+  Result<std::string> rest_after_quote(int first_line, std::string field) {
+    const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
+    if (const std::string_view rest = trimmed(text_.substr(0, end)); !rest.empty()) {
+      return refused("{} row {}: '{}' after a closing quote, expected ','", where_, first_line, rest);
+    }
+    text_.remove_prefix(end);
+    return field;
+  }
+
+  std::string_view text_;
+  const std::string& where_;
+  int line_ = 1;
+};
+
+/// What a number should have been, for people: values are shown as they stand, cut when long.
+std::string shown(const std::string& field) { return field.size() <= 40 ? field : field.substr(0, 40) + "..."; }
+
+}  // namespace
+
+Status CsvTable::set_columns(Row header) {
+  std::set<std::string> seen;
+  for (const std::string& name : header.fields) {
+    if (name.empty()) return refused("{} row {}: column {} has no name", where_, header.line, seen.size() + 1);
+    if (!seen.insert(name).second) {
+      return refused("{} row {}: column {} appears twice", where_, header.line, shown(name));
+    }
+  }
+  columns_ = std::move(header.fields);
+  return {};
+}
+
+Status CsvTable::add_row(Row row) {
+  if (row.fields.size() != columns_.size()) {
+    return refused("{} row {}: {} values, the header has {} columns", where_, row.line, row.fields.size(),
+                   columns_.size());
+  }
+  rows_.push_back(std::move(row));
+  return {};
+}
+
+Result<CsvTable> CsvTable::parse(std::string_view text, std::string where) {
+  CsvTable table;
+  table.where_ = std::move(where);
+  Scanner scanner(text, table.where_);
+  Result<Row> header = scanner.next();
+  if (!header) return tl::make_unexpected(header.error());
+  if (header->fields.empty()) return refused("{}: empty file, expected a header line with column names", table.where_);
+  if (const Status set = table.set_columns(std::move(*header)); !set) return tl::make_unexpected(set.error());
+  while (true) {
+    Result<Row> record = scanner.next();
+    if (!record) return tl::make_unexpected(record.error());
+    if (record->fields.empty()) return table;
+    if (const Status added = table.add_row(std::move(*record)); !added) return tl::make_unexpected(added.error());
+  }
+}
+
+Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const std::vector<Row>& rows) {
+  CsvTable table;
+  table.where_ = std::move(where);
+  if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
+  for (const Row& row : rows) {
+    if (!std::all_of(row.fields.begin(), row.fields.end(), is_utf8)) {
+      return refused("{} row {}: not UTF-8 text", table.where_, row.line);
+    }
+    if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
+  }
+  return table;
+}
+
+std::optional<std::size_t> CsvTable::find(std::string_view column) const {
+  const auto at = std::find(columns_.begin(), columns_.end(), column);
+  if (at == columns_.end()) return std::nullopt;
+  return static_cast<std::size_t>(at - columns_.begin());
+}
+
+Result<std::size_t> CsvTable::require(std::string_view column) const {
+  if (const auto at = find(column)) return *at;
+  const std::string names = shown(fmt::format("{}", fmt::join(columns_, ",")));
+  const bool semicolons = columns_.size() == 1 && columns_[0].find(';') != std::string::npos;
+  return refused("{}: missing column {}; the header has: {}{}", where_, column, names,
+                 semicolons ? " (columns must be separated by ',')" : "");
+}
+
+Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::string>& columns) const {
+  std::vector<std::size_t> found;
+  std::vector<std::string> missing;
+  for (const std::string& column : columns) {
+    if (const auto at = find(column)) {
+      found.push_back(*at);
+    } else {
+      missing.push_back(column);
+    }
+  }
+  if (found.empty() || missing.empty()) return found;
+  return refused("{}: missing column {}; {} come all together or not at all", where_, missing.front(),
+                 fmt::join(columns, ", "));
+}
+
+Result<double> CsvTable::number(std::size_t row, std::size_t column, double limit) const {
+  std::string_view text = field(row, column);
+  if (text.empty()) return refuse(row, "{} is empty, expected a number", columns_[column]);
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc::result_out_of_range) {
+    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown(field(row, column)), limit);
+  }
+  if (error != std::errc() || end != text.data() + text.size()) {
+    return refuse(row, "{} is '{}', expected a number", columns_[column], shown(field(row, column)));
+  }
+  if (!std::isfinite(value)) {
+    return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column));
+  }
+  if (std::abs(value) > limit) return refuse(row, "{} is {:g}, limit {:g}", columns_[column], value, limit);
+  return value;
+}
+
+Result<int> CsvTable::integer(std::size_t row, std::size_t column, int lowest, int highest) const {
+  const Result<double> value = number(row, column);
+  if (!value) return tl::make_unexpected(value.error());
+  if (*value != std::floor(*value) || *value < lowest || *value > highest) {
+    return refuse(row, "{} is {}, expected a whole number from {} to {}", columns_[column], shown(field(row, column)),
+                  lowest, highest);
+  }
+  return static_cast<int>(*value);
+}
+
+Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<std::size_t>& wxyz) const {
+  Eigen::Vector4d values;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Result<double> value = number(row, wxyz[k]);
+    if (!value) return tl::make_unexpected(value.error());
+    values(static_cast<Eigen::Index>(k)) = *value;
+  }
+  if (std::abs(values.norm() - 1) > kQuaternionLimit) {
+    return refuse(row, "quaternion {},{},{},{} has length {:.6g}, expected 1 (limit {:g})", columns_[wxyz[0]],
+                  columns_[wxyz[1]], columns_[wxyz[2]], columns_[wxyz[3]], values.norm(), kQuaternionLimit);
+  }
+  values.normalize();
+  return Eigen::Quaterniond(values(0), values(1), values(2), values(3)).toRotationMatrix();
+}
+
+std::string csv_field(std::string_view text) {
+  const bool bare =
+      text.find_first_of(",\"\n\r") == std::string_view::npos && trimmed(text) == text && !text.starts_with('#');
+  if (bare) return std::string(text);
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string csv_number(double value) { return fmt::format("{:.12g}", value); }
+
+}  // namespace trammel

@@ -1,0 +1,73 @@
+#include "server/measurement/files/joint_list.h"
+
+#include <algorithm>
+
+#include "server/base/text_file.h"
+#include "server/measurement/files/csv_table.h"
+#include "server/measurement/pose_check.h"
+#include "server/measurement/pose_columns.h"
+
+namespace trammel {
+
+Result<JointList> parse_joint_csv(const std::string& text, const std::string& where) {
+  const Result<CsvTable> table = CsvTable::parse(text, where);
+  if (!table) return tl::make_unexpected(table.error());
+  const Result<PoseColumns> columns = PoseColumns::find(*table);
+  if (!columns) return tl::make_unexpected(columns.error());
+  if (const Status has_joints = columns->require_joints(*table); !has_joints) {
+    return tl::make_unexpected(has_joints.error());
+  }
+  if (table->size() == 0) return refused("{}: no poses below the header, at least 1 is needed", where);
+  JointList list{where, columns->joint_types(), {}};
+  for (std::size_t row = 0; row < table->size(); ++row) {
+    Result<PoseContext> context = columns->read(*table, row);
+    if (!context) return tl::make_unexpected(context.error());
+    list.poses.push_back({columns->pose_id(*table, row), std::move(*context), table->line(row)});
+  }
+  return list;
+}
+
+Result<JointList> read_joint_csv(const std::string& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_joint_csv(text, path); });
+}
+
+std::string to_csv(const JointList& list) {
+  const auto any = [&](const auto& has) { return std::any_of(list.poses.begin(), list.poses.end(), has); };
+  const bool directions = any([](const CommandedPose& pose) { return !pose.context.direction.empty(); });
+  const bool tools = any([](const CommandedPose& pose) { return !pose.context.tool.empty(); });
+  const bool payloads = any([](const CommandedPose& pose) { return !pose.context.payload.empty(); });
+  const std::size_t n = list.joint_types.size();
+  std::string text = "pose_id";
+  for (std::size_t j = 0; j < n; ++j) text += ',' + joint_column(static_cast<int>(j), list.joint_types[j]);
+  for (std::size_t j = 0; directions && j < n; ++j) text += fmt::format(",dir{}", j + 1);
+  if (tools) text += ",tool_id";
+  if (payloads) text += ",payload_id";
+  text += '\n';
+  for (const CommandedPose& pose : list.poses) {
+    const PoseContext& context = pose.context;
+    text += csv_field(pose.pose_id);
+    for (std::size_t j = 0; j < n; ++j) {
+      text += ',' + csv_number(joint_to_column(context.q(static_cast<Eigen::Index>(j)), list.joint_types[j]));
+    }
+    for (std::size_t j = 0; directions && j < n; ++j) {
+      text += context.direction.empty() ? "," : fmt::format(",{}", context.direction[j]);
+    }
+    if (tools) text += ',' + csv_field(context.tool);
+    if (payloads) text += ',' + csv_field(context.payload);
+    text += '\n';
+  }
+  return text;
+}
+
+Result<JointList> check_against_cell(JointList list, const Cell& cell) {
+  if (const Status joints = check_joint_columns(list.joint_types, cell.robot, list.where); !joints) {
+    return tl::make_unexpected(joints.error());
+  }
+  for (CommandedPose& pose : list.poses) {
+    const Status checked = check_pose(pose.context, cell, fmt::format("{} row {}", list.where, pose.row));
+    if (!checked) return tl::make_unexpected(checked.error());
+  }
+  return list;
+}
+
+}  // namespace trammel

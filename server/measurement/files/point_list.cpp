@@ -1,0 +1,202 @@
+#include "server/measurement/files/point_list.h"
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
+#include "server/measurement/files/point_table.h"
+#include "server/measurement/files/text_lines.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kPositionLimit = 1e3;   // m, no tracker sees farther
+constexpr double kUncertaintyLimit = 1;  // m
+constexpr double kAngleLimit = 360;      // deg
+constexpr double kInch = 0.0254;         // m
+
+/// Reads rows of a table whose columns have our names.
+class PointReader {
+ public:
+  PointReader(const PointTable& parts, double coverage)
+      : table_(parts.table),
+        positional_(parts.positional),
+        coordinates_(*parts.statements.coordinates),
+        length_(unit_length(parts.statements.unit.value_or(LengthUnit::kMillimetre))),
+        angle_(parts.statements.radians.value_or(false) ? 1 : from_deg(1)),
+        coverage_(coverage) {}
+
+  [[nodiscard]] Status find_columns() {
+    name_ = *table_.find("name");
+    for (const std::string& column : coordinate_columns(coordinates_)) position_.push_back(*table_.find(column));
+    const CoordinateNames wanted = uncertainty_columns(coordinates_);
+    auto uncertainties = table_.all_or_none({wanted.begin(), wanted.end()});
+    if (!uncertainties) return tl::make_unexpected(uncertainties.error());
+    auto angles = table_.all_or_none({"rx", "ry", "rz"});
+    if (!angles) return tl::make_unexpected(angles.error());
+    uncertainties_ = std::move(*uncertainties);
+    angles_ = std::move(*angles);
+    sigma_ = table_.find("sigma");
+    return {};
+  }
+
+  [[nodiscard]] Result<NamedPoint> read(std::size_t row) const {
+    NamedPoint point;
+    point.row = table_.line(row);
+    point.name = table_.field(row, name_);
+    if (point.name.empty()) return table_.refuse(row, "name is empty");
+    if (positional_ && is_number(point.name) && point.name.find('.') != std::string::npos) {
+      return table_.refuse(
+          row, "name is '{}', which looks like a coordinate; expected [[collection] group] target first", point.name);
+    }
+    const Result<Vector3> native = read_three(row, position_, coordinates_, kPositionLimit);
+    if (!native) return tl::make_unexpected(native.error());
+    if (coordinates_ != Coordinates::kCartesian && native->x() < 0) {
+      return table_.refuse(row, "r is {:g}, must not be below 0", native->x() / length_);
+    }
+    point.p_W = cartesian(*native);
+    if (const Status rotation = read_rotation(row, point); !rotation) return tl::make_unexpected(rotation.error());
+    if (const Status sigma = read_sigma(row, *native, point); !sigma) return tl::make_unexpected(sigma.error());
+    return point;
+  }
+
+ private:
+  static double unit_length(LengthUnit unit) {
+    return unit == LengthUnit::kMetre ? 1 : unit == LengthUnit::kInch ? kInch : from_mm(1);
+  }
+
+  /// Three numbers in m and rad; which of them are angles follows from the coordinates.
+  [[nodiscard]] Result<Vector3> read_three(std::size_t row, const std::vector<std::size_t>& columns,
+                                           Coordinates coordinates, double length_limit) const {
+    Vector3 values;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const bool angle =
+          (k == 1 && coordinates != Coordinates::kCartesian) || (k == 2 && coordinates == Coordinates::kSpherical);
+      const double scale = angle ? angle_ : length_;
+      const Result<double> value =
+          table_.number(row, columns[k], (angle ? from_deg(kAngleLimit) : length_limit) / scale);
+      if (!value) return tl::make_unexpected(value.error());
+      values(static_cast<Eigen::Index>(k)) = *value * scale;
+    }
+    return values;
+  }
+
+  [[nodiscard]] Vector3 cartesian(const Vector3& native) const {
+    const double r = native.x();
+    const double theta = native.y();
+    if (coordinates_ == Coordinates::kCylindrical) return {r * std::cos(theta), r * std::sin(theta), native.z()};
+    if (coordinates_ == Coordinates::kCartesian) return native;
+    const double phi = native.z();
+    return {r * std::sin(phi) * std::cos(theta), r * std::sin(phi) * std::sin(theta), r * std::cos(phi)};
+  }
+
+  [[nodiscard]] Status read_rotation(std::size_t row, NamedPoint& point) const {
+    if (angles_.empty()) return {};
+    Vector3 angles;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Result<double> value = table_.number(row, angles_[k], from_deg(kAngleLimit) / angle_);
+      if (!value) return tl::make_unexpected(value.error());
+      angles(static_cast<Eigen::Index>(k)) = *value * angle_;
+    }
+    point.R_W = pose_zyx(Vector3::Zero(), angles.z(), angles.y(), angles.x()).linear();
+    return {};
+  }
+
+  [[nodiscard]] Status read_sigma(std::size_t row, const Vector3& native, NamedPoint& point) const {
+    if (sigma_ && !table_.field(row, *sigma_).empty()) {
+      const Result<double> sigma = table_.number(row, *sigma_, kUncertaintyLimit / length_);
+      if (!sigma) return tl::make_unexpected(sigma.error());
+      if (*sigma <= 0) return table_.refuse(row, "sigma is {:g}, must be above 0", *sigma);
+      point.sigma = *sigma * length_;
+    }
+    if (uncertainties_.empty()) return {};
+    const Result<Vector3> read = read_three(row, uncertainties_, coordinates_, kUncertaintyLimit);
+    if (!read) return tl::make_unexpected(read.error());
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if ((*read)(k) >= 0) continue;
+      const std::size_t column = uncertainties_[static_cast<std::size_t>(k)];
+      return table_.refuse(row, "{} is {}, must not be below 0", table_.columns()[column], table_.field(row, column));
+    }
+    Vector3 along = *read;  // m, along the three directions of the coordinates
+    if (coordinates_ == Coordinates::kCylindrical) along.y() *= native.x();
+    if (coordinates_ == Coordinates::kSpherical) {
+      along.y() *= native.x() * std::abs(std::sin(native.z()));
+      along.z() *= native.x();
+    }
+    if (along.norm() > 0) point.sigma = along.norm() / std::sqrt(3.0) / coverage_;
+    return {};
+  }
+
+  const CsvTable& table_;
+  bool positional_;
+  Coordinates coordinates_;
+  double length_;  // m in a unit of the file
+  double angle_;   // rad in a unit of the file
+  double coverage_;
+  std::size_t name_ = 0;
+  std::vector<std::size_t> position_, uncertainties_, angles_;
+  std::optional<std::size_t> sigma_;
+};
+
+}  // namespace
+
+Result<PointList> parse_points(const std::string& text, const std::string& where, const PointFileOptions& options) {
+  if (!(options.coverage > 0)) return refused("{}: coverage factor {:g}, must be above 0", where, options.coverage);
+  const Result<PointTable> parts = take_apart(text, where, options);
+  if (!parts) return tl::make_unexpected(parts.error());
+  PointReader reader(*parts, options.coverage);
+  if (const Status found = reader.find_columns(); !found) return tl::make_unexpected(found.error());
+  PointList list{where, {}};
+  std::map<std::string, int> row_of_name;
+  for (std::size_t row = 0; row < parts->table.size(); ++row) {
+    Result<NamedPoint> point = reader.read(row);
+    if (!point) return tl::make_unexpected(point.error());
+    const auto [earlier, is_new] = row_of_name.emplace(point->name, point->row);
+    if (!is_new) return parts->table.refuse(row, "name '{}' is already that of row {}", point->name, earlier->second);
+    list.points.push_back(std::move(*point));
+  }
+  return list;
+}
+
+Result<PointList> read_points(const std::string& path, const PointFileOptions& options) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_points(text, path, options); });
+}
+
+Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded) {
+  std::map<std::string, const CommandedPose*> pose_of_id;
+  for (const CommandedPose& pose : commanded.poses) {
+    const auto [earlier, is_new] = pose_of_id.emplace(pose.pose_id, &pose);
+    if (is_new) continue;
+    return refused("{} row {}: pose_id '{}' is already that of row {}", commanded.where, pose.row, pose.pose_id,
+                   earlier->second->row);
+  }
+  if (points.points.empty()) return refused("{}: no points, at least 1 is needed", points.where);
+  MeasurementBatch batch;
+  batch.id = std::filesystem::path(points.where).stem().string();
+  batch.where = points.where;
+  batch.joint_types = commanded.joint_types;
+  for (const NamedPoint& point : points.points) {
+    const auto pose = pose_of_id.find(point.name);
+    if (pose == pose_of_id.end()) {
+      return refused("{} row {}: point '{}' has no pose of that pose_id in {}", points.where, point.row, point.name,
+                     commanded.where);
+    }
+    Measurement measurement;
+    measurement.pose_id = point.name;
+    measurement.context = pose->second->context;
+    measurement.context.index = static_cast<int>(batch.measurements.size());
+    measurement.p_W = point.p_W;
+    measurement.R_WT = point.R_W;
+    measurement.sigma = point.sigma;
+    measurement.row = point.row;
+    batch.measurements.push_back(std::move(measurement));
+  }
+  batch.source_text = to_csv(batch);
+  return batch;
+}
+
+}  // namespace trammel

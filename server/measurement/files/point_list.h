@@ -1,0 +1,81 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/measurement/files/joint_list.h"
+#include "server/measurement/measurement.h"
+
+/// Points and frames that a tracker's software exports: where things are, and not yet why.
+namespace trammel {
+
+struct NamedPoint {
+  std::string name;               ///< of the target or frame
+  Vector3 p_W = Vector3::Zero();  ///< m, in the file's working frame
+  std::optional<Matrix3> R_W;     ///< of a frame, active W <- frame
+  std::optional<double> sigma;    ///< m, of one axis
+  int row = 0;                    ///< line in its file, for messages
+};
+
+struct PointList {
+  std::string where;  ///< the file as messages name it
+  std::vector<NamedPoint> points;
+};
+
+enum class LengthUnit { kMillimetre, kMetre, kInch };
+enum class Coordinates { kCartesian, kCylindrical, kSpherical };
+/// What the three numbers behind the coordinates are.
+enum class BehindCoordinates { kUncertainties, kFixedXyz, kEulerZyx };
+
+/// What a file may leave unsaid. A file that says otherwise is refused.
+struct PointFileOptions {
+  std::optional<LengthUnit> unit;          ///< else what the file says, else mm
+  std::optional<Coordinates> coordinates;  ///< else what the file says, else cartesian
+  std::optional<BehindCoordinates> behind;
+  double coverage = 1;  ///< uncertainties in the file are this many standard deviations
+};
+
+/// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points", "Export Frames"), and
+/// any list of named points with a header line, `name,x_mm,y_mm,z_mm` among them.
+///
+/// Lines: one point each; empty lines are passed over, `//` and `#` start comments. Fields are separated by `;`, tab,
+/// `,` or blanks, by the first of these that is in the first line of data; a name with a separator in it stands in
+/// double quotes. Time stamps at the end of a line (fields with `/` or `:`, AM, PM, an ISO date) are passed over.
+///
+/// Layouts without a header line, told by the number of fields, the same in every line:
+///
+///     [[collection] group] target  c1 c2 c3                 4 to 6 fields
+///     [[collection] group] target  c1 c2 c3  u1 u2 u3       7 to 9 fields: coordinate uncertainties
+///     [[collection] group] frame   c1 c2 c3  rx ry rz       7 to 9 fields: fixed XYZ angles, deg
+///     [[collection] group] frame   c1 c2 c3  rz ry rx       7 to 9 fields: Euler ZYX angles, deg
+///
+/// With 7 to 9 fields a comment (`fixed XYZ`, `XYZ fixed`, `fixed angles`, `Euler ZYX`, `ZYX Euler`, `uncertainties`)
+/// or `options.behind` must say which of the three it is. A number with a decimal point where a name belongs is
+/// refused.
+///
+/// Layouts with a header (the first line of data, or a comment of as many fields that names a point and three
+/// coordinates), columns in any order, found by name without regard to case, blanks and underscores: `name` (`point`,
+/// `target`, `frame`, each also with `name`), `x y z`, `r theta z` or `r theta phi`; optional `ux uy uz` (`ur utheta
+/// uz`, `ur utheta uphi`), `sigma`, `rx ry rz` (in this order or as `rz ry rx`). Others are passed over. Units may
+/// stand in brackets or behind an underscore: `X (mm)`, `x_mm`, `theta [rad]`.
+///
+/// Coordinates: cartesian; cylindrical R, theta (from +x about +z), z; spherical R, theta (the same), phi (from +z). A
+/// comment with `cylindric`, `spherical` or `polar` says so. Angles are deg unless `Angular units: rad` or the header
+/// says otherwise. Lengths are mm unless a comment `Units: inches`, the header or `options.unit` says m or inch.
+/// Rotation of a frame: Rz(rz) Ry(ry) Rx(rx), which both kinds of angles mean. Uncertainties become one sigma of an
+/// axis: the root mean square of the three, in metres, over `options.coverage`; three zeros mean that none was
+/// recorded.
+///
+/// Refuses, naming file, row, column, value and limit: no points, another number of fields, a number that is none or
+/// too large (1 km), a negative radius or uncertainty, a name twice, other Euler angles, statements that contradict.
+[[nodiscard]] Result<PointList> parse_points(const std::string& text, const std::string& where,
+                                             const PointFileOptions& options = {});
+[[nodiscard]] Result<PointList> read_points(const std::string& path, const PointFileOptions& options = {});
+
+/// Measurements of commanded poses: each point is the measurement of the pose whose pose_id is its name. The order is
+/// that of the points, which is the order in time; poses that were not measured are left out. Refuses a point without a
+/// pose, a pose_id twice, and lists without a point.
+[[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded);
+
+}  // namespace trammel

@@ -1,0 +1,260 @@
+#include "server/measurement/files/point_table.h"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <regex>
+#include <vector>
+
+#include "server/measurement/files/text_lines.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr std::size_t kLeastFields = 4;
+constexpr std::size_t kMostFields = 9;
+
+template <typename T>
+Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
+  if (known && *known != said) return refused("{}: two different statements of {}", where, what);
+  known = said;
+  return {};
+}
+
+Result<LengthUnit> length_unit(const std::string& word, const std::string& where, int line) {
+  if (word == "mm" || word.starts_with("millimet")) return LengthUnit::kMillimetre;
+  if (word == "m" || word.starts_with("meter") || word.starts_with("metre")) return LengthUnit::kMetre;
+  if (word == "in" || word.starts_with("inch")) return LengthUnit::kInch;
+  return refused("{} row {}: unit is '{}', expected mm, m or inch", where, line, word);
+}
+
+Result<bool> is_radian(const std::string& word, const std::string& where, int line) {
+  if (word.starts_with("deg")) return false;
+  if (word.starts_with("rad")) return true;
+  return refused("{} row {}: angular unit is '{}', expected deg or rad", where, line, word);
+}
+
+bool contains(const std::string& text, const char* pattern) { return std::regex_search(text, std::regex(pattern)); }
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower;
+}
+
+Status read_unit_statements(const std::string& comment, const std::string& where, int line, Statements& statements) {
+  static const std::regex kUnits(R"((angular|angle)?\s*\bunits?\s*(?:[:=]|\bare\b|\bin\b)\s*([a-z]+))");
+  for (auto at = std::sregex_iterator(comment.begin(), comment.end(), kUnits); at != std::sregex_iterator(); ++at) {
+    if ((*at)[1].matched) {
+      const Result<bool> radians = is_radian((*at)[2], where, line);
+      if (!radians) return tl::make_unexpected(radians.error());
+      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+    } else {
+      const Result<LengthUnit> unit = length_unit((*at)[2], where, line);
+      if (!unit) return tl::make_unexpected(unit.error());
+      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+    }
+  }
+  return {};
+}
+
+Status read_statements(const TextLine& line, const std::string& where, Statements& statements) {
+  const std::string comment = lower_case(line.text);
+  if (const Status units = read_unit_statements(comment, where, line.number, statements); !units) return units;
+  const auto coordinates = contains(comment, "cylindric")            ? std::optional(Coordinates::kCylindrical)
+                           : contains(comment, "spherical|\\bpolar") ? std::optional(Coordinates::kSpherical)
+                           : contains(comment, "cartesian")          ? std::optional(Coordinates::kCartesian)
+                                                                     : std::nullopt;
+  if (coordinates) {
+    if (const Status s = state(statements.coordinates, *coordinates, where, "the coordinates"); !s) return s;
+  }
+  const bool zyx = contains(comment, R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)");
+  if (!zyx && contains(comment, R"(\beuler\b)")) {
+    return refused("{} row {}: Euler angles or parameters other than ZYX; expected Euler ZYX or fixed XYZ", where,
+                   line.number);
+  }
+  const auto behind = zyx ? std::optional(BehindCoordinates::kEulerZyx)
+                      : contains(comment, R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)")
+                          ? std::optional(BehindCoordinates::kFixedXyz)
+                      : contains(comment, "\\buncertaint") ? std::optional(BehindCoordinates::kUncertainties)
+                                                           : std::nullopt;
+  if (!behind) return {};
+  return state(statements.behind, *behind, where, "what follows the coordinates");
+}
+
+/// Our name of a column, for what other programs call it; empty for one that is passed over.
+std::string known_column(const std::string& name) {
+  static const std::map<std::string, std::string> kNames = {
+      {"name", "name"},       {"point", "name"}, {"pointname", "name"}, {"target", "name"},
+      {"targetname", "name"}, {"frame", "name"}, {"framename", "name"}, {"radius", "r"}};
+  static const std::vector<std::string> kSame = {"x",  "y",  "z",      "r",    "theta", "phi", "ux", "uy",
+                                                 "uz", "ur", "utheta", "uphi", "sigma", "rx",  "ry", "rz"};
+  if (const auto known = kNames.find(name); known != kNames.end()) return known->second;
+  return std::find(kSame.begin(), kSame.end(), name) != kSame.end() ? name : "";
+}
+
+bool has_all(const std::vector<std::string>& columns, std::initializer_list<const char*> wanted) {
+  return std::all_of(wanted.begin(), wanted.end(), [&](const char* name) {
+    return std::find(columns.begin(), columns.end(), name) != columns.end();
+  });
+}
+
+std::optional<Coordinates> coordinates_of(const std::vector<std::string>& columns) {
+  if (has_all(columns, {"x", "y", "z"})) return Coordinates::kCartesian;
+  if (has_all(columns, {"r", "theta", "phi"})) return Coordinates::kSpherical;
+  if (has_all(columns, {"r", "theta", "z"})) return Coordinates::kCylindrical;
+  return std::nullopt;
+}
+
+/// A header line taken apart; `columns` is empty when it is none.
+struct Header {
+  std::vector<std::string> columns;  // our names; a column that is passed over has its place as a name
+  std::vector<std::string> units;
+};
+
+Header header_of(std::string_view line, char separator) {
+  static const std::regex kTwoWords("(point|target|frame|group|collection)\\s+name", std::regex::icase);
+  const std::string text = std::regex_replace(std::string(line), kTwoWords, "$1");
+  Header header;
+  for (const std::string& field : split_fields(text, separator)) {
+    const ColumnName column = column_name(field);
+    const std::string known = known_column(column.name);
+    header.columns.push_back(known.empty() ? fmt::format("({}) {}", header.columns.size() + 1, field) : known);
+    header.units.push_back(known.empty() ? "" : column.unit);
+  }
+  if (!has_all(header.columns, {"name"}) || !coordinates_of(header.columns)) return {};
+  return header;
+}
+
+bool is_angle(const std::string& column) {
+  return column.ends_with("theta") || column.ends_with("phi") || (column.size() == 2 && column.starts_with('r'));
+}
+
+Status read_header_units(const Header& header, const std::string& where, int line, Statements& statements) {
+  for (std::size_t k = 0; k < header.units.size(); ++k) {
+    if (header.units[k].empty()) continue;
+    if (is_angle(header.columns[k])) {
+      const Result<bool> radians = is_radian(header.units[k], where, line);
+      if (!radians) return tl::make_unexpected(radians.error());
+      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+    } else {
+      const Result<LengthUnit> unit = length_unit(header.units[k], where, line);
+      if (!unit) return tl::make_unexpected(unit.error());
+      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+    }
+  }
+  return {};
+}
+
+/// Takes time stamps and empty fields off the end.
+void drop_time_stamp(std::vector<std::string>& fields) {
+  static const std::regex kStamp(R"(.*[/:].*|[AaPp]\.?[Mm]\.?|\d{4}-\d{2}-\d{2}.*)");
+  while (fields.size() > kLeastFields && (fields.back().empty() || std::regex_match(fields.back(), kStamp))) {
+    fields.pop_back();
+  }
+}
+
+/// The columns of a file without a header line, from its first row.
+Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, const Statements& statements,
+                                                    const std::string& where) {
+  const std::size_t count = row.fields.size();
+  if (count < kLeastFields || count > kMostFields) {
+    return refused(
+        "{} row {}: {} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 uncertainties or "
+        "angles]",
+        where, row.line, count, kLeastFields, kMostFields);
+  }
+  const bool more_behind = count > kLeastFields + 2;
+  if (more_behind && !statements.behind) {
+    return refused(
+        "{} row {}: 3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ or "
+        "Euler ZYX angles",
+        where, row.line);
+  }
+  std::vector<std::string> columns = {"collection", "group", "name"};
+  columns.erase(columns.begin(), columns.begin() + 2 - static_cast<std::ptrdiff_t>((count - kLeastFields) % 3));
+  const Coordinates coordinates = statements.coordinates.value_or(Coordinates::kCartesian);
+  const auto append = [&](const CoordinateNames& names) { columns.insert(columns.end(), names.begin(), names.end()); };
+  append(coordinate_columns(coordinates));
+  if (!more_behind) return columns;
+  switch (*statements.behind) {
+    case BehindCoordinates::kUncertainties:
+      append(uncertainty_columns(coordinates));
+      break;
+    case BehindCoordinates::kFixedXyz:
+      append({"rx", "ry", "rz"});
+      break;
+    case BehindCoordinates::kEulerZyx:
+      append({"rz", "ry", "rx"});
+      break;
+  }
+  return columns;
+}
+
+}  // namespace
+
+CoordinateNames coordinate_columns(Coordinates coordinates) {
+  if (coordinates == Coordinates::kCylindrical) return {"r", "theta", "z"};
+  if (coordinates == Coordinates::kSpherical) return {"r", "theta", "phi"};
+  return {"x", "y", "z"};
+}
+
+CoordinateNames uncertainty_columns(Coordinates coordinates) {
+  if (coordinates == Coordinates::kCylindrical) return {"ur", "utheta", "uz"};
+  if (coordinates == Coordinates::kSpherical) return {"ur", "utheta", "uphi"};
+  return {"ux", "uy", "uz"};
+}
+
+Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
+  const std::vector<TextLine> lines = text_lines(text);
+  const auto first = std::find_if(lines.begin(), lines.end(), [](const TextLine& line) { return !line.comment; });
+  if (first == lines.end()) return refused("{}: no points, at least 1 is needed", where);
+  const char separator = separator_of(first->text);
+  PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
+  std::vector<CsvTable::Row> rows;
+  for (const TextLine& line : lines) {
+    if (!line.comment) rows.push_back({line.number, split_fields(line.text, separator)});
+  }
+  Header header = header_of(first->text, separator);
+  int header_line = first->number;
+  if (!header.columns.empty()) rows.erase(rows.begin());
+  for (const TextLine& line : lines) {
+    if (!line.comment) continue;
+    Header named = header_of(line.text, separator_of(line.text));
+    const bool is_header = header.columns.empty() && !named.columns.empty() && !rows.empty() &&
+                           named.columns.size() == rows.front().fields.size();
+    if (is_header) {
+      header = std::move(named);
+      header_line = line.number;
+    } else if (const Status said = read_statements(line, where, parts.statements); !said) {
+      return tl::make_unexpected(said.error());
+    }
+  }
+  if (rows.empty()) return refused("{}: no points below the header, at least 1 is needed", where);
+  parts.positional = header.columns.empty();
+  if (parts.positional) {
+    for (CsvTable::Row& row : rows) drop_time_stamp(row.fields);
+    Result<std::vector<std::string>> columns = positional_columns(rows.front(), parts.statements, where);
+    if (!columns) return tl::make_unexpected(columns.error());
+    for (const CsvTable::Row& row : rows) {
+      if (row.fields.size() == columns->size()) continue;
+      return refused("{} row {}: {} values, the rows before have {}", where, row.line, row.fields.size(),
+                     columns->size());
+    }
+    header.columns = std::move(*columns);
+    header_line = rows.front().line;
+  } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
+    return tl::make_unexpected(units.error());
+  }
+  const Status coordinates =
+      state(parts.statements.coordinates, *coordinates_of(header.columns), where, "the coordinates");
+  if (!coordinates) return tl::make_unexpected(coordinates.error());
+  Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows);
+  if (!table) return tl::make_unexpected(table.error());
+  parts.table = std::move(*table);
+  return parts;
+}
+
+}  // namespace trammel

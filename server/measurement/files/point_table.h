@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "server/measurement/files/csv_table.h"
+#include "server/measurement/files/point_list.h"
+
+/// The layout of a list of points, found out.
+namespace trammel {
+
+/// What the file and the caller say about it.
+struct Statements {
+  std::optional<LengthUnit> unit;
+  std::optional<Coordinates> coordinates;
+  std::optional<BehindCoordinates> behind;
+  std::optional<bool> radians;
+};
+
+/// The file as a table with our column names (those of parse_points()), and what it says about itself.
+struct PointTable {
+  CsvTable table;
+  Statements statements;
+  bool positional = false;  ///< had no header line
+};
+
+/// Refuses files without a point, rows of another length, and statements that are unknown or contradict `options` or
+/// each other.
+[[nodiscard]] Result<PointTable> take_apart(const std::string& text, const std::string& where,
+                                            const PointFileOptions& options);
+
+/// Our names of the three coordinates, and of their uncertainties, in their order.
+using CoordinateNames = std::array<std::string, 3>;
+[[nodiscard]] CoordinateNames coordinate_columns(Coordinates coordinates);
+[[nodiscard]] CoordinateNames uncertainty_columns(Coordinates coordinates);
+
+}  // namespace trammel

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/measurement/files/point_list.h"
+
+/// Localisation by reference reflectors: fixed points of the cell, measured when the world frame was made and again
+/// later, say whether the tracker has moved and where to. Thesis 3.2.4 (five of them).
+namespace trammel {
+
+struct ReferenceOptions {
+  double localise_above = 20e-6;  ///< m, rms of the differences
+  double repeat_above = 100e-6;   ///< m
+};
+
+enum class ReferenceVerdict {
+  kFine,              ///< rms <= localise_above: measure on
+  kLocalise,          ///< the transform belongs to what is measured from now on
+  kLocaliseAndRepeat  ///< rms > repeat_above: the test before this check belongs repeated too
+};
+
+struct ReferenceResidual {
+  std::string name;
+  Vector3 difference_W = Vector3::Zero();  ///< measured - reference, as measured, m
+  Vector3 remaining_W = Vector3::Zero();   ///< what the transform leaves of it, m
+};
+
+struct ReferenceCheck {
+  ReferenceVerdict verdict = ReferenceVerdict::kFine;
+  /// W as the references define it, from the W of the new measurement: p_reference = X p_measured. Least squares.
+  Pose X_WV = Pose::Identity();
+  double rms = 0;            ///< m, of |difference_W|
+  double rms_remaining = 0;  ///< m, of |remaining_W|
+  /// rms_remaining <= repeat_above: one rigid motion explains the differences. Else a reflector has moved, and the
+  /// transform must not be used.
+  bool rigid = true;
+  std::vector<ReferenceResidual> residuals;  ///< in the order of the references
+  std::string worst;                         ///< reflector with the largest |remaining_W|
+  std::vector<std::string> not_measured;     ///< references that the new measurement lacks
+};
+
+/// The verdict takes both measurements to be from the same station. Refuses fewer than 3 reflectors in both, reflectors
+/// on a line, a measured reflector that no reference is named like, and limits that are not 0 < localise <= repeat.
+[[nodiscard]] Result<ReferenceCheck> check_references(const PointList& references, const PointList& measured,
+                                                      const ReferenceOptions& options = {});
+
+/// The batch in the world frame of the references: positions and orientations moved by `X_WV`, source text written
+/// anew.
+[[nodiscard]] MeasurementBatch localised(MeasurementBatch batch, const Pose& X_WV);
+
+}  // namespace trammel

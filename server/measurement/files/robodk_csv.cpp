@@ -1,0 +1,359 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <numeric>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/measurement/files/csv_table.h"
+#include "server/measurement/files/text_lines.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kPositionLimit = 1e3;  // m
+constexpr double kTurnsLimit = 10;      // of a joint
+constexpr std::size_t kMostJoints = 12;
+constexpr std::size_t kPositionalJoints = 6;
+constexpr double kInch = 0.0254;  // m
+
+enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kQuaternion };
+
+/// A column and what one of its units is in ours; `angle` says rad, else m.
+struct ScaledColumn {
+  std::size_t column = 0;
+  double scale = 1;
+  bool angle = false;
+};
+
+struct RoboDkColumns {
+  std::vector<ScaledColumn> joints, position, angles;
+  std::vector<std::size_t> quaternion, tcp, extra;
+  std::vector<std::string> extra_names;
+  std::optional<std::size_t> pose_id;
+  Orientation orientation = Orientation::kNone;
+};
+
+/// `j3`, `joint3`, `a3`, `q3` -> 3; 0 for any other name.
+std::size_t joint_number(std::string_view name) {
+  for (const std::string_view prefix : {"joint", "j", "a", "q"}) {
+    if (!name.starts_with(prefix)) continue;
+    const std::string_view digits = name.substr(prefix.size());
+    std::size_t number = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    const bool whole = error == std::errc() && end == digits.data() + digits.size();
+    if (whole && number >= 1 && number <= kMostJoints) return number;
+  }
+  return 0;
+}
+
+/// The column with the unit that its header names, or `unit`.
+Result<ScaledColumn> scaled(const CsvTable& table, std::size_t column, std::string unit) {
+  if (const std::string said = column_name(table.columns()[column]).unit; !said.empty()) {
+    const bool angle = unit == "deg" || unit == "rad";
+    const bool fits =
+        angle ? said == "deg" || said == "rad" || said == "mm" : said == "mm" || said == "m" || said == "in";
+    if (!fits) {
+      return refused("{}: column {}: unit '{}', expected {}", table.where(), table.columns()[column], said,
+                     angle ? "deg or rad, of a rail mm" : "mm, m or in");
+    }
+    unit = said;
+  }
+  if (unit == "deg") return ScaledColumn{column, from_deg(1), true};
+  if (unit == "rad") return ScaledColumn{column, 1, true};
+  if (unit == "m") return ScaledColumn{column, 1, false};
+  if (unit == "in") return ScaledColumn{column, kInch, false};
+  return ScaledColumn{column, from_mm(1), false};
+}
+
+/// Columns by the names in the first line.
+class NamedColumns {
+ public:
+  explicit NamedColumns(const CsvTable& table) : table_(table) {
+    for (const std::string& column : table.columns()) names_.push_back(column_name(column).name);
+  }
+
+  [[nodiscard]] Result<RoboDkColumns> find() {
+    if (const Status joints = find_joints(); !joints) return tl::make_unexpected(joints.error());
+    if (const Status position = find_three({"x", "y", "z"}, "mm", found_.position); !position) {
+      return tl::make_unexpected(position.error());
+    }
+    if (found_.position.empty()) return tl::make_unexpected(table_.require("X").error());
+    if (const Status orientation = find_orientation(); !orientation) return tl::make_unexpected(orientation.error());
+    for (const char* name : {"poseid", "id", "name", "point", "target"}) {
+      if (!found_.pose_id) found_.pose_id = find_name(name);
+    }
+    if (found_.pose_id) used_.push_back(*found_.pose_id);
+    for (std::size_t column = 0; column < names_.size(); ++column) {
+      if (std::find(used_.begin(), used_.end(), column) != used_.end()) continue;
+      found_.extra.push_back(column);
+      found_.extra_names.push_back(table_.columns()[column]);
+    }
+    return found_;
+  }
+
+ private:
+  [[nodiscard]] std::optional<std::size_t> find_name(const std::string& name) const {
+    const auto at = std::find(names_.begin(), names_.end(), name);
+    if (at == names_.end()) return std::nullopt;
+    return static_cast<std::size_t>(at - names_.begin());
+  }
+
+  [[nodiscard]] Status find_joints() {
+    std::map<std::size_t, std::size_t> column_of_joint;
+    for (std::size_t column = 0; column < names_.size(); ++column) {
+      const std::size_t number = joint_number(names_[column]);
+      if (number == 0) continue;
+      const auto [earlier, is_new] = column_of_joint.emplace(number, column);
+      if (is_new) continue;
+      return refused("{}: two columns for joint {}: {} and {}", table_.where(), number,
+                     table_.columns()[earlier->second], table_.columns()[column]);
+    }
+    for (const auto& [number, column] : column_of_joint) {
+      if (number != found_.joints.size() + 1) {
+        return refused("{}: missing column J{} before {}", table_.where(), found_.joints.size() + 1,
+                       table_.columns()[column]);
+      }
+      const Result<ScaledColumn> joint = scaled(table_, column, "deg");
+      if (!joint) return tl::make_unexpected(joint.error());
+      found_.joints.push_back(*joint);
+      used_.push_back(column);
+    }
+    return {};
+  }
+
+  /// All three, or none of them; refuses one that is there twice.
+  [[nodiscard]] Status find_three(const std::array<std::string, 3>& wanted, const std::string& unit,
+                                  std::vector<ScaledColumn>& found) {
+    std::vector<ScaledColumn> columns;
+    for (const std::string& name : wanted) {
+      if (std::count(names_.begin(), names_.end(), name) > 1) {
+        return refused("{}: column {} appears twice", table_.where(), name);
+      }
+      const auto column = find_name(name);
+      if (!column) continue;
+      const Result<ScaledColumn> one = scaled(table_, *column, unit);
+      if (!one) return tl::make_unexpected(one.error());
+      if (one->angle != (unit == "deg")) {
+        return refused("{}: column {} is a length, expected deg or rad", table_.where(), table_.columns()[*column]);
+      }
+      columns.push_back(*one);
+    }
+    if (columns.size() == 1 || columns.size() == 2) {
+      return refused("{}: {} of the columns {}; they come all together or not at all", table_.where(), columns.size(),
+                     fmt::join(wanted, ", "));
+    }
+    for (const ScaledColumn& column : columns) used_.push_back(column.column);
+    found = std::move(columns);
+    return {};
+  }
+
+  [[nodiscard]] Status find_orientation() {
+    const std::array<std::pair<Orientation, std::array<std::string, 3>>, 3> kinds = {
+        {{Orientation::kAbc, {"a", "b", "c"}},
+         {Orientation::kWpr, {"w", "p", "r"}},
+         {Orientation::kRxRyRz, {"rx", "ry", "rz"}}}};
+    for (const auto& [kind, names] : kinds) {
+      std::vector<ScaledColumn> angles;
+      if (const Status three = find_three(names, "deg", angles); !three) return three;
+      if (angles.empty()) continue;
+      if (const Status one = set_orientation(kind); !one) return one;
+      found_.angles = std::move(angles);
+    }
+    for (const char* name : {"qw", "qx", "qy", "qz"}) {
+      if (const auto column = find_name(name)) found_.quaternion.push_back(*column);
+    }
+    if (found_.quaternion.empty()) return {};
+    if (found_.quaternion.size() != 4) {
+      return refused("{}: {} of the columns qw, qx, qy, qz; they come all together or not at all", table_.where(),
+                     found_.quaternion.size());
+    }
+    used_.insert(used_.end(), found_.quaternion.begin(), found_.quaternion.end());
+    return set_orientation(Orientation::kQuaternion);
+  }
+
+  [[nodiscard]] Status set_orientation(Orientation kind) {
+    if (found_.orientation != Orientation::kNone) {
+      return refused("{}: two orientations; expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz", table_.where());
+    }
+    found_.orientation = kind;
+    return {};
+  }
+
+  const CsvTable& table_;
+  std::vector<std::string> names_;
+  std::vector<std::size_t> used_;
+  RoboDkColumns found_;
+};
+
+/// Names for the columns of the layouts by position; empty for any other number of columns.
+std::vector<std::string> positional_names(std::size_t count) {
+  std::vector<std::string> names;
+  for (std::size_t j = 1; j <= kPositionalJoints; ++j) names.push_back(fmt::format("J{}", j));
+  const bool full_pose = count == 18;
+  const auto append = [&](const std::string& prefix) {
+    for (const char* axis : {"x", "y", "z"}) names.push_back(fmt::format("{}{}{}", prefix, axis, "_mm"));
+    if (!full_pose) return;
+    for (const char* axis : {"rx", "ry", "rz"}) names.push_back(fmt::format("{}{}{}", prefix, axis, "_rad"));
+  };
+  append("");
+  if (count != 9) append("tcp_");
+  return names.size() == count ? names : std::vector<std::string>{};
+}
+
+/// The file as a table; by position, with the names above.
+struct RoboDkTable {
+  CsvTable table;
+  bool positional = false;
+};
+
+Result<RoboDkTable> take_apart(const std::string& text, const std::string& where) {
+  std::vector<CsvTable::Row> rows;
+  char separator = ',';
+  for (const TextLine& line : text_lines(text)) {
+    if (line.comment) continue;
+    if (rows.empty()) separator = separator_of(line.text);
+    rows.push_back({line.number, split_fields(line.text, separator)});
+    for (std::string& field : rows.back().fields) {
+      std::string pointed = field;
+      std::replace(pointed.begin(), pointed.end(), ',', '.');
+      if (separator != ',' && is_number(pointed)) field = pointed;
+    }
+  }
+  if (rows.empty()) return refused("{}: empty file, expected joints and measured positions", where);
+  CsvTable::Row header = rows.front();
+  const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), is_number);
+  if (has_header) rows.erase(rows.begin());
+  if (rows.empty()) return refused("{}: no measurements below the header, at least 1 is needed", where);
+  const bool named = std::any_of(header.fields.begin(), header.fields.end(),
+                                 [](const std::string& field) { return joint_number(column_name(field).name) > 0; });
+  if (!named) {
+    header.fields = positional_names(header.fields.size());
+    if (header.fields.empty()) {
+      return refused("{} row {}: {} columns and none named J1; without names expected 9, 12 or 18", where, header.line,
+                     rows.front().fields.size());
+    }
+  }
+  return CsvTable::from_rows(where, header, rows).map([&](CsvTable table) {
+    return RoboDkTable{std::move(table), !named};
+  });
+}
+
+/// Columns of the layouts by position: the TCP is set apart, and kept.
+Result<RoboDkColumns> find_columns(const RoboDkTable& parts) {
+  Result<RoboDkColumns> columns = NamedColumns(parts.table).find();
+  if (columns && parts.positional) columns->tcp = columns->extra;
+  return columns;
+}
+
+Result<double> read_scaled(const CsvTable& table, std::size_t row, const ScaledColumn& column, double angle_limit) {
+  const double limit = column.angle ? angle_limit : kPositionLimit;
+  return table.number(row, column.column, limit / column.scale).map([&](double value) { return value * column.scale; });
+}
+
+Result<Vector3> read_three(const CsvTable& table, std::size_t row, const std::vector<ScaledColumn>& columns) {
+  Vector3 values;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Result<double> value = read_scaled(table, row, columns[k], 2 * kPi);
+    if (!value) return tl::make_unexpected(value.error());
+    values(static_cast<Eigen::Index>(k)) = *value;
+  }
+  return values;
+}
+
+Matrix3 turn(int axis, double angle) { return rotation_exp(angle * Vector3::Unit(axis)); }
+
+Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
+  if (columns.orientation == Orientation::kNone) return std::optional<Matrix3>();
+  if (columns.orientation == Orientation::kQuaternion) {
+    return table.rotation(row, columns.quaternion).map([](const Matrix3& R) { return std::optional(R); });
+  }
+  return read_three(table, row, columns.angles).map([&](const Vector3& angles) -> std::optional<Matrix3> {
+    if (columns.orientation == Orientation::kAbc) return turn(2, angles(0)) * turn(1, angles(1)) * turn(0, angles(2));
+    if (columns.orientation == Orientation::kWpr) return turn(2, angles(2)) * turn(1, angles(1)) * turn(0, angles(0));
+    return turn(0, angles(0)) * turn(1, angles(1)) * turn(2, angles(2));
+  });
+}
+
+Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
+  Measurement measurement;
+  measurement.row = table.line(row);
+  measurement.pose_id = columns.pose_id ? table.field(row, *columns.pose_id) : "";
+  if (measurement.pose_id.empty()) measurement.pose_id = fmt::format("{}", row + 1);
+  measurement.context.index = static_cast<int>(row);
+  measurement.context.q.resize(static_cast<Eigen::Index>(columns.joints.size()));
+  for (std::size_t j = 0; j < columns.joints.size(); ++j) {
+    const Result<double> value = read_scaled(table, row, columns.joints[j], kTurnsLimit * 2 * kPi);
+    if (!value) return tl::make_unexpected(value.error());
+    measurement.context.q(static_cast<Eigen::Index>(j)) = *value;
+  }
+  const Result<Vector3> position = read_three(table, row, columns.position);
+  if (!position) return tl::make_unexpected(position.error());
+  measurement.p_W = *position;
+  Result<std::optional<Matrix3>> rotation = read_rotation(table, row, columns);
+  if (!rotation) return tl::make_unexpected(rotation.error());
+  measurement.R_WT = *rotation;
+  for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
+  return measurement;
+}
+
+/// A tool for each TCP where there are several.
+Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, MeasurementBatch& batch) {
+  std::vector<std::vector<double>> tools;
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    std::vector<double> tool;
+    for (const std::size_t column : tcp) {
+      const Result<double> value = table.number(row, column);
+      if (!value) return tl::make_unexpected(value.error());
+      tool.push_back(*value);
+    }
+    auto at = std::find(tools.begin(), tools.end(), tool);
+    if (at == tools.end()) at = tools.insert(at, std::move(tool));
+    batch.measurements[row].context.tool = fmt::format("tcp-{}", at - tools.begin() + 1);
+  }
+  if (tools.size() > 1) return {};
+  for (Measurement& m : batch.measurements) m.context.tool.clear();
+  return {};
+}
+
+}  // namespace
+
+Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where) {
+  const Result<RoboDkTable> parts = take_apart(text, where);
+  if (!parts) return tl::make_unexpected(parts.error());
+  const Result<RoboDkColumns> columns = find_columns(*parts);
+  if (!columns) return tl::make_unexpected(columns.error());
+  MeasurementBatch batch;
+  batch.id = std::filesystem::path(where).stem().string();
+  batch.where = where;
+  batch.source_text = text;
+  batch.extra_columns = columns->extra_names;
+  for (const ScaledColumn& joint : columns->joints) {
+    batch.joint_types.push_back(joint.angle ? JointType::kRevolute : JointType::kPrismatic);
+  }
+  std::map<std::string, int> row_of_pose;
+  for (std::size_t row = 0; row < parts->table.size(); ++row) {
+    Result<Measurement> measurement = read_measurement(parts->table, row, *columns);
+    if (!measurement) return tl::make_unexpected(measurement.error());
+    const auto [earlier, is_new] = row_of_pose.emplace(measurement->pose_id, measurement->row);
+    if (!is_new) {
+      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second);
+    }
+    batch.measurements.push_back(std::move(*measurement));
+  }
+  if (const Status tools = name_tools(parts->table, columns->tcp, batch); !tools) {
+    return tl::make_unexpected(tools.error());
+  }
+  return batch;
+}
+
+Result<MeasurementBatch> read_robodk_csv(const std::string& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_robodk_csv(text, path); });
+}
+
+}  // namespace trammel

@@ -1,0 +1,89 @@
+#include "server/trainer/pipeline/left_out.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trammel {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// R with R Rᵀ the covariance, which may be singular or empty.
+MatrixXd square_root(const MatrixXd& covariance) {
+  if (covariance.size() == 0) return covariance;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+std::vector<const Measurement*> observations(const CalibrationResult& found, const MeasurementBatch& batch) {
+  std::vector<const Measurement*> poses;
+  for (const Measurement& m : batch.measurements) {
+    const bool suspect = std::any_of(found.suspects.begin(), found.suspects.end(), [&](const SuspectPose& pose) {
+      return pose.pose_id == m.pose_id && pose.row == m.row;
+    });
+    if (!suspect) poses.push_back(&m);
+  }
+  return poses;
+}
+
+}  // namespace
+
+LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) {
+  const PhysicalModel& model = found.model;
+  const std::vector<const Measurement*> poses = observations(found, batch);
+  const auto count = static_cast<Index>(poses.size());
+  R_BW_ = model.X_WB.linear().transpose();
+  q_.resize(count, model.cell->robot.size());
+  residual_ = VectorXd::Zero(6 * count);
+  J_ = MatrixXd::Zero(6 * count, model.parameter_count());
+  sigma_.resize(count);
+  MatrixXd J_W;
+  for (Index i = 0; i < count; ++i) {
+    const Measurement& m = *poses[static_cast<std::size_t>(i)];
+    const Pose X_WT = model.pose_W(m.context, model.values, &J_W);
+    q_.row(i) = m.context.q.transpose();
+    sigma_(i) = std::hypot(m.sigma.value_or(model.cell->tracker.sigma), found.discrepancy);
+    residual_.segment<3>(6 * i) = (m.p_W - X_WT.translation()) / sigma_(i);
+    J_.middleRows<3>(6 * i) = J_W.topRows<3>() / sigma_(i);
+    if (!m.R_WT) continue;
+    const double turn = std::hypot(model.cell->tracker.sigma_rotation, found.discrepancy_rotation);
+    residual_.segment<3>(6 * i + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose()) / turn;
+    J_.middleRows<3>(6 * i + 3) = J_W.bottomRows<3>() / turn;
+  }
+  J_ = (J_ * square_root(found.covariance)).eval();
+}
+
+std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses) const {
+  const auto count = static_cast<Index>(poses.size());
+  Without result{MatrixXd(size(), 3), VectorXd::Zero(count)};
+  VectorXd moved = VectorXd::Zero(J_.cols());
+  if (J_.cols() > 0) {
+    MatrixXd J(6 * count, J_.cols());
+    VectorXd residual(6 * count);
+    for (Index i = 0; i < count; ++i) {
+      const Index row = 6 * poses[static_cast<std::size_t>(i)];
+      J.middleRows<6>(6 * i) = J_.middleRows<6>(row);
+      residual.segment<6>(6 * i) = residual_.segment<6>(row);
+    }
+    // The precision of the parameters without these poses. With them the gradient was 0, so they answer for its rest.
+    MatrixXd precision = MatrixXd::Identity(J.cols(), J.cols());
+    if (count > 0) precision.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose(), -1.0);
+    const Eigen::LLT<MatrixXd> factor(precision);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    moved = factor.solve(J.transpose() * residual);
+    for (Index i = 0; i < count; ++i) {
+      const MatrixXd uncertain = factor.matrixL().solve(J.middleRows<3>(6 * i).transpose());
+      result.variance(i) = std::pow(sigma_(poses[static_cast<std::size_t>(i)]), 2) * uncertain.squaredNorm() / 3;
+    }
+  }
+  const VectorXd all = residual_ + J_ * moved;
+  for (Index i = 0; i < size(); ++i) {
+    result.residual_B.row(i) = (sigma_(i) * (R_BW_ * all.segment<3>(6 * i))).transpose();
+  }
+  return result;
+}
+
+}  // namespace trammel

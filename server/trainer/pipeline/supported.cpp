@@ -1,0 +1,79 @@
+#include "server/trainer/pipeline/supported.h"
+
+#include <algorithm>
+
+#include "server/calibrate/calibrate.h"
+#include "server/calibrate/frames/frames.h"
+#include "server/compensate/paired_gain.h"
+#include "server/measurement/repeats.h"
+
+namespace trammel {
+
+namespace {
+
+/// 3 x N, m: what the sources, identified on `train`, leave of `judges`.
+Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+                                 const MeasurementBatch& train, const MeasurementBatch& judges) {
+  const Result<CalibrationResult> identified = calibrate(cell, with_unknown_tool(sources, *cell), train, {});
+  if (!identified) return tl::make_unexpected(identified.error());
+  Eigen::Matrix3Xd left(3, static_cast<Eigen::Index>(judges.measurements.size()));
+  for (Eigen::Index i = 0; i < left.cols(); ++i) {
+    const Measurement& m = judges.measurements[static_cast<std::size_t>(i)];
+    left.col(i) = m.p_W - identified->model.pose_W(m.context).translation();
+  }
+  return left;
+}
+
+std::vector<std::string> joined(std::vector<std::string> own, const std::vector<std::string>& found) {
+  own.insert(own.end(), found.begin(), found.end());
+  return own;
+}
+
+}  // namespace
+
+Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
+                               const std::vector<std::string>& found, const MeasurementBatch& train,
+                               const MeasurementBatch& judges, const std::function<bool(double share)>& progress) {
+  Supported supported{found, {}};
+  const MeasurementBatch merged = merge_repeats(train, cell->tracker.sigma).batch;
+  auto with = left_by(cell, joined(own, found), merged, judges);
+  if (!with) return tl::make_unexpected(with.error());
+  while (supported.sources.size() > 1) {
+    const auto asked = static_cast<double>(supported.left_out.size());
+    Unsupported least;
+    std::size_t place = 0;
+    Eigen::Matrix3Xd left;
+    for (std::size_t k = 0; k < supported.sources.size(); ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(supported.sources.size());
+      if (progress && !progress((asked + share) / static_cast<double>(found.size())))
+        return failure(ErrorCode::kBusy, "training given up on request");
+      std::vector<std::string> others = supported.sources;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      const auto without = left_by(cell, joined(own, others), merged, judges);
+      if (!without) continue;  // the rest cannot do without it
+      // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at which it does
+      // nothing.
+      const double z = paired_gain(*without, *with).z_sum;
+      if (z > least.z || (z == least.z && !least.source.empty())) continue;
+      least = {supported.sources[k], z};
+      place = k;
+      left = *without;
+    }
+    if (least.source.empty()) break;
+    supported.sources.erase(supported.sources.begin() + static_cast<std::ptrdiff_t>(place));
+    supported.left_out.push_back(std::move(least));
+    *with = std::move(left);
+  }
+  return supported;
+}
+
+std::string to_string(const std::vector<Unsupported>& left_out) {
+  std::vector<std::string> sentences;
+  for (const Unsupported& one : left_out) {
+    sentences.push_back(
+        fmt::format("{} is left out: the poses held out do as well without it (z {:.2f})", one.source, one.z));
+  }
+  return fmt::format("{}", fmt::join(sentences, "; "));
+}
+
+}  // namespace trammel
