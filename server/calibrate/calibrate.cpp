@@ -52,11 +52,6 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   return identify(complete, options);
 }
 
-Eigen::MatrixXd CalibrationResult::correlation() const {
-  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
-}
-
 Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
                                     const MeasurementBatch& batch, const CalibrateOptions& options) {
   std::vector<std::vector<std::string>> candidates = {{}};

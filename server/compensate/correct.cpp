@@ -92,26 +92,6 @@ double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.s
 
 }  // namespace
 
-std::string_view to_string(CorrectionStatus status) {
-  switch (status) {
-    case CorrectionStatus::kOk:
-      return "ok";
-    case CorrectionStatus::kOutOfDomain:
-      return "out_of_domain";
-    case CorrectionStatus::kJointLimit:
-      return "joint_limit";
-    case CorrectionStatus::kUnreachable:
-      return "unreachable";
-    case CorrectionStatus::kSingular:
-      return "singular";
-    case CorrectionStatus::kNotConverged:
-      return "not_converged";
-    case CorrectionStatus::kRefused:
-      return "refused";
-  }
-  return "refused";
-}
-
 Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
   const Chain& robot = cell().robot;
   if (target.joint_target) {

@@ -2,6 +2,7 @@
 
 #include "idl/limits.h"
 #include "server/base/check.h"
+#include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/base/hash.h"
+#include "server/compensate/model_file.h"
 #include "server/store/file_header.h"
 #include "server/store/writer_lock.h"
 

@@ -15,6 +15,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/compensate/model_file.h"
 #include "server/error_sources/error_source.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/measurement.h"

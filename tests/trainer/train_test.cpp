@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"

@@ -6,6 +6,7 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
 namespace trammel::cli {

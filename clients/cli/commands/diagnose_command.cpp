@@ -6,6 +6,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/diagnosis_json.h"

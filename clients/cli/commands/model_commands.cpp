@@ -7,6 +7,7 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/triage.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/model_page.h"

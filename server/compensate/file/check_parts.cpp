@@ -1,10 +1,10 @@
-#include "server/compensate/model_checks.h"
+#include "server/compensate/file/check_parts.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string_view>
 
-namespace trammel {
+namespace trammel::model_file {
 namespace {
 
 constexpr double kRigid = 1e-6;              // |RᵀR - 1|
@@ -68,7 +68,7 @@ Status check_size(const Eigen::MatrixXd& covariance, Eigen::Index P) {
   return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(), covariance.cols(), P, P);
 }
 
-Status check_parameters(const CompensatedModel::Parts& parts) {
+Status check_parameters(const ModelParts& parts) {
   for (const IdentifiedParameter& p : parts.parameters) {
     if (p.stddev < 0) return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name, p.stddev);
   }
@@ -87,7 +87,7 @@ Status check_bias(const BiasState& bias) {
 }
 
 /// Where a bias was learned that was kept since: with all the standard sources, which it was told of.
-Status check_origin(const CompensatedModel::Parts::BiasOrigin& origin, Eigen::Index P) {
+Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
   for (const std::string_view name : {"base", "geometry", "compliance"}) {
     const auto& sources = origin.physics.sources;
     if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
@@ -99,7 +99,7 @@ Status check_origin(const CompensatedModel::Parts::BiasOrigin& origin, Eigen::In
   return fine;
 }
 
-Status check_ranges(const CompensatedModel::Parts& parts) {
+Status check_ranges(const ModelParts& parts) {
   if (!parts.q_min.allFinite() || !parts.q_max.allFinite() || !parts.extrapolation_slope.allFinite())
     return refused("model: a joint range is not finite");
   if (parts.q_min.size() == parts.q_max.size() && (parts.q_min.array() > parts.q_max.array()).any())
@@ -114,7 +114,7 @@ Status check_ranges(const CompensatedModel::Parts& parts) {
 
 }  // namespace
 
-Status check_parts(const CompensatedModel::Parts& parts) {
+Status check_parts(const ModelParts& parts) {
   Status fine = check_frames(parts.physics, "");
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
   if (fine) fine = check_size(parts.covariance, P);
@@ -127,4 +127,4 @@ Status check_parts(const CompensatedModel::Parts& parts) {
   return fine;
 }
 
-}  // namespace trammel
+}  // namespace trammel::model_file
