@@ -375,6 +375,30 @@ Complaints check_sleeps(const SourceTree& tree) {
   return complaints;
 }
 
+/// Complains of locks that clang does not see, and of mutexes that say neither by an annotation nor by a comment on
+/// their line what they guard.
+Complaints check_locks(const SourceTree& tree) {
+  static const std::regex kUnseen(
+      R"(\bstd\s*::\s*((recursive_|shared_|timed_)*mutex|(lock|scoped|unique|shared)_(guard|lock)|condition_variable(_any)?)\b)");
+  static const std::regex kMutex(R"(^ +(mutable )?Mutex (\w+_?);( *//.*)?$)");
+  Complaints complaints;
+  find_in_code(
+      tree, kUnseen, "a lock that is not of server/base/mutex.h",
+      [](const std::string& path) { return !is_under(path, "tests") && path != "server/base/mutex.h"; }, complaints);
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || is_under(path, "tests")) continue;
+    std::istringstream lines(text);
+    std::string line;
+    for (int number = 1; std::getline(lines, line); ++number) {
+      std::smatch mutex;
+      if (!std::regex_match(line, mutex, kMutex) || mutex[3].matched) continue;
+      if (text.find("TRAMMEL_GUARDED_BY(" + mutex.str(2) + ")") == std::string::npos)
+        complaints.push_back(path + ":" + std::to_string(number) + ": " + mutex.str(2) + " guards nothing");
+    }
+  }
+  return complaints;
+}
+
 Complaints check_mirror(const SourceTree& tree) {
   std::set<std::string> server, tests;
   for (const auto& [path, text] : tree) {
@@ -584,6 +608,8 @@ TEST(Tidy, NoFunctionIsLongerThanAScreen) {
   }
   std::cout << "server: " << lengths_in(tree, "server") << "\nclients: " << lengths_in(tree, "clients") << "\n";
 }
+
+TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) { EXPECT_EQ(shown(check_locks(read_source_tree())), ""); }
 
 TEST(Tidy, TestFoldersMirrorTheServer) { EXPECT_EQ(shown(check_mirror(read_source_tree())), ""); }
 
@@ -805,6 +831,20 @@ TEST(TidyChecks, FindSleepsEverywhere) {
                                 {"server/base/a.cpp", "const char* s = R\"(usleep(10))\"; // sleep(1)\n"}})),
             "clients/cli/a.cpp:1: sleeps instead of waiting for a state\n"
             "tests/bias/a_test.cpp:2: sleeps instead of waiting for a state\n");
+}
+
+TEST(TidyChecks, FindLocksThatTheCompilerDoesNotCheck) {
+  EXPECT_EQ(shown(check_locks({{"server/base/mutex.h", "std::mutex mutex_;\n"},
+                               {"server/a/a.h", "  std::mutex mutex_;\n  std::condition_variable_any c_;\n"},
+                               {"server/b/b.cpp", "const std::lock_guard lock(mutex_);\nstd::once_flag once;\n"},
+                               {"tests/b/b_test.cpp", "std::mutex mutex_;\n"}})),
+            "server/a/a.h:1: a lock that is not of server/base/mutex.h\n"
+            "server/a/a.h:2: a lock that is not of server/base/mutex.h\n"
+            "server/b/b.cpp:1: a lock that is not of server/base/mutex.h\n");
+  EXPECT_EQ(shown(check_locks({{"server/a/a.h", "  Mutex mutex_;\n  int n_ TRAMMEL_GUARDED_BY(mutex_);\n"},
+                               {"server/b/b.h", "  Mutex mutex_;  // one at a time\n"},
+                               {"server/c/c.h", "  mutable Mutex mutex_;\n  int n_;\n"}})),
+            "server/c/c.h:1: mutex_ guards nothing\n");
 }
 
 TEST(TidyChecks, ComplainOfATestFolderWithoutItsServerFolder) {
