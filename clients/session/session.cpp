@@ -1,7 +1,6 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
-#include <mutex>
 #include <random>
 #include <utility>
 

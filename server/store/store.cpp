@@ -6,11 +6,11 @@
 #include <array>
 #include <chrono>
 #include <exception>
-#include <mutex>
 #include <string_view>
 #include <utility>
 
 #include "server/base/hash.h"
+#include "server/base/mutex.h"
 #include "server/store/file_header.h"
 #include "server/store/writer_lock.h"
 
@@ -379,7 +379,7 @@ struct Store::Connection {
   /// `work(database)` alone at the connection; what SQLite throws becomes kInternal.
   template <typename Work>
   auto exclusively(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
-    const std::lock_guard guard(mutex);
+    const MutexLock guard(mutex);
     try {
       return work(database);
     } catch (const SQLite::Exception& error) {
@@ -403,8 +403,8 @@ struct Store::Connection {
 
   const std::string path;
   const WriterLock lock;
-  std::mutex mutex;
-  SQLite::Database database;  // guarded by mutex
+  Mutex mutex;
+  SQLite::Database database TRAMMEL_GUARDED_BY(mutex);
 };
 
 Store::Store(std::unique_ptr<Connection> connection) : connection_(std::move(connection)) {}
