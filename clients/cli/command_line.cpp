@@ -37,9 +37,10 @@ int run_command_line(int argc, const char* const* argv) {
   app.set_version_flag("--version", TRAMMEL_VERSION);
   app.require_subcommand(0, 1);
   app.footer(
-      "Exit codes: 0 done, 1 done but not all (targets left as they were, a model not in force), 2 wrong usage,\n"
-      "3 refused data, 4 unreachable or busy service.\n"
-      "A file named '-' is standard output.");
+      "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of what they belong to.\n"
+      "An output file named '-' is standard output. Errors go to standard error and name file, row, value and limit.\n"
+      "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong usage;\n"
+      "3 refused data; 4 service unreachable or busy.");
   Action chosen;
   add_plan_command(app, chosen);
   add_pose_commands(app, chosen);

@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kJobPoll{2000};
 /// Room for everything but the text in the largest sample.
 constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
-/// Nobody else's, on any host.
+/// A name that no other client has, on whatever host: 128 random bits.
 std::string make_partition() {
   std::random_device random;
   return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());

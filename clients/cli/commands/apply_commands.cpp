@@ -211,7 +211,7 @@ Result<Extent> correct(const CorrectArguments& arguments) {
 void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   command
       .add_option("--model", arguments.model,
-                  "Model file; with --service a cell id (its model in force) or cell@version")
+                  "Model file; with --service a cell id (its model in force) or CELL@VERSION")
       ->required();
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
@@ -221,17 +221,19 @@ void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 void add_predict(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ApplyArguments>();
   CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
-  command->add_option("--joints", arguments->input, "Commanded joints (CSV: deg, rails in mm)")->required();
+  command->add_option("--joints", arguments->input, "Commanded joints (CSV: joints in deg, rails in mm)")->required();
   command
       ->add_option("-o,--output", arguments->output,
-                   "Predicted errors, standard deviations and poses in the robot's base (CSV: mm)")
+                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm)")
       ->required();
   command->add_flag(
       "--covariance", arguments->covariance,
-      "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
-      "of the true error, without the tracker's own (slx_mm ...)");
-  command->add_flag("--orientation", arguments->orientation,
-                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
+      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations of the "
+      "true error, the tracker's noise left out (slx_mm ...); with a model file only");
+  command->add_flag(
+      "--orientation", arguments->orientation,
+      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
+      "file only");
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
 }
@@ -239,11 +241,15 @@ void add_predict(CLI::App& app, Action& chosen) {
 void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
-  command->add_option("input", arguments->input, "Targets in the robot's base (CSV: mm, joints in deg)")->required();
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Corrected targets (CSV: mm, deg), each behind the columns of its input; a column named as one of "
-                   "ours comes as input_NAME")
+      ->add_option("input", arguments->input,
+                   "Targets in the robot's base (.csv: positions in mm, joints in deg, rails in mm)")
+      ->required();
+  command
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Corrected targets to write (CSV: mm, deg), behind the columns of the input; an input column that is named "
+          "as an output column comes as input_NAME")
       ->required();
   CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
                                                 "Exit with 0, not 1, where targets are left as they were");
