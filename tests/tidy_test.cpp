@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <map>
 #include <optional>
 #include <regex>
@@ -414,6 +415,134 @@ Complaints check_mirror(const SourceTree& tree) {
   return complaints;
 }
 
+// How long functions are.
+
+/// The most lines of a function, from the first of its declaration to its closing brace.
+constexpr int kMostLines = 60;
+
+struct Function {
+  std::string name;
+  int line = 0;   ///< its first
+  int lines = 0;  ///< with the closing brace
+};
+
+/// Code without preprocessor lines; lines stay where they are.
+std::string without_directives(const std::string& code) {
+  std::istringstream lines(code);
+  std::string kept;
+  bool continued = false;
+  for (std::string line; std::getline(lines, line);) {
+    const auto first = line.find_first_not_of(" \t");
+    const bool directive = continued || (first != std::string::npos && line[first] == '#');
+    continued = directive && line.ends_with('\\');
+    kept += (directive ? "" : line) + "\n";
+  }
+  return kept;
+}
+
+/// `text` with what stands in round or square brackets left out, the brackets kept.
+std::string outside_brackets(const std::string& text) {
+  std::string outside;
+  int depth = 0;
+  for (const char c : text) {
+    if (c == ')' || c == ']') --depth;
+    if (depth <= 0) outside += c;
+    if (c == '(' || c == '[') ++depth;
+  }
+  return outside;
+}
+
+/// What a brace opens, by the text between it and the statement before.
+enum class Opens { kScope, kFunction, kMember, kOther };
+Opens opened_by(const std::string& header) {
+  static const std::regex kType(
+      R"(^(template\s*<.*>)?\s*(inline\s+)?((namespace|class|struct|union|enum)\b|extern\s*$))");
+  static const std::regex kOperator(R"(\boperator\s*(\(\)|\[\]|[^\s\w(]+))"),
+      kTemplate(R"(^\s*template\s*<[^()]*?>\s)");
+  static const std::regex kMember(R"(\(\)[^:]*:[^:].*[\w>]\s*$)");
+  const std::string plain = std::regex_replace(std::regex_replace(header, kOperator, "called"), kTemplate, "");
+  const std::string outside = outside_brackets(plain);
+  if (outside.find('=') != std::string::npos) return Opens::kOther;
+  if (std::regex_search(plain, kType)) return Opens::kScope;
+  if (std::regex_search(outside, kMember)) return Opens::kMember;
+  return outside.find("()") != std::string::npos ? Opens::kFunction : Opens::kOther;
+}
+
+std::string name_in(const std::string& header) {
+  static const std::regex kName(R"(([\w~]+|operator\s*[^\s\w(]+|operator\s*\(\))\s*\()");
+  std::smatch found;
+  return std::regex_search(header, found, kName) ? std::string(found[1]) : header;
+}
+
+/// The functions of a file; what stands inside a function, lambdas and local types, is part of it.
+std::vector<Function> functions_of(std::string_view text) {
+  const std::string code = without_directives(code_of(text));
+  std::vector<Function> functions;
+  std::string header;  // since the last statement or brace of a scope
+  int line = 1, first = 1, inside = 0;
+  bool is_function = false;
+  for (const char c : code) {
+    if (c == '\n') ++line;
+    if (inside > 0) {
+      inside += c == '{' ? 1 : c == '}' ? -1 : 0;
+      if (inside > 0) continue;
+      if (is_function) functions.push_back({name_in(header), first, line - first + 1});
+      if (is_function) header.clear();
+      continue;
+    }
+    const Opens opens = c == '{' ? opened_by(header) : Opens::kScope;
+    if (c == '{' && opens != Opens::kScope) {
+      inside = 1;
+      is_function = opens == Opens::kFunction;
+    } else if (c == '{' || c == '}' || (c == ';' && outside_brackets(header + ";").ends_with(';'))) {
+      header.clear();
+    } else if (!header.empty() || !std::isspace(static_cast<unsigned char>(c))) {
+      if (header.empty()) first = line;
+      header += c;
+      if (header == "public:" || header == "private:" || header == "protected:") header.clear();
+    }
+  }
+  return functions;
+}
+
+/// Of server/ and clients/, those of three lines and more: shorter ones are names for an expression.
+std::vector<Function> functions_of(const SourceTree& tree) {
+  std::vector<Function> all;
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || !(is_under(path, "server") || is_under(path, "clients"))) continue;
+    for (Function& function : functions_of(text)) {
+      function.name = path + ":" + std::to_string(function.line) + ": " + function.name;
+      if (function.lines >= 3) all.push_back(std::move(function));
+    }
+  }
+  return all;
+}
+
+Complaints check_lengths(const SourceTree& tree) {
+  Complaints complaints;
+  for (const Function& function : functions_of(tree)) {
+    if (function.lines <= kMostLines) continue;
+    complaints.push_back(function.name + ": " + std::to_string(function.lines) + " lines, limit " +
+                         std::to_string(kMostLines));
+  }
+  return complaints;
+}
+
+/// `1234 functions, median 8 lines, 90 % at most 23, longest 60`; of one room where `folder` says it.
+std::string lengths_in(const SourceTree& tree, const std::string& folder) {
+  std::vector<int> lines;
+  for (const Function& function : functions_of(tree)) {
+    if (function.name.starts_with(folder + "/")) lines.push_back(function.lines);
+  }
+  std::sort(lines.begin(), lines.end());
+  if (lines.empty()) return "no functions";
+  const auto at = [&](double share) {
+    return std::to_string(lines[static_cast<std::size_t>(share * static_cast<double>(lines.size() - 1))]);
+  };
+  return std::to_string(lines.size()) + " functions, median " + at(0.5) + " lines, 90 % at most " + at(0.9) +
+         ", longest " + at(1);
+}
+
 Rooms read_rooms() {
   std::ifstream in(std::filesystem::path(TRAMMEL_SOURCE_DIR) / "server/README.md");
   std::ostringstream text;
@@ -467,6 +596,18 @@ TEST(Tidy, NothingIncludesItselfByWayOfOthers) { EXPECT_EQ(shown(check_circles(r
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
 TEST(Tidy, NobodySleeps) { EXPECT_EQ(shown(check_sleeps(read_source_tree())), ""); }
+
+TEST(Tidy, NoFunctionIsLongerThanAScreen) {
+  const SourceTree tree = read_source_tree();
+  EXPECT_EQ(shown(check_lengths(tree)), "");
+  std::set<std::string> rooms;
+  for (const auto& [path, text] : tree) rooms.insert(room_of(folder_of(path)));
+  for (const std::string& room : rooms) {
+    if (is_under(room, "server") || is_under(room, "clients"))
+      std::cout << room << ": " << lengths_in(tree, room) << "\n";
+  }
+  std::cout << "server: " << lengths_in(tree, "server") << "\nclients: " << lengths_in(tree, "clients") << "\n";
+}
 
 TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) { EXPECT_EQ(shown(check_locks(read_source_tree())), ""); }
 
@@ -636,6 +777,52 @@ TEST(TidyChecks, TellCodeFromCommentsAndLiterals) {
   EXPECT_EQ(code_of("a(\"b \\\" // c\") + d"), "a() + d");
   EXPECT_EQ(code_of("R\"(a\n\"b\")\" + R\"x(c)\" d)x\" e"), "\n +  e");
   EXPECT_EQ(code_of("'\"' a '\\'' 1'000'000 b"), " a  1'000'000 b");
+}
+
+std::string functions(std::string_view text) {
+  std::string all;
+  for (const Function& function : functions_of(text))
+    all += function.name + " " + std::to_string(function.line) + " " + std::to_string(function.lines) + "\n";
+  return all;
+}
+
+TEST(TidyChecks, CountTheLinesOfFunctionsFromTheirFirstToTheirBrace) {
+  EXPECT_EQ(functions("#include <a>\nnamespace a {\n\nint one() { return 1; }\n\n"
+                      "// { not code\ntemplate <int N = 3>\nint\ntwo(int a = 3) {\n  return a;\n}\n}\n"),
+            "one 4 1\ntwo 7 5\n");
+  EXPECT_EQ(functions("class CAPABILITY(1) A final : public B {\n  A() : a_{1}, b_(2) {\n    a_ = b_;\n  }\n  bool "
+                      "operator==(A b) const {\n"
+                      "    return true;\n  }\n private:\n  int f() const override {\n    return 3;\n  }\n};\n"),
+            "A 2 3\noperator== 5 3\nf 9 3\n");
+}
+
+TEST(TidyChecks, TakeWhatStandsInAFunctionForAPartOfIt) {
+  EXPECT_EQ(functions("void f() {\n  const auto g = [](int a) {\n    return a;\n  };\n  struct B {\n    int h() {\n"
+                      "      return 1;\n    }\n  };\n  if (g(1)) {\n    for (;;) {\n    }\n  }\n}\n"),
+            "f 1 14\n");
+}
+
+TEST(TidyChecks, TakeTablesAndTypesForNoFunctions) {
+  EXPECT_EQ(functions("const A kTable[] = {\n  {f(1), {2}},\n  {g()}};\nenum class E {\n  kA,\n  kB };\n"
+                      "int x{3};\nstd::array<int, 2> y() {\n  return {1, 2};\n}\n"),
+            "y 8 3\n");
+}
+
+TEST(TidyChecks, ComplainOfFunctionsThatAreTooLong) {
+  const auto lines = [](int count) {
+    std::string text = "void f() {\n";
+    for (int i = 2; i < count; ++i) text += "  g();\n";
+    return text + "}\n";
+  };
+  EXPECT_EQ(shown(check_lengths({{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}})), "");
+  EXPECT_EQ(shown(check_lengths({{"server/a/a.cpp", "\n" + lines(61)}, {"clients/b/b.h", lines(3) + lines(70)}})),
+            "clients/b/b.h:4: f: 70 lines, limit 60\nserver/a/a.cpp:2: f: 61 lines, limit 60\n");
+}
+
+TEST(TidyChecks, TellMedianAndLongestOfARoom) {
+  EXPECT_EQ(lengths_in({{"server/a/a.cpp", "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}},
+                       "server/a"),
+            "2 functions, median 3 lines, 90 % at most 3, longest 4");
 }
 
 TEST(TidyChecks, FindSleepsEverywhere) {

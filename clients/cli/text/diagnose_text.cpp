@@ -4,7 +4,7 @@
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
-#include "server/report/html.h"
+#include "server/report/shown_value.h"
 
 namespace trammel::cli {
 
