@@ -60,7 +60,7 @@ int refuse(const Error& error) {
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
-  if (!found.problems.empty()) return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(found.problems, "\n"))});
+  if (!found.problems.empty()) return refuse(refused("{}", fmt::join(found.problems, "\n")).value());
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
@@ -199,8 +199,7 @@ int run(const Arguments& arguments) {
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
   if (arguments.check) return check(server, arguments.config);
-  if (!server.problems.empty())
-    return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(server.problems, "\n"))});
+  if (!server.problems.empty()) return refuse(refused("{}", fmt::join(server.problems, "\n")).value());
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;

@@ -82,7 +82,7 @@ Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& pa
 Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source) {
   std::size_t place = 0;
   Eigen::Index first = 0;
-  while (place < model.sources.size() && acting_order(model.sources[place]->name()) <= acting_order(source->name())) {
+  while (place < model.sources.size() && !acts_before(*source, *model.sources[place])) {
     first += static_cast<Eigen::Index>(model.sources[place++]->parameters().size());
   }
   const std::vector<Parameter>& parameters = source->parameters();
@@ -123,7 +123,8 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
     if (!source) return tl::make_unexpected(source.error());
     for (const ErrorSourcePtr& other : model.sources) {
-      if (other->name().starts_with("compliance") && (*source)->name().starts_with("compliance")) {
+      const CauseRecord& cause = other->cause();
+      if (&cause == &(*source)->cause() && cause.forms.size() > 1) {
         return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(),
                        spec);
       }
@@ -136,9 +137,8 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     }
     model.sources.push_back(std::move(*source));
   }
-  std::stable_sort(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) {
-    return acting_order(a->name()) < acting_order(b->name());
-  });
+  std::stable_sort(model.sources.begin(), model.sources.end(),
+                   [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) { return acts_before(*a, *b); });
   model.X_WB = cell->X_WB.value_or(Pose::Identity());
   for (const auto& [name, X_FT] : cell->tools) model.tools[name] = X_FT.value_or(Pose::Identity());
   model.cell = std::move(cell);

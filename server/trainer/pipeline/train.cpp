@@ -21,7 +21,7 @@ constexpr const char* kProgramVersion = "0.1.0";
 constexpr double kDomainQuantile = 0.995;  // of the training poses, each left out, count as known
 constexpr int kLeastBiasPoses = 10;
 
-Error given_up() { return {ErrorCode::kBusy, "training given up on request"}; }
+Failure given_up() { return failure(ErrorCode::kBusy, "training given up on request"); }
 
 /// Split, with velocities where the poses are a path and repeats merged where they are none. Held-out rows are not
 /// touched.
@@ -141,7 +141,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
                    batch.measurements.size(), kLeastBiasPoses);
   }
-  if (!progress(0)) return tl::make_unexpected(given_up());
+  if (!progress(0)) return given_up();
   BiasOptions options;
   options.kernel = kernel;
   options.seed = seed;
@@ -262,7 +262,7 @@ Result<CompensatedModel> train_from(const CompensatedModel& from, const std::sha
     if (const Status learned = add_bias_anew(*refit, *options.bias, options, report); !learned)
       return tl::make_unexpected(learned.error());
   }
-  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  if (!report("validating", 0.9)) return given_up();
   record_stamp(refit->parts, batch, options);
   return validated(std::move(refit->parts), split);
 }
@@ -299,10 +299,10 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
   const BatchSplit split = prepared(*checked, cell->tracker.sigma, options);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
 
-  if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
+  if (!report("calibrating", 0.0)) return given_up();
   if (options.from) {
     Result<CompensatedModel> model = train_from(*options.from, cell, batch, split, options, report);
-    if (model && !report("done", 1.0)) return tl::make_unexpected(given_up());
+    if (model && !report("done", 1.0)) return given_up();
     return model;
   }
   Result<CalibrationResult> calibration = identify(cell, split.train, options);
@@ -325,10 +325,10 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
                                   [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return tl::make_unexpected(learned.error());
 
-  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
   Result<CompensatedModel> model = validated(std::move(parts), split);
-  if (model && !report("done", 1.0)) return tl::make_unexpected(given_up());
+  if (model && !report("done", 1.0)) return given_up();
   return model;
 }
 
