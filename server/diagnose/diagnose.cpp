@@ -1,7 +1,5 @@
 #include "server/diagnose/diagnose.h"
 
-#include <algorithm>
-
 #include "server/base/hash.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/orientation_check.h"
@@ -10,7 +8,6 @@
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/next_poses.h"
 #include "server/diagnose/tell/wording.h"
-#include "server/measurement/velocity.h"
 
 namespace trammel {
 
@@ -24,41 +21,26 @@ bool reported(const DiagnoseOptions& options, const std::string& stage, double s
   return !options.progress || options.progress(stage, share);
 }
 
-/// Poses in the order in which they were measured, where their times say another one than their rows. True where
-/// something had to be moved; what begins at a pose is then told by its pose id, not by a row.
-bool put_in_order_of_time(MeasurementBatch& batch) {
-  const auto time = [](const Measurement& m) { return m.context.time; };
-  if (!std::all_of(batch.measurements.begin(), batch.measurements.end(),
-                   [&](const auto& m) { return time(m).has_value(); }))
-    return false;
-  const auto earlier = [&](const Measurement& a, const Measurement& b) { return *time(a) < *time(b); };
-  if (std::is_sorted(batch.measurements.begin(), batch.measurements.end(), earlier)) return false;
-  std::stable_sort(batch.measurements.begin(), batch.measurements.end(), earlier);
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].context.index = static_cast<int>(i);
-  return true;
-}
-
-Result<PreparedBatch> prepare(const Cell& cell, const MeasurementBatch& batch, std::uint64_t seed) {
-  Result<MeasurementBatch> checked = check_against_cell(batch, cell);
-  if (!checked) return tl::make_unexpected(checked.error());
-  if (const Status oriented = check_orientations(*checked, cell); !oriented)
+Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
+  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
     return tl::make_unexpected(oriented.error());
   PreparedBatch prepared;
-  prepared.sorted = put_in_order_of_time(*checked);
-  fill_velocity(*checked);
-  BatchSplit split = split_batch(*checked, 0, seed);
-  MergedRepeats merged = merge_repeats(split.train, cell.tracker.sigma);
-  prepared.surrogates = put_in_surrogates(*checked);
-  take_over_surrogates(prepared.surrogates, *checked, merged.batch);
-  take_over_surrogates(prepared.surrogates, *checked, split.validation);
+  // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
+  prepared.sorted = !batch.is_in_order_of_time();
+  const CheckedBatch ordered = batch.in_order_of_time();
+  MeasurementBatch all = ordered.rows();
+  MergedRepeats merged = merge_repeats(ordered.training(), cell.tracker.sigma);
+  prepared.validation = ordered.held_out();
+  prepared.surrogates = put_in_surrogates(all);
+  take_over_surrogates(prepared.surrogates, all, merged.batch);
+  take_over_surrogates(prepared.surrogates, all, prepared.validation);
   const std::size_t poses = merged.batch.measurements.size();
   if (poses < static_cast<std::size_t>(kFewestPoses)) {
-    const std::size_t held_out = split.validation.measurements.size();
-    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id, poses,
+    const std::size_t held_out = prepared.validation.measurements.size();
+    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id(), poses,
                    held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses);
   }
   prepared.train = std::move(merged.batch);
-  prepared.validation = std::move(split.validation);
   prepared.repeats = merged.statistics;
   return prepared;
 }
@@ -70,9 +52,9 @@ MeasurementBatch as_recorded(const Surrogates& surrogates, MeasurementBatch batc
 
 }  // namespace
 
-Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                            const DiagnoseOptions& options) {
-  const Result<PreparedBatch> prepared = prepare(*cell, batch, options.seed);
+  const Result<PreparedBatch> prepared = prepare(*cell, batch);
   if (!prepared) return tl::make_unexpected(prepared.error());
   if (!reported(options, "calibrating", 0)) return tl::make_unexpected(given_up());
   Result<SearchResult> searched =
@@ -105,7 +87,7 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
       dependence_of(explained.after, explained.all, explained.all.project(explained.after.residual()), options.seed);
   tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
   diagnosis.batch = recorded;
-  diagnosis.batch_hash = batch_hash(batch);
+  diagnosis.batch_hash = batch.hash();
   diagnosis.cell_hash = sha256_hex(cell->cell_yaml + cell->robot_yaml);
   diagnosis.seed = options.seed;
   diagnosis.sentence = sentence_for(diagnosis);
