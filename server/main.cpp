@@ -6,14 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
-#include <mutex>
 #include <optional>
 #include <sstream>
 #include <string>
 #include <thread>
 
+#include "server/base/mutex.h"
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
@@ -60,7 +59,7 @@ int refuse(const Error& error) {
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
-  if (!found.problems.empty()) return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(found.problems, "\n"))});
+  if (!found.problems.empty()) return refuse(refused("{}", fmt::join(found.problems, "\n")).value());
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
@@ -123,8 +122,8 @@ class StopSignals {
 
   /// Until the first comes.
   [[nodiscard]] const char* wait() {
-    std::unique_lock lock(mutex_);
-    came_.wait(lock, [this] { return number_ != 0; });
+    MutexLock lock(mutex_);
+    came_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return number_ != 0; });
     return ::strsignal(number_);
   }
 
@@ -138,7 +137,7 @@ class StopSignals {
     while (::sigwait(&signals_, &number) != 0) continue;
     if (over.stop_requested()) return;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       number_ = number;
     }
     came_.notify_all();
@@ -152,9 +151,9 @@ class StopSignals {
   }
 
   sigset_t signals_;
-  std::mutex mutex_;
-  std::condition_variable came_;
-  int number_ = 0;  // guarded by mutex_
+  Mutex mutex_;
+  Condition came_;
+  int number_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::jthread thread_;
 };
 
@@ -199,8 +198,7 @@ int run(const Arguments& arguments) {
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
   if (arguments.check) return check(server, arguments.config);
-  if (!server.problems.empty())
-    return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(server.problems, "\n"))});
+  if (!server.problems.empty()) return refuse(refused("{}", fmt::join(server.problems, "\n")).value());
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;

@@ -1,7 +1,6 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
-#include <mutex>
 #include <random>
 #include <utility>
 
@@ -105,7 +104,7 @@ struct Session::Participant {
 
   /// The server that has the job, and its present state.
   [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
-    Error last{ErrorCode::kUnreachable, fmt::format("no server found ({})", where_it_looked())};
+    Error last = failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value();
     for (const KnownServer& server : watch->wait_for_servers(options.server_ports.size(), deadline())) {
       auto found = job(server.id(), number);
       if (found) return std::pair(server.id(), std::move(*found));

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/port_lock.h"
@@ -112,7 +112,7 @@ class DdsService::Running {
 
   void publish_model(const std::string& cell) {
     {
-      const std::lock_guard lock(mutex_);  // so that the last one published is the one in force
+      const MutexLock lock(mutex_);  // so that the last one published is the one in force
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
@@ -204,7 +204,7 @@ class DdsService::Running {
   std::unique_ptr<StatusEcho> echo_;
   ReplyChannels channels_;
   ServiceCore core_;
-  std::mutex mutex_;  // one model published at a time
+  Mutex mutex_;  // one model published at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::jthread status_thread_;
@@ -218,13 +218,13 @@ DdsService::~DdsService() { stop(); }
 
 Status DdsService::start() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
   auto started = Running::start(options_, trainer_, store_, registry_);
   if (!started) return tl::make_unexpected(started.error());
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   running_ = std::move(*started);
   for (const auto& model : registry_.all()) running_->publish_model(model->cell);
   return {};
@@ -232,17 +232,17 @@ Status DdsService::start() {
 
 void DdsService::stop() {
   std::unique_ptr<Running> last;  // destroyed without the lock: its workers may publish
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   last.swap(running_);
 }
 
 void DdsService::publish_progress(const JobProgress& progress) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (running_) running_->publish_progress(progress);
 }
 
 void DdsService::publish_model(const std::string& cell) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (running_) running_->publish_model(cell);
 }
 

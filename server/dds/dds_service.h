@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "server/base/mutex.h"
 #include "server/base/result.h"
 #include "server/dds/dds_options.h"
 #include "server/registry/model_registry.h"
@@ -40,8 +40,8 @@ class DdsService {
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;
-  std::mutex mutex_;
-  std::unique_ptr<Running> running_;  // guarded by mutex_
+  Mutex mutex_;
+  std::unique_ptr<Running> running_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

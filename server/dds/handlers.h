@@ -2,10 +2,10 @@
 
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "idl/valid.h"
+#include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -35,8 +35,8 @@ class SubjectFinder {
 
   const Trainer& trainer_;
   const ModelRegistry& registry_;
-  std::mutex mutex_;
-  std::deque<std::shared_ptr<const ServedModel>> loaded_;  // guarded by mutex_; newest first
+  Mutex mutex_;
+  std::deque<std::shared_ptr<const ServedModel>> loaded_ TRAMMEL_GUARDED_BY(mutex_);  // newest first
 };
 
 /// The answers to requests: a decoded request in, a reply or an error out. No DDS. Headers are the caller's business.

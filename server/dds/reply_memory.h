@@ -2,11 +2,12 @@
 
 #include <cstddef>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
+
+#include "server/base/mutex.h"
 
 namespace trammel {
 
@@ -18,14 +19,14 @@ class ReplyMemory {
   explicit ReplyMemory(std::size_t capacity) : capacity_(capacity) {}
 
   [[nodiscard]] std::optional<Reply> find(const std::string& request_id) const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = replies_.find(request_id);
     if (found == replies_.end()) return std::nullopt;
     return found->second;
   }
 
   void remember(const std::string& request_id, Reply reply) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!replies_.emplace(request_id, std::move(reply)).second) return;
     order_.push_back(request_id);
     if (order_.size() > capacity_) {
@@ -36,9 +37,9 @@ class ReplyMemory {
 
  private:
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::unordered_map<std::string, Reply> replies_;  // guarded by mutex_
-  std::deque<std::string> order_;                   // guarded by mutex_; oldest first
+  mutable Mutex mutex_;
+  std::unordered_map<std::string, Reply> replies_ TRAMMEL_GUARDED_BY(mutex_);
+  std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
 }  // namespace trammel

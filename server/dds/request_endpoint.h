@@ -3,14 +3,12 @@
 #include <pthread.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -19,6 +17,7 @@
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/reply_channels.h"
@@ -137,7 +136,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
   void on_data_available(wire::dds::DataReader*) override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       ++arrivals_;
     }
     arrived_.notify_one();
@@ -148,7 +147,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     Request request;
     wire::dds::SampleInfo info;
     while (!stop.stop_requested()) {
-      std::unique_lock lock(mutex_);
+      MutexLock lock(mutex_);
       const std::uint64_t seen = arrivals_;
       lock.unlock();
       while (!stop.stop_requested() && take(request, info)) {
@@ -183,8 +182,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   wire::dds::Topic* reply_topic_ = nullptr;
   wire::dds::DataReader* reader_ = nullptr;
   ReplyMemory<Reply> memory_;
-  std::mutex mutex_;
-  std::condition_variable_any arrived_;
+  Mutex mutex_;  // so that no arrival falls between the look at arrivals_ and the waiting
+  Condition arrived_;
   std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_
   std::atomic<std::uint64_t> looked_{0};    // arrivals when a worker last began to take
   std::atomic<int> idle_{0};                // workers that wait for arrivals

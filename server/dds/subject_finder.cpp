@@ -71,7 +71,7 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
 }
 
 Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell, int version) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = std::find_if(loaded_.begin(), loaded_.end(),
                                   [&](const auto& m) { return m->cell == cell && m->version == version; });
   if (found != loaded_.end()) return *found;

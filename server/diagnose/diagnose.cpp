@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kFewestPoses = 12;
 
-Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
+Failure given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request"); }
 
 bool reported(const DiagnoseOptions& options, const std::string& stage, double share) {
   return !options.progress || options.progress(stage, share);
@@ -56,11 +56,11 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Checke
                            const DiagnoseOptions& options) {
   const Result<PreparedBatch> prepared = prepare(*cell, batch);
   if (!prepared) return tl::make_unexpected(prepared.error());
-  if (!reported(options, "calibrating", 0)) return tl::make_unexpected(given_up());
+  if (!reported(options, "calibrating", 0)) return given_up();
   Result<SearchResult> searched =
       search_causes(cell, with_unknown_tool(cell->model.error_sources, *cell), prepared->train, options);
   if (!searched) return tl::make_unexpected(searched.error());
-  if (!reported(options, "measuring the gain", 0.65)) return tl::make_unexpected(given_up());
+  if (!reported(options, "measuring the gain", 0.65)) return given_up();
   const Explained explained(*cell, std::move(*searched));
   const SearchResult& found = explained.found;
   const MeasurementBatch recorded = as_recorded(prepared->surrogates, found.batch);
@@ -71,18 +71,18 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Checke
   tell_noise(explained, *prepared, diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
   tell_held_out(explained, *prepared, diagnosis);
-  if (!reported(options, "asking what could not have been seen", 0.72)) return tl::make_unexpected(given_up());
+  if (!reported(options, "asking what could not have been seen", 0.72)) return given_up();
   const std::vector<FamilyPtr> families = make_families(explained.after);
   tell_blindness(explained, families, *cell, prepared->surrogates, recorded, diagnosis);
   tell_periodograms(explained, diagnosis);
-  if (!reported(options, "planning the next poses", 0.8)) return tl::make_unexpected(given_up());
+  if (!reported(options, "planning the next poses", 0.8)) return given_up();
   diagnosis.next_poses = next_poses_for(found, explained.before, options);
   if (diagnosis.next_poses.q.empty()) diagnosis.next_poses.none_because = why_no_next_poses(diagnosis.findings);
   if (options.recovery) {
-    if (!reported(options, "hiding effects in the poses", 0.85)) return tl::make_unexpected(given_up());
+    if (!reported(options, "hiding effects in the poses", 0.85)) return given_up();
     tell_recovery(explained, families, options.seed + 2, diagnosis);
   }
-  if (!reported(options, "looking at what is left", 0.95)) return tl::make_unexpected(given_up());
+  if (!reported(options, "looking at what is left", 0.95)) return given_up();
   diagnosis.leftover =
       dependence_of(explained.after, explained.all, explained.all.project(explained.after.residual()), options.seed);
   tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);

@@ -3,11 +3,11 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <exception>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "server/base/mutex.h"
 #include "server/base/result.h"
 #include "server/store/writer_lock.h"
 
@@ -25,7 +25,7 @@ struct StoreConnection {
   /// `work(database)` alone at the connection; what SQLite throws becomes kInternal.
   template <typename Work>
   auto exclusively(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
-    const std::lock_guard guard(mutex);
+    const MutexLock guard(mutex);
     try {
       return work(database);
     } catch (const SQLite::Exception& error) {
@@ -49,8 +49,8 @@ struct StoreConnection {
 
   const std::string path;
   const WriterLock lock;
-  std::mutex mutex;
-  SQLite::Database database;  // guarded by mutex
+  Mutex mutex;
+  SQLite::Database database TRAMMEL_GUARDED_BY(mutex);
 };
 
 /// A prepared statement with its values bound in order.

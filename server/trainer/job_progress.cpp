@@ -33,7 +33,7 @@ JobProgress progress_of(const StoredJob& job) {
 
 void ProgressBook::report(const JobProgress& progress) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool finished = progress.stage == JobStage::kDone || progress.stage == JobStage::kFailed;
     if (finished) {
       unfinished_.erase(progress.job);
@@ -45,7 +45,7 @@ void ProgressBook::report(const JobProgress& progress) {
 }
 
 std::optional<JobProgress> ProgressBook::find(std::int64_t job) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = unfinished_.find(job);
   return found == unfinished_.end() ? std::nullopt : std::optional(found->second);
 }

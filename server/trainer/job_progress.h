@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 
+#include "server/base/mutex.h"
 #include "server/store/store.h"
 
 namespace trammel {
@@ -41,8 +41,8 @@ class ProgressBook {
 
  private:
   Listener listener_;
-  mutable std::mutex mutex_;
-  std::map<std::int64_t, JobProgress> unfinished_;  // guarded by mutex_
+  mutable Mutex mutex_;
+  std::map<std::int64_t, JobProgress> unfinished_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

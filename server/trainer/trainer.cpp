@@ -134,7 +134,7 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   }
   const StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
 
-  const std::lock_guard lock(submit_mutex_);
+  const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
   if (!repeated) {
     if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
@@ -169,7 +169,7 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     }
     sent = std::move(*batch);
   }
-  const std::lock_guard lock(submit_mutex_);
+  const MutexLock lock(submit_mutex_);
   if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""});
   if (!accepted) return tl::make_unexpected(accepted.error());
@@ -209,7 +209,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   job.created_at = unix_now();
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
-  const std::lock_guard lock(submit_mutex_);
+  const MutexLock lock(submit_mutex_);
   if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_job(job, release);
   if (!accepted) return tl::make_unexpected(accepted.error());

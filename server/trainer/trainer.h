@@ -2,13 +2,13 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "server/base/bounded_queue.h"
+#include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
@@ -122,7 +122,7 @@ class Trainer {
   JobRunner runner_;
   std::unique_ptr<BoundedQueue<QueuedJob>> queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
-  std::mutex submit_mutex_;  // one at a time between the look at the queue's room and the push: who may push
+  Mutex submit_mutex_;  // one at a time between the look at the queue's room and the push: who may push
   std::jthread worker_;
 };
 

@@ -7,7 +7,6 @@
 #include "server/diagnose/evidence/refine.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
-#include "server/numerics/product.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -38,23 +37,6 @@ struct Calibrated {
   MeasurementBatch batch;
   PriorModel model;
 };
-
-TEST(Product, EveryBuildThatThisProcessorRunsAgreesWithThePlainSum) {
-  for (const auto& [k, m, n] : {std::tuple{1, 1, 1}, {7, 5, 3}, {1033, 9, 6}, {64, 4, 4}}) {
-    const MatrixXd a = random_matrix(k, m, 1);
-    const MatrixXd b = random_matrix(k, n, 2);
-    const MatrixXd plain = a.transpose() * b;
-    const auto expect_equal = [&](RawProduct product) {
-      MatrixXd c = MatrixXd::Constant(m, n, -7);
-      product(k, m, a.data(), k, n, b.data(), k, c.data(), m);
-      EXPECT_LT((c - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
-    };
-    expect_equal(raw_product_baseline);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) expect_equal(raw_product_avx2);
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) expect_equal(raw_product_avx512);
-    EXPECT_LT((transposed_product(a, b) - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
-  }
-}
 
 TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
   const MatrixXd Z = 3 * random_matrix(40, 6, 4);

@@ -30,7 +30,7 @@ class Extend : public testing::Test {
 };
 
 TEST_F(Extend, ARefusalSaysHowManyRowsWereSetAside) {
-  const Error few{ErrorCode::kRefused, "batch b1: 10 poses to diagnose, at least 12"};
+  const Error few = refused("batch b1: 10 poses to diagnose, at least 12").value();
   EXPECT_EQ(with_rows_set_aside(few, batch_).message, few.message + " (30 of 120 rows are set aside to judge by)");
   for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kTrain;
   EXPECT_EQ(with_rows_set_aside(few, batch_).message, few.message);

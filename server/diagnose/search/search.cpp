@@ -25,7 +25,7 @@ constexpr int kFewestHarmonics = 4;
 constexpr const char* kOfManyForms = "compliance";
 constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
 
-Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
+Failure given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request"); }
 
 std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   std::vector<Parameter> priors;
@@ -465,7 +465,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
   bool changed = true;
   for (int k = 0; k < kMostSteps && changed; ++k) {
     if (options.progress && !options.progress("looking for causes", 0.6 * k / kMostSteps))
-      return tl::make_unexpected(given_up());
+      return given_up();
     Result<bool> more = search.step();
     if (more && !*more) more = search.prune();
     if (!more) return tl::make_unexpected(more.error());

@@ -63,7 +63,7 @@ Status ModelHistory::publish_from_store(const std::string& cell) {
   if (!*version) return {};
   auto model = load_for_service(cell, **version);
   if (!model) return tl::make_unexpected(model.error());
-  const std::lock_guard lock(changes_of(cell));
+  const MutexLock lock(changes_of(cell));
   put_in_force({cell, **version, std::move(*model)});
   return {};
 }
@@ -80,7 +80,7 @@ Status ModelHistory::activate(const std::string& cell, int version) {
   if (auto found = find_cell(cells_, cell); !found) return tl::make_unexpected(found.error());
   auto model = load_for_service(cell, version);
   if (!model) return tl::make_unexpected(model.error());
-  const std::lock_guard lock(changes_of(cell));
+  const MutexLock lock(changes_of(cell));
   if (auto activated = store_.activate(cell, version); !activated) return activated;
   put_in_force({cell, version, std::move(*model)});
   return {};
@@ -88,7 +88,7 @@ Status ModelHistory::activate(const std::string& cell, int version) {
 
 Result<int> ModelHistory::rollback(const std::string& cell) {
   if (auto found = find_cell(cells_, cell); !found) return tl::make_unexpected(found.error());
-  const std::lock_guard lock(changes_of(cell));
+  const MutexLock lock(changes_of(cell));
   const auto versions = store_.previous_in_force(cell);
   if (!versions) return tl::make_unexpected(versions.error());
   std::optional<Error> why_not;
@@ -116,7 +116,7 @@ Result<int> ModelHistory::import_model(const std::string& cell, const std::strin
   }
   const Status fits = check_fits_cell(*model, **cell_found, "imported model " + model->provenance().id);
   if (!fits) return tl::make_unexpected(fits.error());
-  const std::lock_guard lock(changes_of(cell));
+  const MutexLock lock(changes_of(cell));
   const auto present = store_.models(cell);
   if (!present) return tl::make_unexpected(present.error());
   for (const StoredModel& stored : *present) {
@@ -140,7 +140,7 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate) {
     const bool released = *may_release && (verdict->put_in_force || verdict->undecided);
     if (*may_release && !released)
       message += fmt::format("; what was in quarantine of {} stays there", fmt::join(candidate.job.batch_ids, ", "));
-    const std::lock_guard lock(changes_of(cell));
+    const MutexLock lock(changes_of(cell));
     if (registry_.in_force(cell) != present) continue;
     const auto version =
         store_.add_model(cell, candidate.model, candidate.job.id, verdict->put_in_force, message, released);

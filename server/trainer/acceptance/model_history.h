@@ -3,11 +3,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/gate.h"
@@ -63,7 +63,7 @@ class ModelHistory {
   [[nodiscard]] Result<Kept> keep(const Candidate& candidate);
 
  private:
-  [[nodiscard]] std::mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
+  [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
   /// Of a model that the store has put in force; the cell's lock is held.
   void put_in_force(ServedModel model);
   /// Of the candidate against `present`; null: none in force.
@@ -78,7 +78,7 @@ class ModelHistory {
   ModelRegistry& registry_;
   const double accept_ratio_;
   Listener listener_;
-  std::map<std::string, std::mutex> changing_;  // the map never changes; one change of a cell's models at a time
+  std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
 };
 
 }  // namespace trammel

@@ -152,7 +152,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
                    batch.measurements.size(), kLeastBiasPoses);
   }
-  if (!progress(0)) return tl::make_unexpected(given_up());
+  if (!progress(0)) return given_up();
   BiasOptions options;
   options.kernel = kernel;
   options.seed = seed;

@@ -46,8 +46,7 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
     Eigen::Matrix3Xd left;
     for (std::size_t k = 0; k < supported.sources.size(); ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(supported.sources.size());
-      if (progress && !progress((asked + share) / static_cast<double>(found.size())))
-        return tl::make_unexpected(given_up());
+      if (progress && !progress((asked + share) / static_cast<double>(found.size()))) return given_up();
       std::vector<std::string> others = supported.sources;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
       const auto without = left_by(cell, joined(own, others), merged, judges);

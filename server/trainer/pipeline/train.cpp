@@ -128,7 +128,7 @@ Result<CompensatedModel> train_from(const CompensatedModel& from, const std::sha
     if (const Status learned = add_bias_anew(*refit, *options.bias, options, report); !learned)
       return tl::make_unexpected(learned.error());
   }
-  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  if (!report("validating", 0.9)) return given_up();
   record_stamp(refit->parts, batch, options);
   return validated(std::move(refit->parts), split);
 }
@@ -160,7 +160,7 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, con
   const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), left_out, options.seed,
                                   [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return tl::make_unexpected(learned.error());
-  if (!report("validating", 0.9)) return tl::make_unexpected(given_up());
+  if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
   return validated(std::move(parts), split);
 }
@@ -182,10 +182,10 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
   if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id());
 
-  if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
+  if (!report("calibrating", 0.0)) return given_up();
   Result<CompensatedModel> model = options.from ? train_from(*options.from, cell, batch, split, options, report)
                                                 : train_anew(cell, batch, split, options, report);
-  if (model && !report("done", 1.0)) return tl::make_unexpected(given_up());
+  if (model && !report("done", 1.0)) return given_up();
   return model;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "server/numerics/numerics.h"
+#include "server/numerics/numerics_table.h"
 
-/// The builds themselves, for the dispatcher and for the test that holds them equal.
+/// One build for each instruction set, for numerics() to choose from and for the test that holds them equal.
 namespace trammel {
 
 [[nodiscard]] const Numerics& numerics_baseline();  ///< SSE2, every x86-64
