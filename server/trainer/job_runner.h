@@ -19,6 +19,7 @@
 namespace trammel {
 
 class JobBatches;
+struct Diagnosis;
 
 /// A job that waits, with the batch that it came with where that is at hand: after a restart the store alone has it.
 struct QueuedJob {
