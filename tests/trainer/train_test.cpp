@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
+#include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
@@ -107,7 +108,7 @@ TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     later.measurements[i].context.temperature = 20.5 + 0.02 * static_cast<double>(i);
   }
-  const MeasurementBatch checked = test::demand(check_against_cell(later, *cell));
+  const MeasurementBatch checked = test::demand(check_against_cell(later, *cell)).rows();
   EXPECT_EQ(*checked.measurements.front().context.time, 0);
   EXPECT_EQ(*checked.measurements[100].context.time, 2000);
 }

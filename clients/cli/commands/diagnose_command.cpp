@@ -22,7 +22,7 @@ using nlohmann::ordered_json;
 constexpr const char* kCellOption = "--cell-out";
 constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
 
-Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 std::uint64_t seed) {
   ProgressLine progress;
   DiagnoseOptions options;
@@ -34,7 +34,7 @@ Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const M
   return diagnose(cell, batch, options);
 }
 
-Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 const Diagnosis& diagnosis, std::uint64_t seed) {
   ProgressLine progress;
   TrainOptions options;
@@ -69,9 +69,8 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
 }
 
 /// Never silently worse: what does not lower the error on poses held out beyond chance goes into no file.
-Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                        const Diagnosis& diagnosis, const DiagnoseArguments& arguments, ordered_json& json,
-                        Outputs& outputs) {
+Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
+                        const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
   if (!extension) return extension;
   json["applied"] = extension_json(*extension);
@@ -88,10 +87,10 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const Measureme
 }
 
 /// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
-Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
-  Result<MeasurementBatch> batch = read_batch(arguments.batch);
-  if (!batch || !arguments.apply) return batch;
-  return with_held_out(std::move(*batch), kHeldOutShare, arguments.seed);
+Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
+  return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
+    return check_against_cell(std::move(batch), cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
+  });
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
@@ -103,7 +102,7 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   Result<Cell> read = read_cell(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<MeasurementBatch> batch = batch_to_diagnose(arguments);
+  const Result<CheckedBatch> batch = batch_to_diagnose(arguments, *cell);
   if (!batch) return tl::make_unexpected(batch.error());
   const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));

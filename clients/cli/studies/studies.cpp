@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "server/trainer/pipeline/train.h"
 
 namespace trammel::cli {
@@ -57,14 +58,18 @@ class Laboratory {
     TrainOptions train_options = options("calibrating " + level);
     train_options.level = level;
     train_options.bias = "none";
-    return train(cell(), batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return train(cell(), checked, train_options);
+    });
   }
   Result<CompensatedModel> learn(const std::string& level, const CompensatedModel& calibrated,
                                  const MeasurementBatch& batch) {
     const std::string stage = fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
     TrainOptions train_options = options(stage);
     train_options.bias = options_.bias;
-    return learn_bias(calibrated, batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return learn_bias(calibrated, checked, train_options);
+    });
   }
 
  private:
