@@ -10,9 +10,9 @@
 #include <cstdio>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
@@ -49,18 +49,24 @@ int exit_code(const Error& error) {
   }
 }
 
-/// Each line of the message is a problem of its own.
+/// A line each of all that is wrong.
 int refuse(const Error& error) {
-  std::istringstream lines(error.message);
-  for (std::string line; std::getline(lines, line);) fmt::print(stderr, "trammeld: {}\n", line);
+  for (const Error& one : apart(error)) fmt::print(stderr, "trammeld: {}\n", sentence(one));
   return exit_code(error);
+}
+
+/// A start that would fail, of whatever kind its problems are.
+int refuse_start(std::vector<Error> problems) {
+  Error all = together(std::move(problems));
+  all.code = ErrorCode::kRefused;
+  return refuse(all);
 }
 
 /// What a start would find.
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
-  if (!found.problems.empty()) return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(found.problems, "\n"))});
+  if (!found.problems.empty()) return refuse_start(found.problems);
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
@@ -70,7 +76,7 @@ Status start_log(const LogOptions& options) {
     spdlog::set_default_logger(options.file.empty() ? spdlog::stderr_color_mt("trammeld")
                                                     : spdlog::basic_logger_mt("trammeld", options.file));
   } catch (const spdlog::spdlog_ex& error) {
-    return refused("log: {}", error.what());
+    return refused("{}", error.what()).under("log: file");
   }
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);
@@ -199,8 +205,7 @@ int run(const Arguments& arguments) {
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
   if (arguments.check) return check(server, arguments.config);
-  if (!server.problems.empty())
-    return refuse({ErrorCode::kRefused, fmt::format("{}", fmt::join(server.problems, "\n"))});
+  if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;

@@ -229,6 +229,8 @@ Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::stri
   }
 }
 
-Error error_of(const wire::ReplyHeader& header) { return {from_wire(header.result()), header.message()}; }
+Error error_of(const wire::ReplyHeader& header) {
+  return failure(from_wire(header.result()), "{}", header.message()).value();
+}
 
 }  // namespace trammel::client

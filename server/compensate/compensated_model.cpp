@@ -131,7 +131,7 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(), n);
   }
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
-    return refused("model: a parameter is not finite");
+    return refused("model: a parameter is not finite").of("parameters");
   }
   if (const Status fits = check_origin(parts); !fits) return tl::make_unexpected(fits.error());
   const BiasPhysics then = physics_of_bias(parts);
@@ -182,7 +182,9 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
     known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);
   }
   return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
-                 cell().name, tool, payload, known);
+                 cell().name, tool, payload, known)
+      .of("tool_id")
+      .with_text(tool);
 }
 
 bool CompensatedModel::is_own(const MeasurementBatch& batch) const {

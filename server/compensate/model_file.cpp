@@ -371,20 +371,30 @@ Json content_of(const CompensatedModel::Parts& parts) {
 
 Result<CompensatedModel> model_from(const Json& content, const Json& stamp, const std::string& where) {
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
-  if (!cell) return tl::make_unexpected(cell.error());
+  if (!cell) {
+    Error damaged = cell.error();
+    damaged.row.reset();  // of a text inside the file
+    return Failure(std::move(damaged));
+  }
   Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
-  if (!physics) return refused("{}: {}", where, sentence(physics.error()));
+  if (!physics) return Failure(physics.error()).as(ErrorCode::kRefused).in(where);
   CompensatedModel::Parts parts;
   parts.physics = std::move(*physics);
   parts.covariance = matrix_from(content.at("covariance"));
   const std::vector<Parameter> known = parts.physics.parameters();
   const Json& parameters = list_from(content.at("parameters"));
   if (parameters.size() != known.size())
-    return refused("{}: {} parameters, expected {}", where, parameters.size(), known.size());
+    return refused("{} parameters, expected {}", parameters.size(), known.size())
+        .in(where)
+        .of("parameters")
+        .beyond(parameters.size(), known.size());
   for (std::size_t i = 0; i < known.size(); ++i) {
     const Json& one = parameters.at(i);
     if (one.at("name").get<std::string>() != known[i].name)
-      return refused("{}: its parameter {} is not {}, as its error sources say", where, i + 1, known[i].name);
+      return refused("its parameter {} is not {}, as its error sources say", i + 1, known[i].name)
+          .in(where)
+          .of("parameters")
+          .with_text(known[i].name);
     parts.parameters.push_back(
         {known[i], number_from(one, "value"), number_from(one, "stddev"), truth_from(one.at("identified"))});
   }
@@ -419,17 +429,19 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
     if (bias.contains("poses")) {
       if (bias.value("fades", "") != kFades) {
         return refused(
-            "{}: its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would "
-            "answer "
-            "otherwise now: train it again",
-            where, parts.bias->kernel);
+                   "its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would "
+                   "answer otherwise now",
+                   parts.bias->kernel)
+            .in(where)
+            .of("bias")
+            .next("train it again");
       }
       for (const Json& context : list_from(bias.at("poses"))) parts.bias_contexts.push_back(context_from(context));
     }
     if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
     if (content.contains("bias_origin")) {
       Result<CompensatedModel::Parts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);
-      if (!origin) return refused("{}: {}", where, sentence(origin.error()));
+      if (!origin) return Failure(origin.error()).as(ErrorCode::kRefused).in(where);
       parts.bias_origin = std::move(*origin);
     }
     if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");
@@ -450,10 +462,7 @@ Result<CompensatedModel> model_from(const Json& content, const Json& stamp, cons
   const Status possible = check_parts(parts);
   Result<CompensatedModel> model =
       possible ? CompensatedModel::make(std::move(parts)) : tl::make_unexpected(possible.error());
-  return std::move(model).map_error([&](Error error) {
-    error.message = where + ": " + error.message;
-    return error;
-  });
+  return std::move(model).map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
 }  // namespace
@@ -490,23 +499,26 @@ Status check_keys(const Members& members, const std::string& where) {
   static constexpr std::array<std::string_view, 5> kKeys = {"content", "hash", "stamp", "trammel_model", "stamp_hash"};
   for (const auto& [key, value] : members) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
-      return refused("{}: not a Trammel model: unknown key {}", where, shown(key));
+      return refused("not a Trammel model: unknown key {}", shown(key)).in(where).of(shown(key));
   }
   // Models of before the stamp was hashed have no stamp_hash.
   for (const std::string_view key : kKeys) {
     if (key != "stamp_hash" && !members.contains(std::string(key)))
-      return refused("{}: not a Trammel model: no {}", where, key);
+      return refused("not a Trammel model: no {}", key).in(where).of(std::string(key));
   }
   const std::string_view format = members.at("trammel_model");
   if (format == std::to_string(kFormat)) return {};
-  return refused("{}: model format {}, this program reads {}", where, shown(format), kFormat);
+  return refused("model format {}, this program reads {}", shown(format), kFormat)
+      .in(where)
+      .of("trammel_model")
+      .with_text(shown(format));
 }
 
 /// Of the bytes as they stand in the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
   if (members.at(by) == '"' + hash + '"') return {};
-  return refused("{}: damaged: its {} is {}, its {} has {}", where, by, shown(members.at(by)), of, hash);
+  return refused("damaged: its {} is {}, its {} has {}", by, shown(members.at(by)), of, hash).in(where).of(by);
 }
 
 Result<CompensatedModel> checked_model(const Members& members, const std::string& where) {
@@ -523,9 +535,11 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
   try {
     return json_members(text, where).and_then([&](const Members& members) { return checked_model(members, where); });
   } catch (const Json::exception& error) {
-    return refused("{}: not a Trammel model: {}", where, shown(error.what()));
+    return refused("not a Trammel model: {}", shown(error.what())).in(where);
   } catch (const std::bad_alloc&) {
-    return failure(ErrorCode::kTooLarge, "{}: its {} bytes ask for more memory than there is", where, text.size());
+    return failure(ErrorCode::kTooLarge, "its {} bytes ask for more memory than there is", text.size())
+        .in(where)
+        .with_value(text.size());
   }
 }
 

@@ -115,7 +115,7 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
     case wire::MANAGE_EXPORT: {
       const auto in_force = registry_.in_force(cell);
       if (request.version() == 0 && !in_force) {
-        return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+        return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
       }
       const int version = request.version() == 0 ? in_force->version : request.version();
       const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
@@ -125,7 +125,8 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
       reply.text(serialize(*model));
       if (reply.text().size() > kMaxText) {
         return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version,
-                       reply.text().size(), kMaxText);
+                       reply.text().size(), kMaxText)
+            .beyond(reply.text().size(), kMaxText);
       }
       return reply;
     }
@@ -165,7 +166,9 @@ Result<wire::ManageModelsReply> Handlers::release_and_train(const std::string& c
   if (!wanted) return tl::make_unexpected(wanted.error());
   if (wanted->batches.size() > wire::MAX_BATCHES) {
     return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", wanted->batches.size(),
-                   wire::MAX_BATCHES);
+                   wire::MAX_BATCHES)
+        .of("batches")
+        .beyond(wanted->batches.size(), wire::MAX_BATCHES);
   }
   const auto job = trainer_.retrain(cell, wanted->batches, wanted->level, wanted->bias, Trainer::Quarantine::kReleased);
   if (!job) return tl::make_unexpected(job.error());

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kFewestPoses = 12;
 
-Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
+Error given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request").value(); }
 
 bool reported(const DiagnoseOptions& options, const std::string& stage, double share) {
   return !options.progress || options.progress(stage, share);
@@ -54,8 +54,10 @@ Result<PreparedBatch> prepare(const Cell& cell, const MeasurementBatch& batch, s
   const std::size_t poses = merged.batch.measurements.size();
   if (poses < static_cast<std::size_t>(kFewestPoses)) {
     const std::size_t held_out = split.validation.measurements.size();
-    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id, poses,
-                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses);
+    return refused("{} poses to diagnose{}, at least {}", poses,
+                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses)
+        .in("batch " + batch.id)
+        .beyond(poses, kFewestPoses);
   }
   prepared.train = std::move(merged.batch);
   prepared.validation = std::move(split.validation);

@@ -216,7 +216,7 @@ Triage triage(const CompensatedModel& model, const MeasurementBatch& batch, cons
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;
-    poisoned.sentence = *doubt;
+    poisoned.sentence = sentence(*doubt);
     return poisoned;
   }
   if (batch.measurements.size() < kFewestPoses) {

@@ -122,10 +122,14 @@ Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& ce
   if (known == nullptr) {
     std::vector<std::string> names = {"compliance"};
     for (std::string& name : known_causes()) names.push_back(std::move(name));
-    return failure(ErrorCode::kUsage, "unknown error source '{}'{}; known: {}", spec,
-                   did_you_mean(cause_of(spec), names), fmt::join(names, ", "));
+    return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec, did_you_mean(cause_of(spec), names))
+        .of("error_sources")
+        .with_text(spec)
+        .next(fmt::format("known: {}", fmt::join(names, ", ")));
   }
-  return parse_spec(spec, *known, cell).and_then([&](const SourceSpec& parsed) { return known->make(parsed, cell); });
+  return parse_spec(spec, *known, cell)
+      .and_then([&](const SourceSpec& parsed) { return known->make(parsed, cell); })
+      .map_error([&](Error error) { return Failure(std::move(error)).of("error_sources").with_text(spec).value(); });
 }
 
 Result<std::vector<std::string>> parse_level(const std::string& level) {
@@ -133,7 +137,8 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   std::istringstream words(level);
   for (std::string word; std::getline(words, word, ',');) {
     word.erase(std::remove(word.begin(), word.end(), ' '), word.end());
-    if (word.empty()) return failure(ErrorCode::kUsage, "level '{}': an empty entry", level);
+    if (word.empty())
+      return failure(ErrorCode::kUsage, "level '{}': an empty entry", level).of("level").with_text(level);
     if (word == "M0") continue;
     if (word == "M1" || word == "M2" || word == "M3") {
       names.emplace_back("base");
@@ -143,9 +148,10 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
       names.push_back(word);
     }
   }
-  if (level.empty()) return failure(ErrorCode::kUsage, "an empty level; expected M0, M1, M2, M3 or error sources");
+  if (level.empty())
+    return failure(ErrorCode::kUsage, "an empty level").of("level").next("expected M0, M1, M2, M3 or error sources");
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
-    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level);
+    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level).of("level").with_text(level);
   }
   return names;
 }

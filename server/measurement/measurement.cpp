@@ -32,7 +32,7 @@ MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in) {
 
 Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& cell) {
   const std::string where = batch.where.empty() ? "batch " + batch.id : batch.where;
-  if (batch.measurements.empty()) return refused("{}: no measurements, at least 1 is needed", where);
+  if (batch.measurements.empty()) return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
     return tl::make_unexpected(columns.error());
@@ -43,11 +43,13 @@ Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& 
   for (Measurement& measurement : batch.measurements) {
     if (measurement.context.time) *measurement.context.time -= origin;
     if (measurement.context.q.size() != cell.robot.size()) {
-      return refused("{} row {}: {} joints, robot {} has {}", where, measurement.row, measurement.context.q.size(),
-                     cell.robot.name(), cell.robot.size());
+      return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
+          .in(where)
+          .at_row(measurement.row)
+          .beyond(measurement.context.q.size(), cell.robot.size());
     }
-    const Status pose = check_pose(measurement.context, cell, fmt::format("{} row {}", where, measurement.row));
-    if (!pose) return tl::make_unexpected(pose.error());
+    const Status pose = check_pose(measurement.context, cell);
+    if (!pose) return Failure(pose.error()).in(where).at_row(measurement.row);
   }
   if (const Status spread = check_spread(batch, cell, where); !spread) return tl::make_unexpected(spread.error());
   return batch;

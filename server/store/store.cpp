@@ -167,7 +167,7 @@ int change(SQLite::Database& database, const char* sql, const Values&... values)
 /// Of the change of one unfinished job.
 Status changed_one(int changes, std::int64_t id) {
   if (changes == 1) return {};
-  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id);
+  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);
 }
 
 std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job) {
@@ -206,7 +206,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
 
 Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = ?").c_str(), id);
-  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id);
+  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
   return job_of(database, row);
 }
 
@@ -250,7 +250,7 @@ void insert_job_batches(SQLite::Database& database, std::int64_t job, const std:
 Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
     if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
-      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id);
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
     }
   }
   const std::int64_t id = insert_job(database, job);
@@ -280,9 +280,11 @@ std::optional<Activation> present_activation(SQLite::Database& database, const s
 /// Where rolling back again and again leads, the next one first.
 Result<std::vector<Activation>> activations_before(SQLite::Database& database, const std::string& cell) {
   const auto present = present_activation(database, cell);
-  if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+  if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
   if (!present->back) {
-    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version);
+    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version)
+        .of("version")
+        .with_value(present->version);
   }
   std::vector<Activation> before;
   for (auto back = present->back; back; back = before.back().back) {
@@ -338,21 +340,25 @@ Status check_owner(SQLite::Database& database, const std::string& path) {
   const bool empty = database.execAndGet("SELECT COUNT(*) FROM sqlite_master").getInt() == 0;
   if (empty && application == 0 && schema == 0) return {};
   if (application != kApplicationId) {
-    return refused("{}: a database of another program (application id {:#x}, not {:#x})", path, application,
-                   kApplicationId);
+    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+        .in(path);
   }
   if (schema > kSchemaVersion) {
-    return refused("{}: schema {} is newer than this program's, limit {}", path, schema, kSchemaVersion);
+    return refused("schema {} is newer than this program's, limit {}", schema, kSchemaVersion)
+        .in(path)
+        .of("schema")
+        .beyond(schema, kSchemaVersion)
+        .next("start a newer one");
   }
   const std::string damage = database.execAndGet("PRAGMA quick_check(1)").getString();
-  if (damage != "ok") return failure(ErrorCode::kInternal, "{}: damaged: {}", path, damage);
+  if (damage != "ok") return failure(ErrorCode::kInternal, "damaged: {}", damage).in(path);
   return {};
 }
 
 Status prepare_file(SQLite::Database& database, const std::string& path) {
   if (auto owner = check_owner(database, path); !owner) return owner;
   const std::string mode = database.execAndGet("PRAGMA journal_mode = WAL").getString();
-  if (mode != "wal") return failure(ErrorCode::kInternal, "{}: this file system cannot hold a WAL ({})", path, mode);
+  if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
   const int schema = database.execAndGet("PRAGMA user_version").getInt();
@@ -383,10 +389,9 @@ struct Store::Connection {
     try {
       return work(database);
     } catch (const SQLite::Exception& error) {
-      return failure(ErrorCode::kInternal, "{}: {} (SQLite error {})", path, error.what(),
-                     error.getExtendedErrorCode());
+      return failure(ErrorCode::kInternal, "{} (SQLite error {})", error.what(), error.getExtendedErrorCode()).in(path);
     } catch (const std::exception& error) {
-      return failure(ErrorCode::kInternal, "{}: {}", path, error.what());
+      return failure(ErrorCode::kInternal, "{}", error.what()).in(path);
     }
   }
 
@@ -419,7 +424,7 @@ Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
     if (!ready) return tl::make_unexpected(ready.error());
     return std::unique_ptr<Store>(new Store(std::move(connection)));
   } catch (const std::exception& error) {
-    return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, error.what());
+    return failure(ErrorCode::kInternal, "cannot be opened: {}", error.what()).in(path);
   }
 }
 
@@ -432,7 +437,9 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
       const std::int64_t made = present.getColumn(2).getInt64();
       if (same_content && present.getColumn(0).getString() == batch.request_id) return read_job(database, made);
       return failure(ErrorCode::kConflict, "cell {} already has a batch {} with {} content (job {})", batch.cell,
-                     batch.id, same_content ? "the same" : "other", made);
+                     batch.id, same_content ? "the same" : "other", made)
+          .of("batch")
+          .with_text(batch.id);
     }
     const std::int64_t id = insert_job(database, job);
     change(database,
@@ -477,7 +484,8 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
 Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredDiagnosis> {
     auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
     return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
                            row.getColumn(3).getString()};
   });
@@ -500,7 +508,7 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
     const int changes =
         change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
     if (changes == 1) return {};
-    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
   });
 }
 
@@ -510,7 +518,8 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
         database,
         "SELECT csv, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? AND id = ?",
         cell, id);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
     StoredBatch batch{cell,
                       id,
                       row.getColumn(0).getString(),
@@ -521,8 +530,9 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
                       row.getColumn(5).getInt64(),
                       row.getColumn(6).getString()};
     if (sha256_hex(batch.csv) != batch.hash) {
-      return failure(ErrorCode::kInternal, "{}: batch {} of cell {} is not what was accepted: its hash should be {}",
-                     connection_->path, id, cell, batch.hash);
+      return failure(ErrorCode::kInternal, "batch {} of cell {} is not what was accepted: its hash should be {}", id,
+                     cell, batch.hash)
+          .in(connection_->path);
     }
     return batch;
   });
@@ -640,7 +650,9 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
 Status Store::activate(const std::string& cell, int version) {
   return connection_->in_transaction([&](SQLite::Database& database) -> Status {
     if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
-      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
+      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
+          .of("version")
+          .with_value(version);
     }
     activate_on_top(database, cell, version);
     return {};
@@ -662,7 +674,9 @@ Result<int> Store::rollback(const std::string& cell, int steps) {
     const auto before = activations_before(database, cell);
     if (!before) return tl::make_unexpected(before.error());
     if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
-      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps);
+      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps)
+          .of("steps")
+          .beyond(steps, steps < 1 ? 1 : before->size());
     }
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     insert_activation(database, cell, wanted.version, wanted.back);
@@ -702,7 +716,10 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
 Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
   const auto content = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
+          .of("version")
+          .with_value(version);
     return row.getColumn(0).getString();
   });
   if (!content) return tl::make_unexpected(content.error());

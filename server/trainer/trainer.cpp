@@ -30,10 +30,11 @@ constexpr int kJobsListed = 20;                           // of those done and o
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running training, for its watchers
 
 Status check_batch_id(const std::string& id) {
-  if (id.empty()) return refused("a batch needs an id");
-  if (id.size() > kMaxBatchId) return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId);
+  if (id.empty()) return refused("a batch needs an id").of("batch");
+  if (id.size() > kMaxBatchId)
+    return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId).of("batch").beyond(id.size(), kMaxBatchId);
   const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!printable) return refused("batch id {:?} has control characters", id);
+  if (!printable) return refused("batch id {:?} has control characters", id).of("batch").with_text(id);
   return {};
 }
 
@@ -72,10 +73,11 @@ bool same_tools(const CompensatedModel& model, const Cell& cell) {
 /// Whether the cell can be served with the model; `which` names it.
 Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
   if (!same_robot(model.cell().robot, cell.robot)) {
-    return refused("{} was trained for another robot than cell {} has", which, cell.name);
+    return refused("{} was trained for another robot than cell {} has", which, cell.name).of("robot");
   }
   if (!same_tools(model, cell)) {
-    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name);
+    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name)
+        .of("tools");
   }
   return {};
 }
@@ -149,8 +151,10 @@ Result<MeasurementBatch> checked_batch(const StoredBatch& stored, const Cell& ce
 
 Status check_released(const StoredBatch& batch) {
   if (batch.quarantine.empty()) return {};
-  return refused("batch {} of cell {} is in quarantine: {}; release it if it is good", batch.id, batch.cell,
-                 batch.quarantine);
+  return refused("batch {} of cell {} is in quarantine: {}", batch.id, batch.cell, batch.quarantine)
+      .of("batch")
+      .with_text(batch.id)
+      .next("release it if it is good");
 }
 
 Trainer::Trainer(std::map<std::string, std::shared_ptr<const Cell>> cells, Store& store, ModelRegistry& registry,
@@ -239,7 +243,9 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   if (!checked) return tl::make_unexpected(checked.error());
   const int poses = static_cast<int>(checked->measurements.size());
   if (poses > options_.max_poses) {
-    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses);
+    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses)
+        .of("poses")
+        .beyond(poses, options_.max_poses);
   }
 
   const std::lock_guard lock(submit_mutex_);
@@ -290,10 +296,12 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
     if (const Status spelled = check_bias_spelling(bias); !spelled) return tl::make_unexpected(spelled.error());
   }
   const bool release = quarantine == Quarantine::kReleased;
-  if (release && batch_ids.empty()) return refused("to release a batch takes its id: which one is good");
+  if (release && batch_ids.empty())
+    return refused("to release a batch takes its id").of("batch").next("say which one is good");
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name);
+  if (stored->empty())
+    return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name).of("batch");
 
   StoredJob job;
   job.cell = cell_name;
@@ -302,7 +310,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   job.bias = bias;
   job.created_at = unix_now();
   const std::set<std::string> wanted(job.batch_ids.begin(), job.batch_ids.end());
-  if (wanted.size() != job.batch_ids.size()) return refused("a batch is named twice; each counts once in a training");
+  if (wanted.size() != job.batch_ids.size())
+    return refused("a batch is named twice").of("batch").next("each counts once in a training");
   std::int64_t poses = 0;
   for (const StoredBatch& batch : *stored) {
     if (!wanted.contains(batch.id)) continue;
@@ -310,7 +319,9 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
     poses += batch.poses;
   }
   if (poses > options_.max_poses) {
-    return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses);
+    return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses)
+        .of("poses")
+        .beyond(poses, options_.max_poses);
   }
 
   const std::lock_guard lock(submit_mutex_);
@@ -357,7 +368,9 @@ Result<int> Trainer::import_model(const std::string& cell_name, const std::strin
   const auto model = deserialize(text, "imported model");
   if (!model) return tl::make_unexpected(model.error());
   if (model->cell().name != cell_name) {
-    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell_name);
+    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell_name)
+        .of("cell")
+        .with_text(model->cell().name);
   }
   const Status fits = check_fits_cell(*model, **cell_found, "imported model " + model->provenance().id);
   if (!fits) return tl::make_unexpected(fits.error());
@@ -401,14 +414,17 @@ int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
 
 Result<std::shared_ptr<const Cell>> Trainer::cell(const std::string& name) const {
   const auto found = cells_.find(name);
-  if (found == cells_.end()) return failure(ErrorCode::kNotFound, "cell {} is not served here", name);
+  if (found == cells_.end())
+    return failure(ErrorCode::kNotFound, "cell {} is not served here", name).of("cell").with_text(name);
   return found->second;
 }
 
 Status Trainer::check_room() const {
   if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}; try again later", queue_->size(),
-                 options_.queue_capacity);
+  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}", queue_->size(), options_.queue_capacity)
+      .of("queue")
+      .beyond(queue_->size(), options_.queue_capacity)
+      .next("try again later");
 }
 
 void Trainer::enqueue(const StoredJob& job) {

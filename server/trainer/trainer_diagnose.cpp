@@ -51,7 +51,8 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
   if (csv.empty()) {
     const auto stored = store_.batches(cell_name);
     if (!stored) return tl::make_unexpected(stored.error());
-    if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name);
+    if (stored->empty())
+      return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name).of("batch");
     job.batch_ids = {batch_id.empty() ? stored->back().id : batch_id};
     if (apply) {
       const auto asked = store_.batch(cell_name, job.batch_ids.front());
@@ -62,7 +63,9 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     const auto sent = batch_to_diagnose(job, {csv, apply, "", ""}, **cell_found);
     if (!sent) return tl::make_unexpected(sent.error());
     if (const auto poses = static_cast<int>(sent->measurements.size()); poses > options_.max_poses) {
-      return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses);
+      return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
+          .of("poses")
+          .beyond(poses, options_.max_poses);
     }
   }
   const std::lock_guard lock(submit_mutex_);
@@ -79,7 +82,7 @@ Result<StoredDiagnosis> Trainer::diagnosis(std::int64_t job) const {
   const auto state = store_.job(job);
   if (!state) return tl::make_unexpected(state.error());
   if (state->state == JobState::kFailed) return refused("job {} failed: {}", job, state->message);
-  return failure(ErrorCode::kBusy, "job {} is not done yet", job);
+  return failure(ErrorCode::kBusy, "job {} is not done yet", job).of("job").with_value(job).next("try again later");
 }
 
 Result<MeasurementBatch> Trainer::batch_to_diagnose(const StoredJob& job, const StoredDiagnosis& asked,
@@ -174,8 +177,10 @@ Result<std::string> Trainer::hold_against_model_in_force(const StoredJob& job, c
   if (const Status kept = store_.set_quarantine(job.cell, stored->id, seen.sentence); !kept) {
     return tl::make_unexpected(kept.error());
   }
-  return refused("batch {} is in quarantine: {}; nothing was learned from it (retrain --release if it is good)",
-                 stored->id, seen.sentence);
+  return refused("batch {} is in quarantine: {}; nothing was learned from it", stored->id, seen.sentence)
+      .of("batch")
+      .with_text(stored->id)
+      .next("retrain --release if it is good");
 }
 
 }  // namespace trammel

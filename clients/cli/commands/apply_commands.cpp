@@ -75,7 +75,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
     if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
-      return refused("{} row {}: {}", list.where, pose.row, sentence(known.error()));
+      return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
     asked.q = pose.context.q;
@@ -95,7 +95,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
       if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
       if (!arguments.orientation) continue;
       const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
-      if (!turned) return refused("{}: {}", arguments.model, sentence(turned.error()));
+      if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
       predictions.turned.push_back(*turned);
     }
   }
@@ -114,8 +114,10 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   std::vector<std::vector<double>> joints;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
-      return refused("{} row {}: tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
-                     list.where, pose.row, pose.context.tool, pose.context.payload, context->tool, context->payload);
+      return refused("tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
+                     pose.context.tool, pose.context.payload, context->tool, context->payload)
+          .in(list.where)
+          .at_row(pose.row);
     }
     joints.push_back(to_wire(pose.context.q, list.joint_types));
   }

@@ -65,7 +65,7 @@ Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& 
   const auto add = [&](const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
     Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
-    if (!text) return refused("{}: {}", path, sentence(text.error()));
+    if (!text) return Failure(text.error()).as(ErrorCode::kRefused).in(path);
     outputs.emplace_back(path, std::move(*text));
     return {};
   };

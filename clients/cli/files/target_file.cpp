@@ -28,11 +28,12 @@ Result<TargetColumns> find_columns(const CsvTable& table) {
   TargetColumns columns{std::move(*commanded), std::move(*pose), table.find("conf")};
   const bool joints = !columns.commanded.joint_types().empty();
   if (columns.pose.empty() && !joints) {
-    return refused("{}: neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...); the header has: {}",
-                   table.where(), fmt::join(table.columns(), ","));
+    return refused("neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...); the header has: {}",
+                   fmt::join(table.columns(), ","))
+        .in(table.where());
   }
   if (!columns.conf && !joints) {
-    return refused("{}: missing column conf, or q1_deg... as the seed of the poses", table.where());
+    return refused("missing column conf, or q1_deg... as the seed of the poses").in(table.where());
   }
   return columns;
 }
@@ -78,7 +79,7 @@ Result<TargetFile> parse_targets_csv(const std::string& text, const std::string&
   if (!table) return tl::make_unexpected(table.error());
   const Result<TargetColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
-  if (table->size() == 0) return refused("{}: no targets below the header, at least 1 is needed", where);
+  if (table->size() == 0) return refused("no targets below the header, at least 1 is needed").in(where);
   TargetFile file{where, columns->commanded.joint_types(), {}, table->columns()};
   for (std::size_t row = 0; row < table->size(); ++row) {
     TargetRow& target = file.rows.emplace_back();
@@ -102,8 +103,10 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;
-    return refused("{} row {}: conf is {}, but robot {} has no spherical wrist to number branches by; give q1_deg...",
-                   file.where, row.row, *row.target.conf, robot.name());
+    return refused("conf is {}, but robot {} has no spherical wrist to number branches by; give q1_deg...",
+                   *row.target.conf, robot.name())
+        .in(file.where)
+        .at_row(row.row);
   }
   return {};
 }

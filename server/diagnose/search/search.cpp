@@ -25,7 +25,7 @@ constexpr int kFewestHarmonics = 4;
 constexpr const char* kOfManyForms = "compliance";
 constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
 
-Error given_up() { return {ErrorCode::kBusy, "diagnosis given up on request"}; }
+Error given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request").value(); }
 
 std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   std::vector<Parameter> priors;

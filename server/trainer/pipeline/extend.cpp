@@ -38,7 +38,7 @@ Result<BatchSplit> split_to_judge(const Cell& cell, const MeasurementBatch& batc
   fill_velocity(*checked);
   BatchSplit split = split_batch(*checked, 0, seed);
   if (split.validation.measurements.empty())
-    return refused("batch {}: no rows are held out to judge an extended model by", batch.id);
+    return refused("no rows are held out to judge an extended model by").in("batch " + batch.id).of("set").beyond(0, 1);
   return split;
 }
 
@@ -46,8 +46,9 @@ Result<BatchSplit> split_to_judge(const Cell& cell, const MeasurementBatch& batc
 
 Status check_can_extend(const Diagnosis& diagnosis) {
   if (diagnosis.sources_after != diagnosis.sources_before) return {};
-  return refused("batch {}: no cause was named that the model could be extended by ({}): {}", diagnosis.batch.id,
-                 to_string(diagnosis.verdict), diagnosis.sentence);
+  return refused("no cause was named that the model could be extended by ({}): {}", to_string(diagnosis.verdict),
+                 diagnosis.sentence)
+      .in("batch " + diagnosis.batch.id);
 }
 
 std::vector<std::string> lasting_sources(const std::vector<std::string>& sources) {

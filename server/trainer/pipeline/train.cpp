@@ -21,7 +21,7 @@ constexpr const char* kProgramVersion = "0.1.0";
 constexpr double kDomainQuantile = 0.995;  // of the training poses, each left out, count as known
 constexpr int kLeastBiasPoses = 10;
 
-Error given_up() { return {ErrorCode::kBusy, "training given up on request"}; }
+Error given_up() { return failure(ErrorCode::kBusy, "training given up on request").value(); }
 
 /// Split, with velocities where the poses are a path and repeats merged where they are none. Held-out rows are not
 /// touched.
@@ -138,8 +138,10 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     return {};
   }
   if (batch.measurements.size() < kLeastBiasPoses) {
-    return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
-                   batch.measurements.size(), kLeastBiasPoses);
+    return refused("{} poses to learn a bias from, at least {} are needed", batch.measurements.size(), kLeastBiasPoses)
+        .in("batch " + batch.id)
+        .beyond(batch.measurements.size(), kLeastBiasPoses)
+        .next("measure more, or say bias: none");
   }
   if (!progress(0)) return tl::make_unexpected(given_up());
   BiasOptions options;
@@ -297,7 +299,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const Measureme
       check_orientations(*checked, options.from ? with_known_tools(*cell, *options.from, options.refit) : *cell);
   if (!oriented) return tl::make_unexpected(oriented.error());
   const BatchSplit split = prepared(*checked, cell->tracker.sigma, options);
-  if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
+  if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id).beyond(0, 1);
 
   if (!report("calibrating", 0.0)) return tl::make_unexpected(given_up());
   if (options.from) {
@@ -337,7 +339,7 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Me
   const Cell& cell = calibrated.cell();
   const Result<MeasurementBatch> checked = check_against_cell(batch, cell);
   if (!checked) return tl::make_unexpected(checked.error());
-  if (checked->measurements.empty()) return refused("batch {}: no rows to train on", batch.id);
+  if (checked->measurements.empty()) return refused("no rows to train on").in("batch " + batch.id).beyond(0, 1);
   if (const Status oriented = check_orientations(*checked, cell); !oriented)
     return tl::make_unexpected(oriented.error());
   CompensatedModel::Parts parts = calibrated.parts();
