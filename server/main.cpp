@@ -8,9 +8,9 @@
 #include <chrono>
 #include <cstdio>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/base/mutex.h"
 #include "server/config/server_config.h"
@@ -48,11 +48,17 @@ int exit_code(const Error& error) {
   }
 }
 
-/// Each line of the message is a problem of its own.
+/// A line each of all that is wrong.
 int refuse(const Error& error) {
-  std::istringstream lines(error.message);
-  for (std::string line; std::getline(lines, line);) fmt::print(stderr, "trammeld: {}\n", line);
+  for (const Error& one : apart(error)) fmt::print(stderr, "trammeld: {}\n", sentence(one));
   return exit_code(error);
+}
+
+/// A start that would fail, of whatever kind its problems are.
+int refuse_start(std::vector<Error> problems) {
+  Error all = together(std::move(problems));
+  all.code = ErrorCode::kRefused;
+  return refuse(all);
 }
 
 /// What a start would find.
@@ -69,7 +75,7 @@ Status start_log(const LogOptions& options) {
     spdlog::set_default_logger(options.file.empty() ? spdlog::stderr_color_mt("trammeld")
                                                     : spdlog::basic_logger_mt("trammeld", options.file));
   } catch (const spdlog::spdlog_ex& error) {
-    return refused("log: {}", error.what());
+    return refused("{}", error.what()).under("log: file");
   }
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);

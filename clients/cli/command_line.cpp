@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/output.h"
 
 namespace trammel::cli {
 
@@ -32,6 +33,16 @@ int exit_code(ErrorCode code) {
   return kRefusedData;
 }
 
+namespace {
+
+/// Where a command was asked to write its result for programs; empty where it was not.
+std::string json_path_of(const CLI::App& command) {
+  const CLI::Option* option = command.get_option_no_throw("--json");
+  return option == nullptr || option->empty() ? std::string() : option->as<std::string>();
+}
+
+}  // namespace
+
 int run_command_line(int argc, const char* const* argv) {
   CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
   app.set_version_flag("--version", TRAMMEL_VERSION);
@@ -60,10 +71,13 @@ int run_command_line(int argc, const char* const* argv) {
     fmt::print(stderr, "A command is required\n{}", app.help());
     return kWrongUsage;
   }
-  const std::string command = app.get_subcommands().front()->get_name();
+  const CLI::App& command = *app.get_subcommands().front();
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  fmt::print(stderr, "trammel {}: {}\n", command, sentence(done.error()));
+  for (const Error& one : apart(done.error())) {
+    fmt::print(stderr, "trammel {}: {}\n", command.get_name(), sentence(one));
+  }
+  tell_refusal(done.error(), json_path_of(command));
   return exit_code(done.error().code);
 }
 

@@ -140,7 +140,8 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   std::istringstream words(level);
   for (std::string word; std::getline(words, word, ',');) {
     word.erase(std::remove(word.begin(), word.end(), ' '), word.end());
-    if (word.empty()) return failure(ErrorCode::kUsage, "level '{}': an empty entry", level);
+    if (word.empty())
+      return failure(ErrorCode::kUsage, "level '{}': an empty entry", level).of("level").with_text(level);
     if (word == "M0") continue;
     if (word == "M1" || word == "M2" || word == "M3") {
       names.emplace_back("base");
@@ -150,9 +151,10 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
       names.push_back(word);
     }
   }
-  if (level.empty()) return failure(ErrorCode::kUsage, "an empty level; expected M0, M1, M2, M3 or error sources");
+  if (level.empty())
+    return failure(ErrorCode::kUsage, "an empty level").of("level").next("expected M0, M1, M2, M3 or error sources");
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
-    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level);
+    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level).of("level").with_text(level);
   }
   return names;
 }

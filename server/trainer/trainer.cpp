@@ -22,10 +22,11 @@ constexpr std::size_t kMaxBatchId = 128;  // bytes
 constexpr int kJobsListed = 20;           // of those done and of those failed, the last ones
 
 Status check_batch_id(const std::string& id) {
-  if (id.empty()) return refused("a batch needs an id");
-  if (id.size() > kMaxBatchId) return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId);
+  if (id.empty()) return refused("a batch needs an id").of("batch");
+  if (id.size() > kMaxBatchId)
+    return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId).of("batch").beyond(id.size(), kMaxBatchId);
   const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!printable) return refused("batch id {:?} has control characters", id);
+  if (!printable) return refused("batch id {:?} has control characters", id).of("batch").with_text(id);
   return {};
 }
 
@@ -284,8 +285,10 @@ int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
 
 Status Trainer::check_room() const {
   if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}; try again later", queue_->size(),
-                 options_.queue_capacity);
+  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}", queue_->size(), options_.queue_capacity)
+      .of("queue")
+      .beyond(queue_->size(), options_.queue_capacity)
+      .next("try again later");
 }
 
 void Trainer::enqueue(const StoredJob& job, std::optional<CheckedBatch> batch) {

@@ -45,7 +45,8 @@ Result<std::string> ask_in_parts(const std::vector<Item>& items, client::CallCon
     Result<client::Answer<Answered>> answer = ask(context, std::vector<Item>(first, first + count));
     if (!answer) return tl::make_unexpected(answer.error());
     if (answer->items.size() != static_cast<std::size_t>(count)) {
-      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count);
+      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count)
+          .beyond(answer->items.size(), count);
     }
     if (from == 0) {
       model_id = answer->model.id;
@@ -76,7 +77,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
     if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
-      return refused("{} row {}: {}", list.where, pose.row, sentence(known.error()));
+      return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
     asked.q = pose.context.q;
@@ -96,7 +97,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
       if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
       if (!arguments.orientation) continue;
       const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
-      if (!turned) return refused("{}: {}", arguments.model, sentence(turned.error()));
+      if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
       predictions.turned.push_back(*turned);
     }
   }
@@ -105,9 +106,13 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
   if (arguments.covariance)
-    return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
+    return failure(ErrorCode::kUsage, "--covariance needs a model file")
+        .of("--covariance")
+        .next("a service does not send covariances");
   if (arguments.orientation)
-    return failure(ErrorCode::kUsage, "--orientation needs a model file: a service does not send these deviations");
+    return failure(ErrorCode::kUsage, "--orientation needs a model file")
+        .of("--orientation")
+        .next("a service does not send these deviations");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
@@ -115,8 +120,13 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   std::vector<std::vector<double>> joints;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
-      return refused("{} row {}: tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
-                     list.where, pose.row, pose.context.tool, pose.context.payload, context->tool, context->payload);
+      return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
+                     context->tool, context->payload)
+          .in(list.where)
+          .at_row(pose.row)
+          .of("tool_id")
+          .with_text(pose.context.tool)
+          .next("a service is asked for one of each");
     }
     joints.push_back(to_wire(pose.context.q, list.joint_types));
   }
@@ -188,7 +198,10 @@ struct CorrectArguments : ApplyArguments {
 
 Result<Extent> correct(const CorrectArguments& arguments) {
   if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
-    return failure(ErrorCode::kUsage, "{}: unknown kind of targets '{}'; known: .csv", arguments.input, ending);
+    return failure(ErrorCode::kUsage, "unknown kind of targets '{}'", ending)
+        .in(arguments.input)
+        .with_text(ending)
+        .next("known: .csv");
   }
   const Result<TargetFile> file = read_targets_csv(arguments.input);
   if (!file) return tl::make_unexpected(file.error());

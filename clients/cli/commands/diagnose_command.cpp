@@ -76,8 +76,8 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBa
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
   if (!extension->gain.beyond_chance()) {
-    return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
-                   to_string(extension->gain));
+    return refused("cell {}: with what was found {}", cell->name, to_string(extension->gain))
+        .next("cell file and model were not written");
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
@@ -94,7 +94,7 @@ Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
-  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
+  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);

@@ -67,7 +67,7 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
 
 Status convert(const ConvertArguments& arguments) {
   if (!arguments.points.empty() && arguments.joints.empty()) {
-    return failure(ErrorCode::kUsage, "--points needs --joints: the plan that was measured");
+    return failure(ErrorCode::kUsage, "--points needs --joints").of("--joints").next("name the plan that was measured");
   }
   Result<Converted> converted = read_converted(arguments);
   if (!converted) return tl::make_unexpected(converted.error());
@@ -148,8 +148,11 @@ ordered_json references_json(const ReferenceCheck& check) {
 Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck& check) {
   if (arguments.batch.empty()) return {};
   if (!check.rigid) {
-    return refused("{}: not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is reflector {}",
-                   arguments.batch, to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst);
+    return refused("not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is reflector {}",
+                   to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst)
+        .in(arguments.batch)
+        .beyond(to_mm(check.rms_remaining), arguments.repeat_above_mm)
+        .with_text(check.worst);
   }
   return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
     const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
@@ -159,7 +162,8 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
 
 Status check_reflectors(const ReferencesArguments& arguments) {
   if (arguments.batch.empty() != arguments.output.empty()) {
-    return failure(ErrorCode::kUsage, "--batch and --output belong together");
+    return failure(ErrorCode::kUsage, "--batch and --output belong together")
+        .of(arguments.batch.empty() ? "--batch" : "--output");
   }
   const Result<PointList> nominal = read_points(arguments.nominal);
   if (!nominal) return tl::make_unexpected(nominal.error());

@@ -32,7 +32,9 @@ Status read_criterion(const std::string& text, PlanOptions& options) {
   }
   const std::size_t comma = text.find(',');
   if (!text.starts_with(separate) || comma == std::string::npos) {
-    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text);
+    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text)
+        .of("--criterion")
+        .with_text(text);
   }
   options.criterion = PlanCriterion::kSeparation;
   options.cause = text.substr(separate.size(), comma - separate.size());
@@ -65,7 +67,7 @@ Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& 
   const auto add = [&](const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
     Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
-    if (!text) return refused("{}: {}", path, sentence(text.error()));
+    if (!text) return Failure(text.error()).as(ErrorCode::kRefused).in(path);
     outputs.emplace_back(path, std::move(*text));
     return {};
   };
@@ -151,7 +153,7 @@ Result<Plan> plan_from(const Cell& cell, const std::string& path) {
 
 Status plan(PlanArguments arguments) {
   if (arguments.options.count == 0 && arguments.from.empty()) {
-    return failure(ErrorCode::kUsage, "--count or --from is required");
+    return failure(ErrorCode::kUsage, "--count or --from is required").of("--count");
   }
   if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
   arguments.options.orientation = !arguments.positions_only;

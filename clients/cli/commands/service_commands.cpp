@@ -46,7 +46,10 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
   }
   const std::string next = next_step(*end);
   if (end->stage == "failed") {
-    return refused("job {} of cell {} failed: {}{}{}", end->job, end->cell, end->what, next.empty() ? "" : "\n", next);
+    return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what)
+        .of("job")
+        .with_value(end->job)
+        .next(next);
   }
   std::string text = fmt::format("job {} of cell {} {}", end->job, end->cell, end->stage);
   if (end->model_version > 0) {
@@ -80,7 +83,7 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   if (arguments.release && arguments.batch_ids.empty()) {
-    return failure(ErrorCode::kUsage, "--release needs --batch: which one is good");
+    return failure(ErrorCode::kUsage, "--release needs --batch").of("--batch").next("say which one is good");
   }
   const Result<std::int64_t> job =
       arguments.release ? session.release_and_train(*cell, arguments.batch_ids, arguments.level, arguments.bias)
@@ -134,7 +137,9 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   if (model->version == 0) {
-    return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model);
+    return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model)
+        .of("--model")
+        .with_text(arguments.model);
   }
   return now_in_force(model->cell, session.activate(model->cell, model->version), arguments);
 }

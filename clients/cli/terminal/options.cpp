@@ -75,12 +75,17 @@ Result<ModelReference> parse_model_reference(const std::string& text) {
   ModelReference reference;
   const std::size_t at = text.find('@');
   reference.cell = text.substr(0, at);
-  if (reference.cell.empty()) return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text);
+  if (reference.cell.empty())
+    return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text)
+        .of("--model")
+        .with_text(text);
   if (at == std::string::npos) return reference;
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + at + 1, end, reference.version);
   if (error != std::errc() || stop != end || reference.version < 1) {
-    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text);
+    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text)
+        .of("--model")
+        .with_text(text);
   }
   return reference;
 }

@@ -36,8 +36,9 @@ Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const 
 
 Status check_can_extend(const Diagnosis& diagnosis) {
   if (diagnosis.sources_after != diagnosis.sources_before) return {};
-  return refused("batch {}: no cause was named that the model could be extended by ({}): {}", diagnosis.batch.id,
-                 to_string(diagnosis.verdict), diagnosis.sentence);
+  return refused("no cause was named that the model could be extended by ({}): {}", to_string(diagnosis.verdict),
+                 diagnosis.sentence)
+      .in("batch " + diagnosis.batch.id);
 }
 
 std::vector<std::string> added_sources(const std::vector<std::string>& own, const Diagnosis& diagnosis) {
