@@ -68,10 +68,7 @@ Result<CompensatedModel> checked_model(const Members& members, const std::string
   const Status possible = model_file::check_parts(*parts);
   Result<CompensatedModel> model =
       possible ? CompensatedModel::make(std::move(*parts)) : tl::make_unexpected(possible.error());
-  return std::move(model).map_error([&](Error error) {
-    error.message = where + ": " + error.message;
-    return error;
-  });
+  return std::move(model).map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
 }  // namespace

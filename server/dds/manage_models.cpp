@@ -152,7 +152,8 @@ Result<wire::ManageModelsReply> Handlers::exported(const std::string& cell, int 
   reply.text(serialize(*model));
   if (reply.text().size() <= kMaxText) return reply;
   return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version, reply.text().size(),
-                 kMaxText);
+                 kMaxText)
+      .beyond(reply.text().size(), kMaxText);
 }
 
 Result<wire::ManageModelsReply> Handlers::jobs_of(const std::string& cell) const {

@@ -34,8 +34,10 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
   const std::size_t poses = merged.batch.measurements.size();
   if (poses < kFewestPoses) {
     const std::size_t held_out = prepared.validation.measurements.size();
-    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id(), poses,
-                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses);
+    return refused("{} poses to diagnose{}, at least {}", poses,
+                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses)
+        .in("batch " + batch.id())
+        .beyond(poses, kFewestPoses);
   }
   prepared.train = std::move(merged.batch);
   prepared.repeats = merged.statistics;
