@@ -224,7 +224,11 @@ ModelProvenance provenance_from(const Json& json, const Json& stamp) {
 
 Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std::string& where) {
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
-  if (!cell) return tl::make_unexpected(cell.error());
+  if (!cell) {
+    Error damaged = cell.error();
+    damaged.row.reset();  // of a text inside the file
+    return Failure(std::move(damaged));
+  }
   Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
   if (!physics) return Failure(physics.error()).as(ErrorCode::kRefused).in(where);
   ModelParts parts;
