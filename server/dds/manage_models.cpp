@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "idl/limits.h"
+#include "idl/manage_text.h"
 #include "server/base/check.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -130,7 +131,7 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
       return reply;
     }
     case wire::MANAGE_IMPORT: {
-      const auto version = trainer_.import_model(cell, request.text());
+      const auto version = trainer_.import_model(cell, wire::imported_model(request));
       if (!version) return tl::make_unexpected(version.error());
       reply.version(*version);
       return reply;
@@ -138,12 +139,12 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
     case wire::MANAGE_QUARANTINE:
       return quarantine_of(cell);
     case wire::MANAGE_RELEASE: {
-      const Status released = trainer_.release(cell, request.text());
+      const Status released = trainer_.release(cell, wire::released_batch(request));
       if (!released) return tl::make_unexpected(released.error());
       return reply;
     }
     case wire::MANAGE_RELEASE_AND_TRAIN:
-      return release_and_train(cell, request.text());
+      return release_and_train(cell, wire::released_training(request));
     case wire::MANAGE_JOBS:
       return jobs_of(cell);
     case wire::MANAGE_JOB:
