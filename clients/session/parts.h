@@ -57,7 +57,7 @@ template <typename Item>
       const PartSize::Seconds begun = now();
       auto part = ask(done, count);
       if (!part && (done == 0 || part.error().code == ErrorCode::kUnreachable)) return part;
-      if (!part) return failure(part.error().code, "after the first {}: {}", done, sentence(part.error()));
+      if (!part) return Failure(part.error()).in(fmt::format("after the first {}", done));
       size.took(count, now() - begun);
       one_model = done == 0 || (part->model.hash == answer.model.hash && part->model.version == answer.model.version);
       if (done == 0) answer.model = part->model;

@@ -56,6 +56,12 @@ class Handlers {
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
 
  private:
+  [[nodiscard]] Result<wire::ManageModelsReply> answer_of_cell(const std::string& cell,
+                                                               const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<wire::ManageModelsReply> job_of(std::int64_t job) const;
+  [[nodiscard]] Result<wire::ManageModelsReply> models_of(const std::string& cell) const;
+  /// The text of a version's model file; of the one in force for version 0.
+  [[nodiscard]] Result<wire::ManageModelsReply> exported(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ManageModelsReply> release_and_train(const std::string& cell, const std::string& text);

@@ -10,6 +10,9 @@
 /// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
 namespace trammel {
 
+/// The smallest p-value that is given: no tail of a few hundred draws or permutations is known further.
+inline constexpr double kLeastPValue = 1e-6;
+
 /// One physical cause, named as the contract spells it.
 struct Cause {
   std::string cause;            ///< `gear_transmission`, `tool`, `outlier`, ...
@@ -51,7 +54,7 @@ struct Finding {
   ErrorFigures held_out_after;       ///< with it
   double held_out_gain = 0;          ///< m: rms before - after
   double strength = 0;               ///< lambda: whitened effect that nothing else in the model explains, squared
-  double p_value = 1;                ///< of the best of all candidates, under the null
+  double p_value = 1;                ///< chance that the best of all candidates scores as much with nothing to find
   double naming_frequency = 1;       ///< share of bootstrap repetitions that name this cause
   std::vector<Cause> could_also_be;  ///< explain it as well; empty: named
   std::string action;                ///< for the shop floor

@@ -216,7 +216,7 @@ Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const 
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;
-    poisoned.sentence = *doubt;
+    poisoned.sentence = sentence(*doubt);
     return poisoned;
   }
   if (batch.measurements.size() < kFewestPoses) {

@@ -1,6 +1,7 @@
 #include "server/report/diagnosis_page.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "server/base/units.h"
 #include "server/diagnose/tell/wording.h"
@@ -8,22 +9,20 @@
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
+#include "server/report/shown_value.h"
 
 namespace trammel {
 
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
-constexpr double kDepends = 0.01;  // a p-value below it
+constexpr double kDepends = 0.01;  // p-value below which the table says yes: 1 of 100 batches by chance
 
 std::string micrometres(double m) { return fmt::format("{:.3g}\u00a0µm", m * 1e6); }
 std::string millimetres(double m) { return fmt::format("{:.4f}", to_mm(m)); }
 
 /// A table that scrolls by itself where the page is narrow.
-std::string table(const char* kind, const std::vector<std::string>& head, const std::string& rows) {
-  return fmt::format("<div class=\"wide\"><table class=\"{}\">\n{}{}</table></div>\n", kind, html_row(head, "th"),
-                     rows);
-}
+std::string table(const HtmlTable& table) { return "<div class=\"wide\">" + html_table(table) + "</div>\n"; }
 
 std::string paragraph(const std::string& text) { return "<p>" + html_text(text) + "</p>\n"; }
 
@@ -56,13 +55,9 @@ std::string unit_shown(const std::string& unit) {
   return unit == "um" ? "µm" : unit;
 }
 
-/// What is smaller says no more: no test here is that exact.
-std::string p_value_shown(double p) {
-  constexpr double kLeast = 1e-6;
-  return p <= kLeast ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p);
-}
+std::string p_value_shown(double p) { return p <= kLeastPValue ? "<\u00a010⁻⁶" : fmt::format("{:.2g}", p); }
 
-/// Behind the letter: " = 0.02", or that it is smaller than anything that can be told.
+/// What stands behind the letter p: " = 0.02" or " < 10⁻⁶".
 std::string p_value_after_p(double p) {
   const std::string shown = p_value_shown(p);
   return (shown.front() == '<' ? " " : " = ") + html_text(shown);
@@ -89,29 +84,38 @@ std::string beginning_of(const Finding& finding) {
                      place(places.front()), place(places.back()));
 }
 
-std::string finding_rows(const Finding& finding) {
+HtmlRow finding_row(const Finding& finding) {
   const std::string others = causes_in_words(finding.could_also_be);
-  const std::string row =
-      html_row({"<b>" + html_text(cause_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
+  return {
+      .cells = {"<b>" + html_text(cause_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
                 estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
                 millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
                 fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
-                others.empty() ? "nothing" : "<span class=\"doubt\">" + html_text(others) + "</span>"});
-  return "<tr class=\"found\">" + row.substr(4) +
-         fmt::format(
-             "<tr class=\"action\"><td></td><td></td><td colspan=\"6\">{} Named by {:.0f}\u00a0% of the "
-             "repetitions.</td></tr>\n",
-             html_text(as_sentence(finding.action) + beginning_of(finding)), 100 * finding.naming_frequency);
+                others.empty() ? "nothing" : "<span class=\"doubt\">" + html_text(others) + "</span>"},
+      .kind = "found"};
+}
+
+/// What to do about it, below its figures.
+HtmlRow action_row(const Finding& finding) {
+  return {.cells = {"", "",
+                    fmt::format("{} Named by {:.0f}\u00a0% of the repetitions.",
+                                html_text(as_sentence(finding.action) + beginning_of(finding)),
+                                100 * finding.naming_frequency)},
+          .kind = "action",
+          .last_spans = 6};
 }
 
 std::string findings_text(const Diagnosis& diagnosis) {
   if (diagnosis.findings.empty()) return "<p>None: no known cause passed.</p>\n";
-  std::string rows;
-  for (const Finding& finding : diagnosis.findings) rows += finding_rows(finding);
-  return table("findings",
-               {"cause", "joint", "parameter ± U (k = 2)", "effect, µm rms", "held-out rms, mm", "strength λ", "p",
-                "could also be"},
-               rows);
+  std::vector<HtmlRow> rows;
+  for (const Finding& finding : diagnosis.findings) {
+    rows.push_back(finding_row(finding));
+    rows.push_back(action_row(finding));
+  }
+  return table({"findings",
+                {"cause", "joint", "parameter ± U (k = 2)", "effect, µm rms", "held-out rms, mm", "strength λ", "p",
+                 "could also be"},
+                rows});
 }
 
 std::string tile(const char* kind, const std::string& value, const char* name) {
@@ -129,21 +133,22 @@ std::string tiles(const Diagnosis& diagnosis) {
               noise_name(diagnosis.noise, diagnosis.instrument).c_str());
 }
 
-std::string figures_row(const char* name, const ErrorFigures& figures) {
-  return html_row(
-      {name, millimetres(figures.rms), millimetres(figures.mean), millimetres(figures.p997), millimetres(figures.max)});
+HtmlRow figures_row(const char* name, const ErrorFigures& figures) {
+  return {
+      {name, millimetres(figures.rms), millimetres(figures.mean), millimetres(figures.p997), millimetres(figures.max)}};
 }
 
 std::string figures_table(const Diagnosis& diagnosis) {
-  std::string rows =
-      figures_row("all poses, before", diagnosis.before) + figures_row("all poses, after", diagnosis.after);
-  if (diagnosis.held_out_before) rows += figures_row("held out, before", *diagnosis.held_out_before);
-  if (diagnosis.held_out_after) rows += figures_row("held out, after", *diagnosis.held_out_after);
-  if (diagnosis.held_out_before_without && diagnosis.held_out_after_without) {
-    rows += figures_row("held out but for those that fit neither, before", *diagnosis.held_out_before_without) +
-            figures_row("held out but for those that fit neither, after", *diagnosis.held_out_after_without);
-  }
-  return table("figures", {"mm", "rms", "mean", "99.7 %", "max"}, rows) +
+  std::vector<HtmlRow> rows = {figures_row("all poses, before", diagnosis.before),
+                               figures_row("all poses, after", diagnosis.after)};
+  const auto add = [&](const char* name, const std::optional<ErrorFigures>& figures) {
+    if (figures) rows.push_back(figures_row(name, *figures));
+  };
+  add("held out, before", diagnosis.held_out_before);
+  add("held out, after", diagnosis.held_out_after);
+  add("held out but for those that fit neither, before", diagnosis.held_out_before_without);
+  add("held out but for those that fit neither, after", diagnosis.held_out_after_without);
+  return table({"figures", {"mm", "rms", "mean", "99.7 %", "max"}, rows}) +
          (diagnosis.held_out_how.empty() ? "" : paragraph("Held out: " + diagnosis.held_out_how + "."));
 }
 
@@ -158,23 +163,23 @@ std::string unexplained_text(const Diagnosis& diagnosis) {
 
 std::string leftover_text(const Diagnosis& diagnosis) {
   if (diagnosis.leftover.empty()) return "<p>What is left was not tested against anything.</p>\n";
-  std::string rows;
+  std::vector<HtmlRow> rows;
   for (const Dependence& one : diagnosis.leftover) {
-    const bool depends = one.p_value < kDepends;
-    const std::string row = html_row({depends ? "yes" : "no", one.of_size ? "its size" : "the residual",
-                                      html_text(one.on), p_value_shown(one.p_value)});
-    rows += fmt::format("<tr class=\"{}\">", depends ? "yes" : "no") + row.substr(4);
+    const char* depends = one.p_value < kDepends ? "yes" : "no";
+    rows.push_back(
+        {.cells = {depends, one.of_size ? "its size" : "the residual", html_text(one.on), p_value_shown(one.p_value)},
+         .kind = depends});
   }
-  return table("leftover", {"depends", "what of it", "on", "p (Holm)"}, rows);
+  return table({"leftover", {"depends", "what of it", "on", "p (Holm)"}, rows});
 }
 
 std::string not_separable_text(const Diagnosis& diagnosis) {
   if (diagnosis.not_separable.empty()) return "<p>These poses tell all causes that were looked for apart.</p>\n";
-  std::string rows;
+  std::vector<HtmlRow> rows;
   for (const Inseparable& group : diagnosis.not_separable) {
-    rows += html_row({html_text(causes_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)});
+    rows.push_back({{html_text(causes_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
   }
-  return table("confusion", {"look the same at these poses", "canonical correlation"}, rows);
+  return table({"confusion", {"look the same at these poses", "canonical correlation"}, rows});
 }
 
 JointType type_of(const Cell& cell, Eigen::Index joint) { return cell.robot.joint(static_cast<int>(joint)).type; }
@@ -184,16 +189,15 @@ std::string next_poses_table(const std::vector<JointVector>& poses, const Cell& 
   for (Eigen::Index j = 0; j < poses.front().size(); ++j) {
     head.push_back(fmt::format("q{}, {}", j + 1, type_of(cell, j) == JointType::kRevolute ? "°" : "mm"));
   }
-  std::string rows;
-  int number = 0;
+  std::vector<HtmlRow> rows;
   for (const JointVector& q : poses) {
-    std::vector<std::string> cells = {fmt::format("n{}", ++number)};
+    std::vector<std::string> cells = {fmt::format("n{}", rows.size() + 1)};
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       cells.push_back(fmt::format("{:.2f}", joint_to_column(q(j), type_of(cell, j))));
     }
-    rows += html_row(cells);
+    rows.push_back({cells});
   }
-  return table("poses", head, rows);
+  return table({"poses", head, rows});
 }
 
 std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
@@ -214,25 +218,34 @@ std::string limits_list(const std::vector<std::string>& limits) {
   return html + "</ul>\n";
 }
 
-/// Causes and what they need: a row for all the joints of which the same is to be said.
-std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) {
-  std::vector<std::pair<const Unseen*, std::string>> lines;
+/// One row for all joints of which the same is to be said.
+struct Need {
+  const Unseen* one = nullptr;
+  std::string joints;
+};
+
+std::vector<Need> needs_of(const std::vector<Unseen>& unseen) {
+  std::vector<Need> needs;
   for (const Unseen& one : unseen) {
-    const auto same = std::find_if(lines.begin(), lines.end(), [&](const auto& line) {
-      return line.first->cause.cause == one.cause.cause && line.first->needs == one.needs;
+    const auto same = std::find_if(needs.begin(), needs.end(), [&](const Need& need) {
+      return need.one->cause.cause == one.cause.cause && need.one->needs == one.needs;
     });
-    if (same == lines.end()) {
-      lines.emplace_back(&one, where_of(one.cause));
+    if (same == needs.end()) {
+      needs.push_back({&one, where_of(one.cause)});
     } else {
-      same->second += ", " + where_of(one.cause);
+      same->joints += ", " + where_of(one.cause);
     }
   }
-  std::string rows;
-  for (const auto& [one, joints] : lines) {
-    rows += html_row({html_text(cause_in_words(one->cause)), html_text(joints), html_text(one->needs)});
+  return needs;
+}
+
+std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) {
+  if (unseen.empty()) return "";
+  std::vector<HtmlRow> rows;
+  for (const Need& need : needs_of(unseen)) {
+    rows.push_back({{html_text(cause_in_words(need.one->cause)), html_text(need.joints), html_text(need.one->needs)}});
   }
-  if (rows.empty()) return "";
-  return fmt::format("<h3>{}</h3>\n", heading) + table("never", {"cause", "joint", "it needs"}, rows);
+  return fmt::format("<h3>{}</h3>\n", heading) + table({"never", {"cause", "joint", "it needs"}, rows});
 }
 
 std::string never_tables(const Diagnosis& diagnosis) {
@@ -245,20 +258,22 @@ std::string never_tables(const Diagnosis& diagnosis) {
          needs_table("Would not have been named for certain: looked for by the order of the poses", never_for_certain);
 }
 
+HtmlRow smallest_row(const Unseen& one) {
+  return {{html_text(cause_in_words(one.cause)), html_text(where_of(one.cause)),
+           fmt::format("{:.3g}", *one.detectable * 1e6),
+           one.identifiable ? fmt::format("{:.3g}", *one.identifiable * 1e6) : "never",
+           fmt::format("{:.0f}\u00a0%", 100 * one.outside), html_text(one.needs)}};
+}
+
 std::string smallest_table(std::vector<Unseen> unseen) {
   std::erase_if(unseen, [](const Unseen& one) { return !one.detectable; });
+  if (unseen.empty()) return "";
   std::stable_sort(unseen.begin(), unseen.end(),
                    [](const Unseen& a, const Unseen& b) { return *a.detectable > *b.detectable; });
-  std::string rows;
-  for (const Unseen& one : unseen) {
-    rows += html_row({html_text(cause_in_words(one.cause)), html_text(where_of(one.cause)),
-                      fmt::format("{:.3g}", *one.detectable * 1e6),
-                      one.identifiable ? fmt::format("{:.3g}", *one.identifiable * 1e6) : "never",
-                      fmt::format("{:.0f}\u00a0%", 100 * one.outside), html_text(one.needs)});
-  }
-  if (rows.empty()) return "";
+  std::vector<HtmlRow> rows;
+  std::transform(unseen.begin(), unseen.end(), std::back_inserter(rows), smallest_row);
   return "<h3>Would have shown from this size on</h3>\n<div class=\"tall\">" +
-         table("unseen", {"cause", "joint", "noticed, µm rms", "named, µm rms", "its own share", "it needs"}, rows) +
+         table({"unseen", {"cause", "joint", "noticed, µm rms", "named, µm rms", "its own share", "it needs"}, rows}) +
          "</div>\n";
 }
 
@@ -270,35 +285,31 @@ std::string unseen_text(const Diagnosis& diagnosis) {
 
 std::string suspects_text(const Diagnosis& diagnosis) {
   if (diagnosis.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
-  std::string rows;
+  std::vector<HtmlRow> rows;
   for (const SuspectedPose& pose : diagnosis.suspects) {
-    rows += html_row({html_text(pose.pose_id), fmt::format("{}", pose.row), fmt::format("{:.3g}", pose.distance * 1e6),
-                      html_text(pose.reason)});
+    rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row), fmt::format("{:.3g}", pose.distance * 1e6),
+                     html_text(pose.reason)}});
   }
-  return table("suspects", {"pose", "row", "off by, µm", "why"}, rows);
+  return table({"suspects", {"pose", "row", "off by, µm", "why"}, rows});
 }
 
-std::string provenance_table(const Diagnosis& diagnosis, const Cell& cell) {
-  const auto line = [](const std::string& name, const std::string& value) {
-    return html_row({name, html_text(value)});
+std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
+  std::vector<HtmlRow> rows;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    rows.push_back({{name, html_text(value)}});
   };
-  return line("cell", cell.name) + line("robot", cell.robot.name()) + line("cell hash (SHA-256)", diagnosis.cell_hash) +
-         line("batch", diagnosis.batch.id) + line("batch hash (SHA-256)", diagnosis.batch_hash) +
-         line("poses", fmt::format("{} used, {} listed above", diagnosis.poses, diagnosis.suspects.size())) +
-         line(noise_name(diagnosis.noise, diagnosis.instrument) + ", per axis",
-              fmt::format("{} ({})", micrometres(diagnosis.noise), diagnosis.noise_from)) +
-         line("error sources before", fmt::format("{}", fmt::join(diagnosis.sources_before, ", "))) +
-         line("error sources after", fmt::format("{}", fmt::join(diagnosis.sources_after, ", "))) +
-         line("made by", fmt::format("trammel {}, seed {}", kProgramVersion, diagnosis.seed));
-}
-
-/// For the charts. `<` is escaped so that no text can end the script that holds it.
-std::string chart_data(const Diagnosis& diagnosis, const Cell& cell) {
-  std::string text =
-      diagnosis_charts(diagnosis, cell).dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
-  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
-    text.replace(at, 1, "\\u003c");
-  return text;
+  add("cell", cell.name);
+  add("robot", cell.robot.name());
+  add("cell hash (SHA-256)", diagnosis.cell_hash);
+  add("batch", diagnosis.batch.id);
+  add("batch hash (SHA-256)", diagnosis.batch_hash);
+  add("poses", fmt::format("{} used, {} listed above", diagnosis.poses, diagnosis.suspects.size()));
+  add(noise_name(diagnosis.noise, diagnosis.instrument) + ", per axis",
+      fmt::format("{} ({})", micrometres(diagnosis.noise), diagnosis.noise_from));
+  add("error sources before", fmt::format("{}", fmt::join(diagnosis.sources_before, ", ")));
+  add("error sources after", fmt::format("{}", fmt::join(diagnosis.sources_after, ", ")));
+  add("made by", fmt::format("trammel {}, seed {}", kProgramVersion, diagnosis.seed));
+  return html_rows(rows);
 }
 
 }  // namespace
@@ -318,8 +329,8 @@ std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
                   {"unseen", unseen_text(diagnosis)},
                   {"suspects", suspects_text(diagnosis)},
                   {"leftover", leftover_text(diagnosis)},
-                  {"provenance", provenance_table(diagnosis, cell)},
-                  {"data", chart_data(diagnosis, cell)},
+                  {"provenance", provenance_rows(diagnosis, cell)},
+                  {"data", script_json(diagnosis_charts(diagnosis, cell))},
                   {"chart_js", std::string(embedded::chart_js)}});
 }
 

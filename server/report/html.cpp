@@ -1,41 +1,67 @@
 #include "server/report/html.h"
 
 #include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
+#include <fmt/ranges.h>
 
 #include "server/base/check.h"
 
 namespace trammel {
 
+namespace {
+
+/// A character as HTML spells it.
+std::string escaped(char c) {
+  switch (c) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    default:
+      return {c};
+  }
+}
+
+std::string class_of(const std::string& kind) { return kind.empty() ? "" : fmt::format(" class=\"{}\"", kind); }
+
+}  // namespace
+
 std::string html_text(std::string_view text) {
   std::string html;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '>':
-        html += "&gt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      default:
-        html += c;
+  for (const char c : text) html += escaped(c);
+  return html;
+}
+
+std::string html_rows(const std::vector<HtmlRow>& rows) {
+  std::string html;
+  for (const HtmlRow& row : rows) {
+    html += fmt::format("<tr{}>", class_of(row.kind));
+    for (std::size_t k = 0; k < row.cells.size(); ++k) {
+      const bool spans = row.last_spans > 1 && k + 1 == row.cells.size();
+      html += fmt::format("<td{}>{}</td>", spans ? fmt::format(" colspan=\"{}\"", row.last_spans) : "", row.cells[k]);
     }
+    html += "</tr>\n";
   }
   return html;
 }
 
-std::string html_row(const std::vector<std::string>& cells, const char* cell_tag) {
-  std::string row = "<tr>";
-  for (const std::string& cell : cells) row += fmt::format("<{0}>{1}</{0}>", cell_tag, cell);
-  return row + "</tr>\n";
+std::string html_head(const std::vector<std::string>& names) {
+  return fmt::format("<tr><th>{}</th></tr>\n", fmt::join(names, "</th><th>"));
+}
+
+std::string html_table(const HtmlTable& table) {
+  return fmt::format("<table{}>\n{}{}</table>", class_of(table.kind), html_head(table.head), html_rows(table.rows));
+}
+
+std::string script_json(const nlohmann::ordered_json& data) {
+  std::string text = data.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
+  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at)) {
+    text.replace(at, 1, "\\u003c");
+  }
+  return text;
 }
 
 std::string fill_in(std::string_view page, const std::map<std::string, std::string, std::less<>>& contents) {
@@ -51,23 +77,6 @@ std::string fill_in(std::string_view page, const std::map<std::string, std::stri
     filled += content->second;
     page.remove_prefix(close + 2);
   }
-}
-
-ShownValue show_with_uncertainty(double value, double expanded) {
-  if (!(expanded > 0) || !std::isfinite(expanded))
-    return {fmt::format("{:.4g}", value), fmt::format("{:.2g}", expanded)};
-  const auto order = [](double x) { return x == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(x)))); };
-  const int decimals = 1 - order(expanded);
-  if (decimals >= 0 && decimals <= 4)
-    return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", expanded, decimals)};
-  constexpr int kLongest = 5;  // digits in front of the point that still read as a number
-  if (decimals < 0 && order(expanded) < kLongest && order(value) < kLongest) {
-    const double step = std::pow(10, -decimals);
-    return {fmt::format("{:.0f}", std::round(value / step) * step),
-            fmt::format("{:.0f}", std::round(expanded / step) * step)};
-  }
-  const int digits = value == 0 ? 1 : std::clamp(order(value) - order(expanded) + 1, 0, 9);
-  return {fmt::format("{:.{}e}", value, digits), fmt::format("{:.1e}", expanded)};
 }
 
 }  // namespace trammel

@@ -2,24 +2,38 @@
 
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace trammel {
 
-/// Text as it stands, whatever it holds.
+/// Text that shows as it stands, whatever it holds.
 [[nodiscard]] std::string html_text(std::string_view text);
-/// A row of a table; cells are HTML.
-[[nodiscard]] std::string html_row(const std::vector<std::string>& cells, const char* cell_tag = "td");
-/// `page` with every `{{name}}` replaced, once; a name without content is a bug.
+
+/// A row of a table; its cells are HTML.
+struct HtmlRow {
+  std::vector<std::string> cells;
+  std::string kind = {};  ///< class for the style sheet; empty: none
+  int last_spans = 1;     ///< columns that the last cell takes
+};
+[[nodiscard]] std::string html_rows(const std::vector<HtmlRow>& rows);
+/// The row of names above a table.
+[[nodiscard]] std::string html_head(const std::vector<std::string>& names);
+
+struct HtmlTable {
+  std::string kind = {};  ///< class for the style sheet; empty: none
+  std::vector<std::string> head;
+  std::vector<HtmlRow> rows;
+};
+[[nodiscard]] std::string html_table(const HtmlTable& table);
+
+/// JSON inside a script of a page: no text in it can end the script.
+[[nodiscard]] std::string script_json(const nlohmann::ordered_json& data);
+
+/// `page` with every `{{name}}` replaced, once. A name without content is a bug.
 [[nodiscard]] std::string fill_in(std::string_view page,
                                   const std::map<std::string, std::string, std::less<>>& contents);
-
-/// A value and the half width of its interval, both rounded to what the width is worth: two digits of it.
-struct ShownValue {
-  std::string value, expanded;
-};
-[[nodiscard]] ShownValue show_with_uncertainty(double value, double expanded);
 
 }  // namespace trammel

@@ -13,6 +13,7 @@
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
+#include "server/report/shown_value.h"
 
 namespace trammel {
 
@@ -20,7 +21,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double kFewestBins = 12;
+constexpr double kFewestBins = 12;    // of a histogram
+constexpr double kLeastError = 1e-6;  // mm: the histogram of a model without any error is that wide
 
 /// What the page compares the model with.
 struct Compared {
@@ -73,8 +75,7 @@ std::string warnings(const CompensatedModel& model, const Evaluation& evaluation
 }
 
 std::string figures_table(const Evaluation& evaluation) {
-  std::string table =
-      html_row({"mm", "rms", "mean", "99.7 %", "max", "x mean ± std", "y mean ± std", "z mean ± std"}, "th");
+  std::vector<HtmlRow> rows;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     std::vector<std::string> cells = {level};
     for (const double value : {figures->rms, figures->mean, figures->p997, figures->max}) {
@@ -83,9 +84,10 @@ std::string figures_table(const Evaluation& evaluation) {
     for (int k = 0; k < 3; ++k) {
       cells.push_back(fmt::format("{:.4f} ± {:.4f}", to_mm(figures->axis_mean(k)), to_mm(figures->axis_stddev(k))));
     }
-    table += html_row(cells);
+    rows.push_back({cells});
   }
-  return table;
+  return html_head({"mm", "rms", "mean", "99.7 %", "max", "x mean ± std", "y mean ± std", "z mean ± std"}) +
+         html_rows(rows);
 }
 
 std::string orientation_table(const Evaluation& evaluation) {
@@ -100,7 +102,7 @@ std::string orientation_table(const Evaluation& evaluation) {
     names.emplace_back("inside their 95 % interval");
     cells.push_back(fmt::format("{:.1f} %", 100 * *turned.coverage_95));
   }
-  return "<table class=\"figures orientation\">\n" + html_row(names, "th") + html_row(cells) + "</table>\n";
+  return html_table({"figures orientation", names, {{cells}}}) + "\n";
 }
 
 std::string date_of(std::int64_t unix_time) {
@@ -132,60 +134,64 @@ std::string trained_ranges(const CompensatedModel& model) {
   return text;
 }
 
-std::string refits(const ModelProvenance& provenance) {
-  std::string rows;
-  for (const RefitRecord& refit : provenance.refits) {
-    rows += html_row({"identified anew",
-                      html_text(fmt::format("{} on {} poses of batch {}; all else is that of model {}",
-                                            fmt::join(refit.sources, ","), refit.poses, refit.batch_id, refit.model))});
-  }
-  return rows;
+std::string refit_text(const RefitRecord& refit) {
+  return fmt::format("{} on {} poses of batch {}; all else is that of model {}", fmt::join(refit.sources, ","),
+                     refit.poses, refit.batch_id, refit.model);
 }
 
-std::string provenance_table(const CompensatedModel& model, const Evaluation& evaluation) {
+std::string provenance_rows(const CompensatedModel& model, const Evaluation& evaluation) {
   const CompensatedModel::Parts& parts = model.parts();
   const ModelProvenance& provenance = parts.provenance;
-  const auto line = [](const std::string& name, const std::string& value) {
-    return html_row({name, html_text(value)});
+  std::vector<HtmlRow> rows;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    rows.push_back({{name, html_text(value)}});
   };
-  return line("model", provenance.id) + line("hash (SHA-256)", provenance.hash) +
-         line("robot", model.cell().robot.name()) +
-         line("error sources", provenance.level.empty() ? "none (nominal)" : provenance.level) +
-         line("learned bias", bias_text(parts)) + line("batch", provenance.batch_id) +
-         line("batch hash (SHA-256)", provenance.batch_hash) +
-         line("newest measurement", provenance.measured_at ? date_of(*provenance.measured_at) : "not recorded") +
-         line("trained", fmt::format("{}, {} poses, seed {}, trammel {}", date_of(provenance.trained_at),
-                                     provenance.training_poses, provenance.seed, provenance.program_version)) +
-         refits(provenance) + line("joints of the training", trained_ranges(model)) +
-         line("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses)) +
-         line("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95)) +
-         line("negative log predictive density",
-              evaluation.nlpd ? fmt::format("{:.3f} nat a coordinate, mm", nlpd_in_mm(*evaluation.nlpd)) : "-") +
-         line("left over beyond the tracker's sigma",
-              fmt::format("{:.4f} mm per axis, calibrated", to_mm(parts.discrepancy)));
+  add("model", provenance.id);
+  add("hash (SHA-256)", provenance.hash);
+  add("robot", model.cell().robot.name());
+  add("error sources", provenance.level.empty() ? "none (nominal)" : provenance.level);
+  add("learned bias", bias_text(parts));
+  add("batch", provenance.batch_id);
+  add("batch hash (SHA-256)", provenance.batch_hash);
+  add("newest measurement", provenance.measured_at ? date_of(*provenance.measured_at) : "not recorded");
+  add("trained", fmt::format("{}, {} poses, seed {}, trammel {}", date_of(provenance.trained_at),
+                             provenance.training_poses, provenance.seed, provenance.program_version));
+  for (const RefitRecord& refit : provenance.refits) add("identified anew", refit_text(refit));
+  add("joints of the training", trained_ranges(model));
+  add("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses));
+  add("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95));
+  add("negative log predictive density",
+      evaluation.nlpd ? fmt::format("{:.3f} nat a coordinate, mm", nlpd_in_mm(*evaluation.nlpd)) : "-");
+  add("left over beyond the tracker's sigma", fmt::format("{:.4f} mm per axis, calibrated", to_mm(parts.discrepancy)));
+  return html_rows(rows);
 }
 
-std::string parameter_row(const IdentifiedParameter& identified) {
+HtmlRow source_row(const ErrorSource& source) {
+  return {.cells = {fmt::format("{} <span>{}</span>", html_text(source.name()), html_text(source.explanation()))},
+          .kind = "cause",
+          .last_spans = 5};
+}
+
+HtmlRow parameter_row(const IdentifiedParameter& identified) {
   const Parameter& parameter = identified.parameter;
   const ShownValue shown =
       show_with_uncertainty(parameter.scale * identified.value, kExpanded * parameter.scale * identified.stddev);
-  const std::string row = html_row({html_text(parameter.name), shown.value, shown.expanded, html_text(parameter.unit),
-                                    identified.identified ? "" : "not identified by itself"});
-  return identified.identified ? row : "<tr class=\"unknown\">" + row.substr(4);
+  return {.cells = {html_text(parameter.name), shown.value, shown.expanded, html_text(parameter.unit),
+                    identified.identified ? "" : "not identified by itself"},
+          .kind = identified.identified ? "" : "unknown"};
 }
 
 std::string parameter_table(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   if (parts.parameters.empty()) return "<p>Nothing: the model is the nominal robot.</p>\n";
-  std::string table =
-      "<table class=\"parameters\">\n" + html_row({"parameter", "value", "U (k = 2)", "unit", ""}, "th");
+  std::vector<HtmlRow> rows;
   std::size_t next = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
-    table += fmt::format("<tr class=\"cause\"><td colspan=\"5\">{} <span>{}</span></td></tr>\n",
-                         html_text(source->name()), html_text(source->explanation()));
-    for (std::size_t k = 0; k < source->parameters().size(); ++k) table += parameter_row(parts.parameters[next++]);
+    rows.push_back(source_row(*source));
+    for (std::size_t k = 0; k < source->parameters().size(); ++k)
+      rows.push_back(parameter_row(parts.parameters[next++]));
   }
-  return table + "</table>\n";
+  return html_table({"parameters", {"parameter", "value", "U (k = 2)", "unit", ""}, rows}) + "\n";
 }
 
 std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
@@ -205,14 +211,13 @@ std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
 
 std::string suspects_text(const CompensatedModel::Parts& parts) {
   if (parts.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
-  std::string html =
-      "<p>These fit the others so badly that their pull was bounded. Measure them again.</p>\n<table>\n"
-      "<tr><th>pose</th><th>row</th><th>off by, mm</th><th>sigma</th></tr>\n";
+  std::vector<HtmlRow> rows;
   for (const SuspectPose& pose : parts.suspects) {
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.0f}</td></tr>\n", html_text(pose.pose_id),
-                        pose.row, to_mm(pose.distance), pose.sigmas);
+    rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row), fmt::format("{:.3f}", to_mm(pose.distance)),
+                     fmt::format("{:.0f}", pose.sigmas)}});
   }
-  return html + "</table>\n";
+  return "<p>These fit the others so badly that their pull was bounded. Measure them again.</p>\n" +
+         html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
 /// |error| of each pose, mm, at two levels.
@@ -253,7 +258,7 @@ double round_width(double limit) {
 }
 
 ordered_json histogram_json(const PoseErrors& errors) {
-  double largest = 1e-6;  // mm
+  double largest = kLeastError;
   for (const double error : errors.calibrated) largest = std::max(largest, error);
   for (const double error : errors.compensated) largest = std::max(largest, error);
   const double width = round_width(largest / kFewestBins);
@@ -273,9 +278,9 @@ ordered_json histogram_json(const PoseErrors& errors) {
           {"compensated", counts(errors.compensated)}};
 }
 
-/// For the charts. `<` is escaped so that no text can end the script that holds it.
-std::string chart_data(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
-                       const Evaluation& evaluation) {
+/// What the charts are drawn from.
+ordered_json chart_data(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
+                        const Evaluation& evaluation) {
   ordered_json data;
   if (is_doubtful(evaluation)) data["doubtful"] = true;
   for (const auto& [level, figures] : levels_of(evaluation)) {
@@ -287,10 +292,7 @@ std::string chart_data(const CompensatedModel& model, const std::optional<Measur
   } else if (bias) {
     data["histogram"] = histogram_json(errors_of_training(*bias));
   }
-  std::string text = data.dump(-1, ' ', true, ordered_json::error_handler_t::replace);
-  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
-    text.replace(at, 1, "\\u003c");
-  return text;
+  return data;
 }
 
 }  // namespace
@@ -307,11 +309,11 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"compared", html_text(compared.text)},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
-                  {"provenance", provenance_table(model, compared.evaluation)},
+                  {"provenance", provenance_rows(model, compared.evaluation)},
                   {"parameters", parameter_table(model)},
                   {"unidentifiable", unidentifiable_text(model.parts())},
                   {"suspects", suspects_text(model.parts())},
-                  {"data", chart_data(model, batch, compared.evaluation)},
+                  {"data", script_json(chart_data(model, batch, compared.evaluation))},
                   {"chart_js", std::string(embedded::chart_js)}});
 }
 

@@ -20,7 +20,7 @@ Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
     if (!ready) return tl::make_unexpected(ready.error());
     return std::unique_ptr<Store>(new Store(std::move(connection)));
   } catch (const std::exception& error) {
-    return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, error.what());
+    return failure(ErrorCode::kInternal, "cannot be opened: {}", error.what()).in(path);
   }
 }
 

@@ -82,7 +82,7 @@ TEST(Parts, ARefusalInTheMiddleSaysHowFarItCameAndHandsOutNothing) {
     return service.answer(first, count);
   });
   ASSERT_FALSE(answer);
-  EXPECT_NE(answer.error().message.find("after the first"), std::string::npos) << answer.error().message;
+  EXPECT_NE(sentence(answer.error()).find("after the first"), std::string::npos) << sentence(answer.error());
 }
 
 TEST(Parts, AnEmptyListIsAskedOnce) {

@@ -7,6 +7,7 @@
 
 #include "server/base/hash.h"
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "server/base/hash.h"
+#include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "server/trainer/pipeline/extend.h"

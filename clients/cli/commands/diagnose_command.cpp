@@ -6,6 +6,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/diagnosis_json.h"
@@ -75,8 +76,8 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBa
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
   if (!extension->gain.beyond_chance()) {
-    return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
-                   to_string(extension->gain));
+    return refused("cell {}: with what was found {}", cell->name, to_string(extension->gain))
+        .next("cell file and model were not written");
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
@@ -93,7 +94,7 @@ Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
-  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
+  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
@@ -153,20 +154,26 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
   command->add_option(
       "--batch", arguments->batch,
-      "Measurements (CSV: deg, mm); with --service also the id of a batch that it has, else the newest");
-  command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
+      "Measurements (CSV: joints in deg, rails in mm; positions in mm); with --service also the id of a batch that the "
+      "service has; left out there: its newest batch");
+  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+      ->type_name("FILE");
   command
-      ->add_option(
-          "--next-poses", arguments->next_poses,
-          "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot; where "
-          "there are none nothing is written, the reason is said on standard error, and the exit code is 0")
+      ->add_option("--next-poses", arguments->next_poses,
+                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot. "
+                   "Where there are "
+                   "none nothing is written, the reason goes to standard error, and the exit code is 0")
       ->type_name("FILE");
   add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
-  CLI::Option* apply_flag = command->add_flag(
-      "--apply", arguments->apply,
-      "Add what was found to the cell's error sources and train; nothing is written unless poses held out gain by it");
-  command->add_option("--model", arguments->model, "With --apply: extended model to write")->needs(apply_flag);
-  command->add_option("--cell-out", arguments->cell_out, "With --apply: cell file to write instead of --cell itself")
+  CLI::Option* apply_flag = command->add_flag("--apply", arguments->apply,
+                                              "Add what was found to the cell's error sources and train. Cell file and "
+                                              "model are written, with --service put in "
+                                              "force, only where poses held out gain by it beyond chance");
+  command->add_option("--model", arguments->model, "With --apply, on files: extended model file to write")
+      ->needs(apply_flag);
+  command
+      ->add_option("--cell-out", arguments->cell_out,
+                   "With --apply, on files: cell file to write instead of --cell itself")
       ->needs(apply_flag);
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);

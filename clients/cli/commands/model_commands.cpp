@@ -8,6 +8,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
 #include "server/compensate/known_rows.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/triage.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/model_page.h"
@@ -55,8 +56,10 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
                         source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
   if (seen.learn || refitted) return {};
-  return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id(), seen.sentence,
-                 fmt::join(refit, ","));
+  return refused("{}", seen.sentence)
+      .in("batch " + batch.id())
+      .of("--refit")
+      .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
 }
 
 Status train_model(const TrainArguments& arguments) {
@@ -137,14 +140,18 @@ Status report(const ReportArguments& arguments) {
 
 void add_train(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot and learn what calibration leaves over");
+  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot, and learn what calibration leaves over");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
-  command->add_option("--level", arguments->level,
-                      "What to identify instead of the cell's error sources: M0, M1 (base), M2 (+ geometry), M3 (+ "
-                      "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
-  command->add_option("--bias", arguments->bias,
-                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none or auto");
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+      ->required();
+  command->add_option(
+      "--level", arguments->level,
+      "What to identify instead of the cell's error sources: M0 (nothing), M1 (base), M2 (base, geometry), M3 "
+      "(base, geometry, compliance), a list of sources, or a level and more: M2,gear_transmission:3");
+  command->add_option(
+      "--bias", arguments->bias,
+      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none, or auto (the simplest "
+      "that poses left out say is worth it)");
   command->add_option("--from", arguments->from,
                       "Model file of the same robot to start from: all but the sources of --refit stay as they are");
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
@@ -153,19 +160,21 @@ void add_train(CLI::App& app, Action& chosen) {
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
-                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column")
+                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
-  command->add_option("-o,--output", arguments->output, "Model to write")->required();
+  command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
 }
 
 void add_evaluate(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<EvaluateArguments>();
-  CLI::App* command = app.add_subcommand("evaluate", "Compare a model with measurements; errors in mm");
+  CLI::App* command =
+      app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+      ->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }
@@ -174,7 +183,8 @@ void add_report(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReportArguments>();
   CLI::App* command = app.add_subcommand("report", "Write a model's report as a page that opens offline");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements to compare it with (CSV: deg, mm)");
+  command->add_option("--batch", arguments->batch,
+                      "Measurements to compare it with (CSV: joints in deg, rails in mm; positions in mm)");
   command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });

@@ -4,10 +4,10 @@
 
 namespace trammel {
 
-/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` times unknown
-/// numbers of unit variance each (the model's own parameters in units of their priors, smooth functions that were found
-/// before). Its covariance is S = 1 + Z Zᵀ; by the matrix inversion lemma S⁻¹ = 1 - U Uᵀ with U = Z L⁻ᵀ, 1 + ZᵀZ = L
-/// Lᵀ.
+/// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` Z times
+/// unknown numbers of unit variance. The columns are the model's own parameters, in units of their priors, and the
+/// anonymous functions found before. The covariance of the rows is S = 1 + Z Zᵀ. By the matrix inversion lemma S⁻¹ = 1
+/// - U Uᵀ with U = Z L⁻ᵀ and 1 + ZᵀZ = L Lᵀ.
 class Background {
  public:
   explicit Background(Eigen::MatrixXd columns);
@@ -16,12 +16,13 @@ class Background {
 
   /// S⁻¹ y of every column.
   [[nodiscard]] Eigen::MatrixXd project(const Eigen::MatrixXd& y) const;
-  /// R x p.
+  /// R x p: U.
   [[nodiscard]] const Eigen::MatrixXd& root() const { return root_; }
   /// R x p: Z.
   [[nodiscard]] const Eigen::MatrixXd& columns() const { return columns_; }
-  /// p x k: posterior means of the unknown numbers given each column of y; their covariance.
+  /// p x k: posterior means of the unknown numbers, given each column of y.
   [[nodiscard]] Eigen::MatrixXd estimate(const Eigen::MatrixXd& y) const;
+  /// p x p: their posterior covariance, whatever y is.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
 
  private:

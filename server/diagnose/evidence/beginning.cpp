@@ -6,11 +6,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-std::vector<Index> possible_beginnings(const LinearProblem& problem, const MatrixXd& always, const Background& rest,
-                                       const VectorXd& data, Index found) {
+namespace {
+
+/// The strength that a step from each pose on explains; 0 for the first pose, where it would have acted always. Sums
+/// from the end give every beginning in one pass.
+VectorXd explained_from(const LinearProblem& problem, const MatrixXd& always, const Background& rest,
+                        const VectorXd& data) {
   const VectorXd projected = rest.project(data);
   const Index m = always.cols();
-  // Sums from the end give every beginning in one pass.
   VectorXd along = VectorXd::Zero(m);
   MatrixXd shared = MatrixXd::Zero(rest.root().cols(), m);
   MatrixXd own = MatrixXd::Identity(m, m);
@@ -25,9 +28,18 @@ std::vector<Index> possible_beginnings(const LinearProblem& problem, const Matri
     const Eigen::LLT<MatrixXd> factor(own - shared.transpose() * shared);
     if (factor.info() == Eigen::Success) explained(i) = along.dot(factor.solve(along));
   }
+  return explained;
+}
+
+}  // namespace
+
+std::vector<Index> possible_beginnings(const LinearProblem& problem, const MatrixXd& always, const Background& rest,
+                                       const VectorXd& data, Index found) {
+  const VectorXd explained = explained_from(problem, always, rest, data);
+  const double least = explained.maxCoeff() - kBeginning95;
   std::vector<Index> possible;
   for (Index i = 1; i < problem.poses(); ++i) {
-    if (i == found || explained(i) > explained.maxCoeff() - kBeginning95) possible.push_back(i);
+    if (i == found || explained(i) > least) possible.push_back(i);
   }
   return possible;
 }

@@ -18,15 +18,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostPoses = 200;  // distances are quadratic; evenly drawn beyond
+constexpr Index kMostPoses = 200;   // distances are quadratic in them; evenly drawn from more
+constexpr Index kFewestPoses = 20;  // fewer say nothing about sixteen questions
 constexpr int kPermutations = 999;
-constexpr int kAsLarge = 10;           // permutations at least as large: then their share is known well enough
-constexpr double kLeastChance = 1e-6;  // no tail is known further
-constexpr double kNegligible = 1e-4;   // of the largest weight
-constexpr double kNarrow = 1e-6;       // of a saddlepoint near the mean
-constexpr double kLeastSpread = 1e-9;
+constexpr int kAsLarge = 10;            // permutations at least as large: then their share is known to a third
+constexpr double kNegligible = 1e-4;    // of the largest weight
+constexpr double kNarrow = 1e-6;        // standard deviations: so near the mean the saddlepoint divides by zero
+constexpr double kLeastSpread = 1e-9;   // rad, s or of a unit variance: less is a constant
+constexpr double kLeastTorque = 1e-12;  // Nm, against division by zero
+constexpr double kFarOut = 30;          // standard deviations, beyond which erfc() is zero
+constexpr int kHalvings = 200;          // of an interval: more than a double can hold
 
-/// Distances between rows, less row and column means.
+/// Distances between rows, less the means of their rows and columns.
 MatrixXd centred_distances(const MatrixXd& rows) {
   const Index n = rows.rows();
   MatrixXd d(n, n);
@@ -47,7 +50,7 @@ double permuted_product(const MatrixXd& a, const MatrixXd& b, const std::vector<
   return sum;
 }
 
-/// Positive eigenvalues of what centred distances are the negative of, largest first.
+/// Positive eigenvalues of minus the centred distances, largest first.
 std::vector<double> spectrum(const MatrixXd& centred) {
   const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(-centred, Eigen::EigenvaluesOnly).eigenvalues();
   std::vector<double> positive;
@@ -56,42 +59,49 @@ std::vector<double> spectrum(const MatrixXd& centred) {
   return positive;
 }
 
-/// The upper tail of sum w_k z_k^2, z_k standard normal.
+/// The upper tail of sum w_k z_k^2, z_k standard normal: saddlepoint, after Lugannani and Rice.
 class WeightedChiSquare {
  public:
-  WeightedChiSquare(const std::vector<double>& one, const std::vector<double>& other) {
-    const double largest = one.front() * other.front();
+  /// The weights are the products of one number of each.
+  WeightedChiSquare(const std::vector<double>& one, const std::vector<double>& other)
+      : largest_(one.front() * other.front()) {
     for (const double a : one) {
       for (const double b : other) {
-        if (a * b < kNegligible * largest) break;
+        if (a * b < kNegligible * largest_) break;
         weight_.push_back(a * b);
       }
     }
     mean_ = std::accumulate(weight_.begin(), weight_.end(), 0.0);
-    largest_ = largest;
   }
 
   /// log P(sum > x), beyond the mean.
   double log_tail(double x) const {
     if (x <= mean_) return std::log(0.5);
-    double low = 0;
-    double high = 0.5 / largest_;
-    for (int k = 0; k < 200; ++k) {
-      const double middle = 0.5 * (low + high);
-      (slope(middle) < x ? low : high) = middle;
-    }
-    const double t = 0.5 * (low + high);
+    const double t = saddlepoint(x);
     const double distance = t * x - cumulant(t);
     const double r = std::sqrt(2 * std::max(0.0, distance));
     const double u = t * std::sqrt(curvature(t));
     if (r < kNarrow) return std::log(0.5);
     // 1 - Phi(r) + phi(r) (1/u - 1/r), with phi(r) taken out.
-    const double mills = r < 30 ? 0.5 * std::erfc(r / std::sqrt(2.0)) * std::sqrt(2 * kPi) * std::exp(0.5 * r * r)
-                                : 1 / r - 1 / (r * r * r);
-    return -distance - 0.5 * std::log(2 * kPi) + std::log(mills + 1 / u - 1 / r);
+    return -distance - 0.5 * std::log(2 * kPi) + std::log(mills_ratio(r) + 1 / u - 1 / r);
   }
 
  private:
+  /// Where the slope of the cumulant is x.
+  double saddlepoint(double x) const {
+    double low = 0;
+    double high = 0.5 / largest_;
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (low + high);
+      (slope(middle) < x ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  }
+  /// (1 - Phi(r)) / phi(r).
+  static double mills_ratio(double r) {
+    if (r >= kFarOut) return 1 / r - 1 / (r * r * r);
+    return 0.5 * std::erfc(r / std::sqrt(2.0)) * std::sqrt(2 * kPi) * std::exp(0.5 * r * r);
+  }
   double cumulant(double t) const {
     double sum = 0;
     for (const double w : weight_) sum -= 0.5 * std::log1p(-2 * t * w);
@@ -109,10 +119,19 @@ class WeightedChiSquare {
   }
 
   std::vector<double> weight_;
-  double mean_ = 0, largest_ = 0;
+  double largest_, mean_ = 0;
 };
 
-/// Of two centred distance matrices.
+/// The tail of the statistic beyond `tenth`, its kAsLarge-th largest of all permutations, at `observed`.
+double p_value_in_tail(const MatrixXd& a, const MatrixXd& b, double observed, double tenth) {
+  const WeightedChiSquare null(spectrum(a), spectrum(b));
+  const double scale = static_cast<double>(a.rows() - 1);  // a product of unit vectors varies by 1 / (n - 1)
+  const double beyond = null.log_tail(scale * observed) - null.log_tail(scale * tenth);
+  const double share = kAsLarge / static_cast<double>(kPermutations);
+  return std::max(kLeastPValue, share * std::exp(std::min(0.0, beyond)));
+}
+
+/// Of two centred distance matrices: the share of permutations that are as large, or its tail where too few are.
 double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Index> order(static_cast<std::size_t>(a.rows()));
@@ -126,16 +145,11 @@ double p_value(const MatrixXd& a, const MatrixXd& b, std::uint64_t seed) {
     if (drawn.back() >= observed && ++above == kAsLarge) return kAsLarge / static_cast<double>(drawn.size());
   }
   std::nth_element(drawn.begin(), drawn.begin() + kAsLarge - 1, drawn.end(), std::greater<>());
-  const double tenth = drawn[kAsLarge - 1];
-  const WeightedChiSquare null(spectrum(a), spectrum(b));
-  const double scale = static_cast<double>(a.rows() - 1);  // a product of unit vectors varies by 1 / (n - 1)
-  const double beyond = null.log_tail(scale * observed) - null.log_tail(scale * tenth);
-  const double share = kAsLarge / static_cast<double>(kPermutations);
-  return std::max(kLeastChance, share * std::exp(std::min(0.0, beyond)));
+  return p_value_in_tail(a, b, observed, drawn[kAsLarge - 1]);
 }
 
-/// Each pose's position part, of unit covariance if nothing but the background's noise is there: of S^-1 y the
-/// covariance is S^-1 = 1 - U U'.
+/// N x 3: the positions of `poses` in S⁻¹ y, scaled to unit covariance of each if there is nothing but noise. The
+/// covariance of S⁻¹ y is S⁻¹ = 1 - U Uᵀ.
 MatrixXd standardised(const LinearProblem& problem, const Background& background, const VectorXd& left,
                       const std::vector<Index>& poses) {
   MatrixXd rows(static_cast<Index>(poses.size()), 3);
@@ -156,27 +170,49 @@ struct Question {
   MatrixXd distances;
 };
 
-std::vector<Question> questions(const LinearProblem& problem, const std::vector<Index>& poses) {
+/// What the residual may depend on, a row a pose.
+struct Circumstances {
+  MatrixXd q;       ///< rad or m
+  MatrixXd torque;  ///< of gravity, over the largest of each joint
+  VectorXd time;    ///< the order of measuring
+};
+
+Circumstances circumstances_of(const LinearProblem& problem, const std::vector<Index>& poses) {
   const auto n = static_cast<Index>(poses.size());
   const int joints = problem.model().cell->robot.size();
-  MatrixXd q(n, joints), torque(n, joints);
-  VectorXd time(n);
+  Circumstances all{MatrixXd(n, joints), MatrixXd(n, joints), VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
     const Measurement& m = problem.batch().measurements[static_cast<std::size_t>(poses[static_cast<std::size_t>(i)])];
-    q.row(i) = m.context.q.transpose();
-    torque.row(i) = ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
-    time(i) = static_cast<double>(m.context.index);
+    all.q.row(i) = m.context.q.transpose();
+    all.torque.row(i) = ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
+    all.time(i) = static_cast<double>(m.context.index);
   }
+  const VectorXd largest = all.torque.cwiseAbs().colwise().maxCoeff().cwiseMax(kLeastTorque).transpose();
+  all.torque = (all.torque * largest.cwiseInverse().asDiagonal()).eval();
+  return all;
+}
+
+std::vector<Question> questions(const LinearProblem& problem, const std::vector<Index>& poses) {
+  const Circumstances circumstances = circumstances_of(problem, poses);
   std::vector<Question> all;
   const auto ask = [&](std::string on, const MatrixXd& x) {
     if ((x.rowwise() - x.colwise().mean()).norm() < kLeastSpread) return;
     all.push_back({std::move(on), centred_distances(x)});
   };
-  for (int joint = 0; joint < joints; ++joint) ask(fmt::format("q{}", joint + 1), q.col(joint));
-  const VectorXd largest = torque.cwiseAbs().colwise().maxCoeff().cwiseMax(1e-12).transpose();
-  ask("torque", torque * largest.cwiseInverse().asDiagonal());
-  ask("time", time);
+  for (Index j = 0; j < circumstances.q.cols(); ++j) ask(fmt::format("q{}", j + 1), circumstances.q.col(j));
+  ask("torque", circumstances.torque);
+  ask("time", circumstances.time);
   return all;
+}
+
+/// Sorts by p-value and corrects each for the number of questions, after Holm.
+void correct_for_number(std::vector<Dependence>& found) {
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+  double highest = 0;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    highest = std::max(highest, std::min(1.0, found[k].p_value * static_cast<double>(found.size() - k)));
+    found[k].p_value = highest;
+  }
 }
 
 }  // namespace
@@ -189,7 +225,7 @@ double independence_p_value(const MatrixXd& x, const MatrixXd& y, std::uint64_t 
 std::vector<Dependence> dependence_of(const LinearProblem& problem, const Background& background, const VectorXd& left,
                                       std::uint64_t seed) {
   const Index n = std::min(kMostPoses, problem.poses());
-  if (n < 20) return {};
+  if (n < kFewestPoses) return {};
   std::vector<Index> poses(static_cast<std::size_t>(n));
   for (Index i = 0; i < n; ++i) poses[static_cast<std::size_t>(i)] = i * problem.poses() / n;
   const MatrixXd residual = standardised(problem, background, left, poses);
@@ -200,12 +236,7 @@ std::vector<Dependence> dependence_of(const LinearProblem& problem, const Backgr
     found.push_back({question.on, false, p_value(by_residual, question.distances, seed + found.size())});
     found.push_back({question.on, true, p_value(by_size, question.distances, seed + found.size())});
   }
-  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-  double highest = 0;
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    highest = std::max(highest, std::min(1.0, found[k].p_value * static_cast<double>(found.size() - k)));
-    found[k].p_value = highest;
-  }
+  correct_for_number(found);
   return found;
 }
 

@@ -15,13 +15,13 @@ namespace trammel {
 /// Places of a source's parameters among all of the model's.
 [[nodiscard]] std::vector<Eigen::Index> places_of_source(const PhysicalModel& model, const std::string& source);
 
-/// One source's share of a joint estimate, in units of priors.
+/// The parameters of one source in a joint estimate, in units of priors.
 struct OwnEstimate {
-  Eigen::VectorXd size;       ///< how far its parameters make it act
-  Eigen::MatrixXd precision;  ///< of them, everything else free: the inverse of their covariance, priors included
+  Eigen::VectorXd size;       ///< their values; 0 for an order, which says where an oscillation is and not how large
+  Eigen::MatrixXd precision;  ///< the inverse of their covariance with everything else free, priors included
   [[nodiscard]] double strength() const { return size.dot(precision * size); }
 };
-/// `change` and `covariance`: the joint estimate of all of a background's numbers, about where the model stands.
+/// `change`, `covariance`: the joint estimate of all numbers of a background, about where the model stands.
 [[nodiscard]] OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source,
                                        const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance);
 

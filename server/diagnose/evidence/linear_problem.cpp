@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "server/base/check.h"
 #include "server/numerics/product.h"
@@ -14,11 +15,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kCut = 3;                // sigmas, beyond which a row's size no longer counts in the noise
+constexpr double kCut = 3;  // standard deviations, beyond which a row's size no longer counts in the noise
 constexpr double kMeanBelowCut = 0.9950;  // of min(z^2, kCut^2), z standard normal
+constexpr double kLeastFreedom = 0.05;    // share that a fit is taken to leave, however many parameters it has
+constexpr int kHalvings = 60;             // of an interval: all that a double can hold
 
 /// The surplus s at which the rows' squares, cut off at kCut, average to what white noise has, given the share of
-/// freedom the fit has left. Zero where there is none.
+/// freedom that the fit leaves. Zero where there is none.
 double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double share) {
   const double wanted = kMeanBelowCut * share * static_cast<double>(residual.size());
   const auto excess = [&](double s) {
@@ -28,13 +31,14 @@ double robust_surplus(const VectorXd& residual, const VectorXd& sigma, double sh
   if (residual.size() == 0 || excess(0) <= 0) return 0;
   double low = 0;
   double high = residual.norm();
-  for (int k = 0; k < 60; ++k) {
+  for (int k = 0; k < kHalvings; ++k) {
     const double middle = 0.5 * (low + high);
     (excess(middle) > 0 ? low : high) = middle;
   }
   return high;
 }
 
+/// The source that `spec` names, if this model can have it beside its own.
 Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& model) {
   Result<ErrorSourcePtr> source = make_error_source(spec, *model.cell);
   if (!source) return source;
@@ -52,118 +56,134 @@ VectorXd scales_of(const std::vector<Parameter>& parameters) {
   return scales;
 }
 
+/// Place of `source`'s first parameter among all of the model's.
+Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
+  Index first = 0;
+  for (const ErrorSourcePtr& other : model.sources) {
+    if (other == source) break;
+    first += static_cast<Index>(other->parameters().size());
+  }
+  return first;
+}
+
+/// What is left of `residual` (SI) beside the model's own parameters, and the share of freedom that they leave.
+struct Leftover {
+  VectorXd residual;
+  double share = 1;
+};
+/// `nuisance`: what the parameters do, SI, in units of their `scales`. `sigma`: of each row.
+Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance, const VectorXd& scales,
+                     const VectorXd& sigma) {
+  const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
+  MatrixXd information = transposed_product(scaled, scaled);
+  const Index P = scales.size();
+  information.diagonal().array() += 1;
+  const Eigen::LLT<MatrixXd> factor(information);
+  // The trace of the fit's hat matrix, priors included.
+  const double taken = static_cast<double>(P) - factor.solve(MatrixXd::Identity(P, P)).trace();
+  const VectorXd right = scaled.transpose() * residual.cwiseQuotient(sigma);
+  return {residual - sigma.asDiagonal() * (scaled * factor.solve(right)),
+          std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size()))};
+}
+
 }  // namespace
+
+/// The model with every wanted source in it, each at zero: then none changes what another does.
+struct LinearProblem::Extended {
+  PhysicalModel model;
+  std::vector<Index> joints;   // place of each joint's own angle among the parameters
+  std::vector<Index> effects;  // first place of each wanted source
+  std::vector<Index> own;      // places of the parameters that the model had before
+};
 
 LinearProblem::LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch,
                              const std::vector<Parameter>& priors, const std::vector<std::string>& further)
     : model_(model), batch_(&batch), priors_(priors) {
   TRAMMEL_CHECK(static_cast<int>(priors.size()) == model.parameter_count());
-  // All wanted sources act at once, each at zero: then none changes what another does.
-  PhysicalModel extended = model;
-  std::vector<ErrorSourcePtr> added;
-  for (int joint = 0; joint < model.cell->robot.size(); ++joint) {
-    // A joint that has slipped before the first pose is off everywhere: its column is the joint's own.
-    added.push_back(*make_error_source(fmt::format("joint_slip:{}@1", joint + 1), *model.cell));
-  }
-  const auto joints = static_cast<Index>(added.size());
-  for (const std::string& spec : further) {
-    Result<ErrorSourcePtr> source = possible(spec, model);
-    if (!source) continue;
-    effects_.push_back({spec, (*source)->parameters(), {}});
-    added.push_back(std::move(*source));
-  }
-  for (const ErrorSourcePtr& source : added) {
-    add_source(extended, source);
-  }
-  std::vector<Index> places;
-  for (const ErrorSourcePtr& source : added) {
-    Index first = 0;
-    for (const ErrorSourcePtr& other : extended.sources) {
-      if (other == source) break;
-      first += static_cast<Index>(other->parameters().size());
-    }
-    places.push_back(first);
-  }
-  fill(extended, places, joints);
+  first_row_ = {0};
+  for (const Measurement& m : batch_->measurements) first_row_.push_back(first_row_.back() + (m.R_WT ? 6 : 3));
+  differentiate(extended_by(further));
   whiten();
 }
 
-void LinearProblem::fill(const PhysicalModel& extended, const std::vector<Index>& places, Index joints) {
-  first_row_ = {0};
-  for (const Measurement& m : batch_->measurements) first_row_.push_back(first_row_.back() + (m.R_WT ? 6 : 3));
+LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string>& further) {
+  std::vector<ErrorSourcePtr> joints, wanted;
+  for (int joint = 0; joint < model_.cell->robot.size(); ++joint) {
+    // A joint that has slipped before the first pose is off everywhere: its column is the joint's own.
+    joints.push_back(*make_error_source(fmt::format("joint_slip:{}@1", joint + 1), *model_.cell));
+  }
+  for (const std::string& spec : further) {
+    Result<ErrorSourcePtr> source = possible(spec, model_);
+    if (!source) continue;
+    effects_.push_back({spec, (*source)->parameters(), {}});
+    wanted.push_back(std::move(*source));
+  }
+  Extended extended{model_, {}, {}, {}};
+  for (const ErrorSourcePtr& source : joints) add_source(extended.model, source);
+  for (const ErrorSourcePtr& source : wanted) add_source(extended.model, source);
+  std::vector<bool> is_own(static_cast<std::size_t>(extended.model.parameter_count()), true);
+  const auto take = [&](const ErrorSourcePtr& source) {
+    const Index first = first_place(extended.model, source);
+    std::fill_n(is_own.begin() + first, source->parameters().size(), false);
+    return first;
+  };
+  std::transform(joints.begin(), joints.end(), std::back_inserter(extended.joints), take);
+  std::transform(wanted.begin(), wanted.end(), std::back_inserter(extended.effects), take);
+  for (std::size_t k = 0; k < is_own.size(); ++k) {
+    if (is_own[k]) extended.own.push_back(static_cast<Index>(k));
+  }
+  return extended;
+}
+
+/// Residuals and derivatives of all poses, SI; the weights of the measurements alone.
+void LinearProblem::differentiate(const Extended& extended) {
   const Index R = first_row_.back();
   residual_.resize(R);
   weight_.resize(R);
-  by_joint_.resize(R, joints);
+  by_joint_.resize(R, static_cast<Index>(extended.joints.size()));
   nuisance_.resize(R, static_cast<Index>(priors_.size()));
   for (Effect& effect : effects_) effect.columns.resize(R, static_cast<Index>(effect.parameters.size()));
-  std::vector<bool> is_added(static_cast<std::size_t>(extended.parameter_count()), false);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    const Index count =
-        static_cast<Index>(k) < joints ? 1 : effects_[k - static_cast<std::size_t>(joints)].columns.cols();
-    for (Index i = 0; i < count; ++i) is_added[static_cast<std::size_t>(places[k] + i)] = true;
-  }
-  std::vector<Index> own;
-  for (std::size_t k = 0; k < is_added.size(); ++k) {
-    if (!is_added[k]) own.push_back(static_cast<Index>(k));
-  }
-  const Tracker& tracker = model_.cell->tracker;
   MatrixXd J;
   for (Index i = 0; i < poses(); ++i) {
     const Measurement& m = batch_->measurements[static_cast<std::size_t>(i)];
-    const Pose X_WT = extended.pose_W(m.context, extended.values, &J);
+    measure(i, extended.model.pose_W(m.context, extended.model.values, &J));
     const Index row = first_row(i);
     const Index count = row_count(i);
-    residual_.segment<3>(row) = m.p_W - X_WT.translation();
-    weight_.segment<3>(row).setConstant(m.sigma.value_or(tracker.sigma));
-    if (m.R_WT) {
-      residual_.segment<3>(row + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose());
-      weight_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
-    }
-    nuisance_.middleRows(row, count) = J(Eigen::seqN(0, count), own);
-    for (Index joint = 0; joint < joints; ++joint) {
-      by_joint_.col(joint).segment(row, count) = J.col(places[static_cast<std::size_t>(joint)]).head(count);
-    }
+    nuisance_.middleRows(row, count) = J(Eigen::seqN(0, count), extended.own);
+    by_joint_.middleRows(row, count) = J(Eigen::seqN(0, count), extended.joints);
     for (std::size_t k = 0; k < effects_.size(); ++k) {
-      effects_[k].columns.middleRows(row, count) =
-          J.block(0, places[k + static_cast<std::size_t>(joints)], count, effects_[k].columns.cols());
+      MatrixXd& columns = effects_[k].columns;
+      columns.middleRows(row, count) = J.block(0, extended.effects[k], count, columns.cols());
     }
   }
 }
 
+/// How far `pose` was measured from `X_WT`, and the standard deviations that its measurement is said to have.
+void LinearProblem::measure(Index pose, const Pose& X_WT) {
+  const Measurement& m = batch_->measurements[static_cast<std::size_t>(pose)];
+  const Tracker& tracker = model_.cell->tracker;
+  const Index row = first_row(pose);
+  residual_.segment<3>(row) = m.p_W - X_WT.translation();
+  weight_.segment<3>(row).setConstant(m.sigma.value_or(tracker.sigma));
+  if (!m.R_WT) return;
+  residual_.segment<3>(row + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose());
+  weight_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
+}
+
+/// From what was measured to rows of unit variance: adds to every standard deviation what is left beyond it, and
+/// divides by it.
 void LinearProblem::whiten() {
   std::vector<Index> position, rotation;
   for (Index i = 0; i < poses(); ++i) {
     for (Index k = 0; k < row_count(i); ++k) (k < 3 ? position : rotation).push_back(first_row(i) + k);
   }
   const VectorXd scales = scales_of(priors_);
-  // How much freedom the fit takes: the trace of its hat matrix, prior included.
-  const MatrixXd scaled = weight_.cwiseInverse().asDiagonal() * nuisance_ * scales.asDiagonal();
-  MatrixXd information = transposed_product(scaled, scaled);
-  const Index P = scales.size();
-  information.diagonal().array() += 1;
-  const Eigen::LLT<MatrixXd> factor(information);
-  const double freedom = static_cast<double>(P) - factor.solve(MatrixXd::Identity(P, P)).trace();
-  const double share = std::max(0.05, 1 - freedom / static_cast<double>(rows()));
   // The noise is what no parameter explains, whether the model stands at its best fit already or not.
-  const VectorXd right = scaled.transpose() * residual_.cwiseQuotient(weight_);
-  const VectorXd left = residual_ - weight_.asDiagonal() * (scaled * factor.solve(right));
-  const double surplus = robust_surplus(left(position), weight_(position), share);
-  const double surplus_rotation = robust_surplus(left(rotation), weight_(rotation), share);
-  const auto weigh = [&](const std::vector<Index>& some, double beyond) {
-    if (some.empty()) return Spread{};
-    const auto count = static_cast<double>(some.size());
-    const double stated = weight_(some).norm() / std::sqrt(count);
-    double sum = 0;
-    for (const Index row : some) {
-      const double sigma = std::hypot(weight_(row), beyond);
-      sum += sigma * sigma;
-      weight_(row) = 1 / sigma;
-    }
-    return Spread{std::sqrt(sum / count), stated, share * count};
-  };
-  position_ = weigh(position, surplus);
-  rotation_ = weigh(rotation, surplus_rotation);
+  const Leftover left = leftover_of(residual_, nuisance_, scales, weight_);
+  const double surplus = robust_surplus(left.residual(position), weight_(position), left.share);
+  const double surplus_rotation = robust_surplus(left.residual(rotation), weight_(rotation), left.share);
+  position_ = weigh(position, surplus, left.share);
+  rotation_ = weigh(rotation, surplus_rotation, left.share);
 
   residual_ = residual_.cwiseProduct(weight_).eval();
   nuisance_ = (weight_.asDiagonal() * nuisance_ * scales.asDiagonal()).eval();
@@ -171,6 +191,20 @@ void LinearProblem::whiten() {
   for (Effect& effect : effects_) {
     effect.columns = (weight_.asDiagonal() * effect.columns * scales_of(effect.parameters).asDiagonal()).eval();
   }
+}
+
+/// Turns the standard deviations of `rows` into weights, with `surplus` (SI) on top of each. `share`: of freedom.
+LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, double surplus, double share) {
+  if (rows.empty()) return {};
+  const auto count = static_cast<double>(rows.size());
+  const double stated = weight_(rows).norm() / std::sqrt(count);
+  double sum = 0;
+  for (const Index row : rows) {
+    const double sigma = std::hypot(weight_(row), surplus);
+    sum += sigma * sigma;
+    weight_(row) = 1 / sigma;
+  }
+  return {std::sqrt(sum / count), stated, share * count};
 }
 
 Eigen::Matrix3Xd LinearProblem::positions(const VectorXd& whitened) const {

@@ -19,9 +19,9 @@ struct Effect {
 /// divided by the standard deviation of its noise, so that white noise has unit variance.
 class LinearProblem {
  public:
-  /// The noise is the measurement's own and, on top, what is left beyond it whatever its reason (a robust estimate): as
-  /// long as something large is unexplained, nothing small is claimed. `further` names sources whose effect is wanted
-  /// too; those that this cell or batch cannot have are left out.
+  /// The noise is that of the measurement and, on top, a robust estimate of what is left beyond it, whatever its
+  /// reason: as long as something large is unexplained, nothing small is claimed. `further` names sources whose effect
+  /// is wanted too; those that the cell or the model cannot have are left out. `batch` outlives the problem.
   LinearProblem(const PhysicalModel& model, const MeasurementBatch& batch, const std::vector<Parameter>& priors,
                 const std::vector<std::string>& further);
 
@@ -41,11 +41,11 @@ class LinearProblem {
   [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
   /// R x n: what one radian (metre) of each joint does, whitened.
   [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
-  /// R: 1 / standard deviation of each row, SI.
+  /// R: 1 / standard deviation of each row, in 1/m and 1/rad.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
-  /// m per axis: noise of a typical position, whatever its reason.
+  /// m per axis: noise of a typical position, whatever its reason. A root mean square.
   [[nodiscard]] double noise() const { return position_.noise; }
-  /// m per axis: what the measurements themselves are said to be good for.
+  /// m per axis: standard deviation that is stated for a measured position. A root mean square.
   [[nodiscard]] double instrument() const { return position_.stated; }
   /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of freedom behind them.
   struct Spread {
@@ -61,8 +61,12 @@ class LinearProblem {
   [[nodiscard]] double position_rms(const Eigen::VectorXd& whitened) const;
 
  private:
-  void fill(const PhysicalModel& extended, const std::vector<Eigen::Index>& places, Eigen::Index joints);
+  struct Extended;
+  [[nodiscard]] Extended extended_by(const std::vector<std::string>& further);
+  void differentiate(const Extended& extended);
+  void measure(Eigen::Index pose, const Pose& X_WT);
   void whiten();
+  Spread weigh(const std::vector<Eigen::Index>& rows, double surplus, double share);
 
   PhysicalModel model_;
   const MeasurementBatch* batch_;

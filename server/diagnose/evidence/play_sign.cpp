@@ -4,20 +4,21 @@
 
 #include "server/base/coverage.h"
 #include "server/diagnose/evidence/effect.h"
+#include "server/diagnose/thresholds.h"
 #include "server/robot/arm_state.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kSure = 1.645;    // standard deviations, of the mean: one side, 95 %
-constexpr double kSureOfPose = 2;  // the same of one pose
-constexpr double kPartOfPoses = 0.25;
+/// b and k of b + k |tau|, SI, with their covariance.
+struct Play {
+  Eigen::Vector2d value;
+  Eigen::Matrix2d covariance;
+};
 
-}  // namespace
-
-PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint, const Eigen::VectorXd& change,
-                      const Eigen::MatrixXd& covariance) {
+Play play_of(const LinearProblem& problem, const std::string& source, const Eigen::VectorXd& change,
+             const Eigen::MatrixXd& covariance) {
   const std::vector<Eigen::Index> places = places_of_source(problem.model(), source);
   Eigen::Vector2d value, scale;
   for (Eigen::Index k = 0; k < 2; ++k) {
@@ -25,22 +26,39 @@ PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, i
     scale(k) = problem.nuisance_parameters()[static_cast<std::size_t>(place)].prior_scale;
     value(k) = problem.model().values(place) + scale(k) * change(place);
   }
-  const Eigen::Matrix2d own = scale.asDiagonal() * Eigen::Matrix2d(covariance(places, places)) * scale.asDiagonal();
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  double directed = 0;
-  double negative = 0;
+  return {value, scale.asDiagonal() * Eigen::Matrix2d(covariance(places, places)) * scale.asDiagonal()};
+}
+
+/// (1, |tau|) at every pose that was approached from a known side of the joint.
+std::vector<Eigen::Vector2d> directed_poses(const LinearProblem& problem, int joint) {
+  std::vector<Eigen::Vector2d> poses;
   for (const Measurement& m : problem.batch().measurements) {
     if (m.context.direction.empty() || m.context.direction[static_cast<std::size_t>(joint)] == 0) continue;
     const double torque = ArmKinematics(problem.model().state(m.context)).gravity_torque()(joint);
-    const Eigen::Vector2d by_value(1, std::abs(torque));
-    mean += by_value;
-    ++directed;
-    if (by_value.dot(value) < -kSureOfPose * std::sqrt(by_value.dot(own * by_value))) ++negative;
+    poses.emplace_back(1, std::abs(torque));
   }
-  if (directed == 0) return {joint, 0, 0, false};
+  return poses;
+}
+
+}  // namespace
+
+PlaySign sign_of_play(const LinearProblem& problem, const std::string& source, int joint, const Eigen::VectorXd& change,
+                      const Eigen::MatrixXd& covariance) {
+  const Play play = play_of(problem, source, change, covariance);
+  const std::vector<Eigen::Vector2d> poses = directed_poses(problem, joint);
+  if (poses.empty()) return {joint, 0, 0, false};
+  const auto stddev = [&](const Eigen::Vector2d& pose) { return std::sqrt(pose.dot(play.covariance * pose)); };
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double negative = 0;
+  for (const Eigen::Vector2d& pose : poses) {
+    mean += pose;
+    if (pose.dot(play.value) < -thresholds::kWrongSignOfPose * stddev(pose)) ++negative;
+  }
+  const auto directed = static_cast<double>(poses.size());
   mean /= directed;
-  PlaySign sign{joint, mean.dot(value), std::sqrt(mean.dot(own * mean)), false};
-  sign.negative = sign.mean < -kSure * sign.stddev || negative > kPartOfPoses * directed;
+  PlaySign sign{joint, mean.dot(play.value), stddev(mean), false};
+  sign.negative =
+      sign.mean < -thresholds::kWrongSign * sign.stddev || negative > thresholds::kPosesOfWrongSign * directed;
   return sign;
 }
 

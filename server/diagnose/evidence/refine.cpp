@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 5;
-constexpr double kSettled = 0.05;  // standard deviations, together
+constexpr int kMostSteps = 5;      // of Gauss and Newton; three settle what is nearly linear
+constexpr double kSettled = 0.05;  // standard deviations, of all parameters together: a step that changes no result
 
 /// How far each parameter stands from its prior, in units of it.
 VectorXd from_prior(const PriorModel& at) {
@@ -27,40 +27,73 @@ VectorXd from_prior(const PriorModel& at) {
   return distance;
 }
 
-/// The step that lowers the sum of squares most without leaving a parameter below its bound: what would go beyond stops
-/// there, and everything else is solved for anew. Cutting a step off afterwards would leave the others where they were
-/// to make up for what was cut.
-VectorXd bounded_step(const PriorModel& at, const MatrixXd& information, const VectorXd& right) {
-  VectorXd step = information.llt().solve(right);
-  const Index P = at.model.values.size();
-  std::vector<bool> held(static_cast<std::size_t>(right.size()), false);
-  const auto room = [&](Index i) {
+/// A normal equation: information * step = right. The model's parameters come first.
+struct NormalEquation {
+  MatrixXd information;
+  VectorXd right;
+};
+
+/// The step that lowers the sum of squares most and takes every parameter that is `held` to its bound: `room` from
+/// where it stands, at any price.
+VectorXd step_to_bounds(const NormalEquation& equation, const std::vector<bool>& held, const VectorXd& room) {
+  MatrixXd left = equation.information;
+  VectorXd rest = equation.right;
+  for (Index i = 0; i < room.size(); ++i) {
+    if (!held[static_cast<std::size_t>(i)]) continue;
+    rest -= room(i) * equation.information.col(i);
+    left.row(i).setZero();
+    left.col(i).setZero();
+    left(i, i) = 1;
+  }
+  for (Index i = 0; i < room.size(); ++i) {
+    if (held[static_cast<std::size_t>(i)]) rest(i) = room(i);
+  }
+  return left.llt().solve(rest);
+}
+
+/// How far each parameter is above its lower bound, in units of its prior and with a minus sign.
+VectorXd room_of(const PriorModel& at) {
+  VectorXd room(at.model.values.size());
+  for (Index i = 0; i < room.size(); ++i) {
     const Parameter& prior = at.priors[static_cast<std::size_t>(i)];
-    return (prior.lower - at.model.values(i)) / prior.prior_scale;
-  };
-  for (bool more = true; more;) {
-    more = false;
-    for (Index i = 0; i < P; ++i) {
+    room(i) = (prior.lower - at.model.values(i)) / prior.prior_scale;
+  }
+  return room;
+}
+
+/// The step that lowers the sum of squares most without leaving a parameter below its bound. What would go beyond stops
+/// there, and everything else is solved for anew: a step that is cut off afterwards leaves the others where they made
+/// up for what was cut.
+VectorXd bounded_step(const PriorModel& at, const NormalEquation& equation) {
+  VectorXd step = equation.information.llt().solve(equation.right);
+  const VectorXd room = room_of(at);
+  std::vector<bool> held(static_cast<std::size_t>(room.size()), false);
+  while (true) {
+    bool more = false;
+    for (Index i = 0; i < room.size(); ++i) {
       if (held[static_cast<std::size_t>(i)] || step(i) >= room(i)) continue;
       held[static_cast<std::size_t>(i)] = more = true;
     }
-    if (!more) break;
-    // What is held moves to its bound, at any price.
-    MatrixXd left = information;
-    VectorXd rest = right;
-    for (Index i = 0; i < P; ++i) {
-      if (!held[static_cast<std::size_t>(i)]) continue;
-      rest -= room(i) * information.col(i);
-      left.row(i).setZero();
-      left.col(i).setZero();
-      left(i, i) = 1;
-    }
-    for (Index i = 0; i < P; ++i) {
-      if (held[static_cast<std::size_t>(i)]) rest(i) = room(i);
-    }
-    step = left.llt().solve(rest);
+    if (!more) return step;
+    step = step_to_bounds(equation, held, room);
   }
-  return step;
+}
+
+/// About where the model stands. `columns`: of the whole background; the priors pull by `distance` from them.
+NormalEquation normal_equation(const LinearProblem& problem, const MatrixXd& columns, const VectorXd& distance) {
+  NormalEquation equation{transposed_product(columns, columns), columns.transpose() * problem.residual()};
+  equation.right.head(distance.size()) -= distance;
+  equation.information.diagonal().array() += 1;
+  return equation;
+}
+
+/// Moves the model by `step`, in units of priors.
+void move(PriorModel& at, const VectorXd& step) {
+  for (Index i = 0; i < at.model.values.size(); ++i) {
+    const Parameter& prior = at.priors[static_cast<std::size_t>(i)];
+    double& value = at.model.values(i);
+    value = std::max(value + prior.prior_scale * step(i), prior.lower);  // rounding
+  }
 }
 
 }  // namespace
@@ -98,23 +131,15 @@ double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std:
   double left = 0;
   for (int k = 0; k < kMostSteps; ++k) {
     const LinearProblem problem(prior_model.model, batch, prior_model.priors, {});
-    const MatrixXd columns = background_columns(problem, unnamed);
-    const Index P = problem.nuisance().cols();
-    MatrixXd information = transposed_product(columns, columns);
-    VectorXd right = columns.transpose() * problem.residual();
     const VectorXd distance = from_prior(prior_model);
+    const NormalEquation equation = normal_equation(problem, background_columns(problem, unnamed), distance);
+    const VectorXd step = bounded_step(prior_model, equation);
     left = problem.residual().squaredNorm() + distance.squaredNorm();
-    right.head(P) -= distance;
-    information.diagonal().array() += 1;
-    const VectorXd step = bounded_step(prior_model, information, right);
-    left -= 2 * right.dot(step) - step.dot(information * step);
-    for (Index i = 0; i < P; ++i) {
-      const Parameter& prior = prior_model.priors[static_cast<std::size_t>(i)];
-      double& value = prior_model.model.values(i);
-      value = std::max(value + prior.prior_scale * step(i), prior.lower);  // rounding
-    }
+    left -= 2 * equation.right.dot(step) - step.dot(equation.information * step);
+    move(prior_model, step);
+    const Index P = distance.size();
     const VectorXd own = step.head(P);
-    if (own.dot(information.topLeftCorner(P, P) * own) < kSettled * kSettled) break;
+    if (own.dot(equation.information.topLeftCorner(P, P) * own) < kSettled * kSettled) break;
   }
   return left;
 }

@@ -6,18 +6,18 @@
 
 namespace trammel {
 
-/// A smooth function that no named cause beats.
+/// An anonymous function that explains what no named cause does.
 struct Unnamed {
-  std::vector<std::string> depends_on;
-  Eigen::MatrixXd columns;  ///< R x m over all poses that are left, SI, of the fitted size
-  double score = 0;
+  std::vector<std::string> depends_on;  ///< `q4`, `time`
+  Eigen::MatrixXd columns;              ///< R x m over the poses that are not out, SI, of the fitted size
+  double score = 0;                     ///< nat
   double p_value = 1;
 };
 
-/// All columns of a background: the model's own parameters, then what is unnamed. R x p, whitened.
+/// All columns of a background, whitened, R x p: the model's own parameters, then the anonymous functions.
 [[nodiscard]] Eigen::MatrixXd background_columns(const LinearProblem& problem, const std::vector<Unnamed>& unnamed);
 
-/// A model with the priors its parameters have, one a parameter.
+/// A model and the prior of each of its parameters.
 struct PriorModel {
   PhysicalModel model;
   std::vector<Parameter> priors;
@@ -28,8 +28,8 @@ struct PriorModel {
 /// Takes the source of that name out.
 void remove_from(PriorModel& prior_model, const std::string& source);
 
-/// Identifies all parameters anew, from where they stand, beside what is unnamed: Gauss-Newton on the whitened rows,
-/// maximum a posteriori. Returns the sum of squares that is left, priors' included.
+/// Identifies all parameters anew, from where they stand, beside the anonymous functions: Gauss-Newton on the whitened
+/// rows, maximum a posteriori. Returns the sum of squares that is left, that of the priors included.
 double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed);
 
 }  // namespace trammel

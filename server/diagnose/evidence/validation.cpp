@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "server/diagnose/evidence/background.h"
+#include "server/diagnose/thresholds.h"
 
 namespace trammel {
 
@@ -14,7 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFamilywise = 0.01;
+constexpr double kFarthest = 400;  // of chi-square: beyond it no chance is left that a double tells from 0
+constexpr int kHalvings = 60;      // of an interval: all that a double can hold
 
 /// The value that chi-square of three degrees of freedom exceeds with that chance.
 double chi_square_3(double chance) {
@@ -22,26 +24,30 @@ double chi_square_3(double chance) {
     return std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
   };
   double low = 0;
-  double high = 400;
-  for (int k = 0; k < 60; ++k) {
+  double high = kFarthest;
+  for (int k = 0; k < kHalvings; ++k) {
     const double middle = 0.5 * (low + high);
     (beyond(middle) > chance ? low : high) = middle;
   }
   return high;
 }
 
+/// How far rows that nothing was learned from are from a model.
 struct Judged {
   Eigen::Matrix3Xd error_B;  ///< m
-  VectorXd distance;         ///< squared, in expected deviations
+  VectorXd distance;         ///< squared error over the expected one: chi-square of three if the row fits
 };
+
+VectorXd scales_of(const std::vector<Parameter>& parameters) {
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k) scales(static_cast<Index>(k)) = parameters[k].prior_scale;
+  return scales;
+}
 
 Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
   const PhysicalModel& model = fitted.model();
   const MatrixXd covariance = Background(fitted.nuisance()).covariance();
-  VectorXd scale(covariance.cols());
-  for (Index k = 0; k < scale.size(); ++k) {
-    scale(k) = fitted.nuisance_parameters()[static_cast<std::size_t>(k)].prior_scale;
-  }
+  const VectorXd scale = scales_of(fitted.nuisance_parameters());
   const auto n = static_cast<Index>(rows.measurements.size());
   Judged result{Eigen::Matrix3Xd(3, n), VectorXd(n)};
   MatrixXd J;
@@ -62,7 +68,7 @@ Judged judged(const LinearProblem& fitted, const MeasurementBatch& rows) {
 Validation validate(const LinearProblem& before, const LinearProblem& after, const MeasurementBatch& rows) {
   const Judged first = judged(before, rows);
   const Judged last = judged(after, rows);
-  const double limit = chi_square_3(kFamilywise / static_cast<double>(rows.measurements.size()));
+  const double limit = chi_square_3(thresholds::kMisjudgedHeldOut / static_cast<double>(rows.measurements.size()));
   Validation validation{figures_of(first.error_B), figures_of(last.error_B), {}, {}, {}};
   std::vector<Index> fit;
   for (Index i = 0; i < first.distance.size(); ++i) {
@@ -71,8 +77,11 @@ Validation validate(const LinearProblem& before, const LinearProblem& after, con
       continue;
     }
     const Measurement& m = rows.measurements[static_cast<std::size_t>(i)];
-    validation.fit_neither.push_back(
-        {m.pose_id, m.row, last.error_B.col(i).norm(), "held-out pose that fits neither model: repeat it", true});
+    validation.fit_neither.push_back({.pose_id = m.pose_id,
+                                      .row = m.row,
+                                      .distance = last.error_B.col(i).norm(),
+                                      .reason = "held-out pose that fits neither model: repeat it",
+                                      .held_out = true});
   }
   if (!validation.fit_neither.empty() && !fit.empty()) {
     validation.before_without = figures_of(first.error_B(Eigen::all, fit));

@@ -5,16 +5,16 @@
 
 namespace trammel {
 
-/// Rows that nothing was learned from, against the model before and after.
+/// The error of held-out rows, before and after.
 struct Validation {
   ErrorFigures before, after;
-  std::vector<SuspectedPose> fit_neither;                     ///< beyond what either model leaves room for
+  std::vector<SuspectedPose> fit_neither;                     ///< rows that fit neither model
   std::optional<ErrorFigures> before_without, after_without;  ///< the same without these; empty where there are none
 };
 
-/// `before`, `after`: the problems that the models were fitted to. A row fits a model when its squared error over what
-/// is expected there (noise, and what the parameters are uncertain by) is below what one in a hundred batches of as
-/// many good rows has anywhere.
+/// Judges held-out `rows` by the models that `before` and `after` were made about. A row fits a model when its squared
+/// error over the expected one (noise, and the uncertainty of the parameters) stays below what the largest of as many
+/// good rows exceeds in 1 of 100 batches.
 [[nodiscard]] Validation validate(const LinearProblem& before, const LinearProblem& after,
                                   const MeasurementBatch& rows);
 

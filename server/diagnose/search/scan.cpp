@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "server/diagnose/thresholds.h"
+
 namespace trammel {
 
 namespace {
@@ -12,10 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kTail = 0.1;          // share of the draws that its tail is fitted to
-constexpr double kLeastChance = 1e-6;  // no tail of a few hundred draws is known further
-constexpr double kChance =
-    0.003;  // of a false alarm a scan: a diagnosis scans at least twice, and 1 % is for all of it
+constexpr double kTail = 0.1;  // share of the draws that the tail is fitted to: 40 of 400 give its fall to a sixth
 
 double quantile(const VectorXd& ascending, double share) {
   const double place = share * static_cast<double>(ascending.size() - 1);
@@ -24,7 +23,7 @@ double quantile(const VectorXd& ascending, double share) {
   return ascending(below) + (place - static_cast<double>(below)) * (ascending(above) - ascending(below));
 }
 
-/// Above the threshold the draws fall off exponentially: where that begins and how fast.
+/// The draws above `threshold` fall off exponentially; `scale` is their mean distance from it.
 struct Tail {
   double threshold, scale;
 };
@@ -54,7 +53,7 @@ double Chance::limit_at(double share) const {
 
 double Chance::p_value(double score) const {
   const Tail tail = tail_of(null_score);
-  if (score > tail.threshold) return std::max(kLeastChance, kTail * std::exp(-(score - tail.threshold) / tail.scale));
+  if (score > tail.threshold) return std::max(kLeastPValue, kTail * std::exp(-(score - tail.threshold) / tail.scale));
   const auto above = std::count_if(null_score.begin(), null_score.end(), [&](double s) { return s >= score; });
   return static_cast<double>(above + 1) / static_cast<double>(null_score.size() + 1);
 }
@@ -89,7 +88,7 @@ Chance chance_of(const std::vector<FamilyPtr>& families, const Background& backg
     }
   }
   std::sort(chance.null_score.begin(), chance.null_score.end());
-  chance.limit = chance.limit_at(kChance);
+  chance.limit = chance.limit_at(thresholds::kFalseAlarms);
   return chance;
 }
 

@@ -11,32 +11,33 @@
 
 namespace trammel {
 
-/// What chance alone brings on these very poses: parametric bootstrap of the background.
+/// What chance alone brings at these poses, from a parametric bootstrap of the background.
 struct Chance {
-  std::map<std::string, double> penalty;  ///< nat, by label: what a family reaches by chance (it may search far), and
-                                          ///< how little it is to be expected
-  Eigen::VectorXd null_score;             ///< the best score of all families in each draw, ascending
-  double limit = 0;                       ///< nat: score that the best of all reaches in 3 of 1000 batches
+  std::map<std::string, double> penalty;  ///< nat, by a family's label: the median of what it reaches by chance (it may
+                                          ///< search far), and how much less it is to be expected than others
+  Eigen::VectorXd null_score;             ///< nat: the best score of all families in each draw, ascending
+  double limit = 0;  ///< nat: the line, which the best of all passes in 3 of 1000 batches by chance
 
   [[nodiscard]] double penalty_of(const Family& family) const;
-  /// nat: score that the best of all reaches with nothing there in `share` of all batches (below a tenth).
+  /// nat: the score that the best of all passes by chance in `share` of the batches. `share` is below a tenth.
   [[nodiscard]] double limit_at(double share) const;
-  /// Chance that the best of all reaches a score with nothing there; beyond the draws by their exponential tail.
+  /// Chance of such a score of the best of all with nothing to find. Beyond the draws it follows their exponential
+  /// tail, not below kLeastPValue.
   [[nodiscard]] double p_value(double score) const;
 };
 
-/// R x draws: samples of the background's whitened rows.
+/// R x draws: samples of whitened rows in which nothing but the background acts.
 [[nodiscard]] Eigen::MatrixXd draw_null(const Background& background, Eigen::Index draws, std::uint64_t seed);
 
 [[nodiscard]] Chance chance_of(const std::vector<FamilyPtr>& families, const Background& background, Eigen::Index draws,
                                std::uint64_t seed);
 
-/// All families looked at together.
+/// How well every family explains one data vector.
 struct Scan {
-  std::vector<Best> best;     ///< a family each
+  std::vector<Best> best;     ///< one a family
   std::vector<double> score;  ///< nat: evidence less penalty
 
-  /// The family with the best score among those `admitted`; empty where none has any.
+  /// The family with the best score among those `admitted`; empty where none explains anything.
   template <typename Admitted>
   [[nodiscard]] std::optional<std::size_t> strongest(const Admitted& admitted) const {
     std::optional<std::size_t> found;
@@ -47,11 +48,11 @@ struct Scan {
   }
 };
 
-/// Scans `data` (R, whitened); families that are not `admitted` keep an empty best.
+/// Scans `data` (R, whitened). Families that are not `admitted` keep an empty best.
 [[nodiscard]] Scan scan(const std::vector<FamilyPtr>& families, const View& view, const Eigen::VectorXd& data,
                         const Chance& chance, const std::function<bool(std::size_t)>& admitted = {});
 
-/// The family that scores best in each column of `data`, and its score; -1 and 0 where none has any.
+/// The family that scores best in each column of `data`, and its score; -1 and 0 where none scores above 0.
 struct Winners {
   std::vector<int> family;
   std::vector<double> score;

@@ -4,7 +4,11 @@
 
 #include "server/diagnose/evidence/effect.h"
 #include "server/diagnose/search/folds.h"
+#include "server/diagnose/search/forms.h"
 #include "server/diagnose/search/naming.h"
+#include "server/diagnose/search/pruning.h"
+#include "server/diagnose/search/standing.h"
+#include "server/diagnose/thresholds.h"
 
 namespace trammel {
 
@@ -14,18 +18,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 40;          // forward and backward
-constexpr double kMostOutliers = 0.1;   // of the poses
-constexpr double kBeyondDoubt = 6;      // times the line: there no fold can disagree
-constexpr double kTellingColumn = 0.1;  // sigmas over all rows, that a function's share may at most be left out with
-constexpr double kUnnamedMargin = 2;    // nat, by which no name must be better than a name
-constexpr double kContender = 0.3;      // of the best score, to be among those that folds choose from
-constexpr double kSimplerMargin = 5;    // nat
-constexpr int kFewestHarmonics = 4;
-constexpr const char* kOfManyForms = "compliance";
-constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
-
-Failure given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request"); }
+constexpr int kMostSteps = 40;          // forward and backward: no batch has needed half of them
+constexpr double kShareOfWork = 0.6;    // of a diagnosis, for the line of progress
+constexpr double kTellingColumn = 0.1;  // standard deviations over all rows together: what moves them less is left out
 
 std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   std::vector<Parameter> priors;
@@ -33,428 +28,351 @@ std::vector<Parameter> priors_of(const CalibrationResult& calibration) {
   return priors;
 }
 
+/// Without `count` rows from `first` on.
+void drop_rows(MatrixXd& columns, Index first, Index count) {
+  MatrixXd kept(columns.rows() - count, columns.cols());
+  kept << columns.topRows(first), columns.bottomRows(columns.rows() - first - count);
+  columns = std::move(kept);
+}
+
+/// Forward and backward selection. Every step leaves `result_` a model that is identified beside all that was found.
 class Search {
  public:
   Search(std::shared_ptr<const Cell> cell, const DiagnoseOptions& options)
       : cell_(std::move(cell)), options_(options) {}
 
-  Status start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
-    result_.all = result_.batch = batch;
-    const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
-    if (!calibration) return tl::make_unexpected(calibration.error());
-    form_is_open_ = std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
-    result_.before = {calibration->model, priors_of(*calibration)};
-    result_.after = result_.before;
-    return {};
-  }
-
-  /// Accepts one more; false where nothing passes.
-  Result<bool> step() {
-    const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors,
-                                candidate_sources(*cell_, result_.batch, nullptr));
-    const std::vector<FamilyPtr> families = make_families(problem);
-    const MatrixXd columns = background_columns(problem, result_.unnamed);
-    const Background background(columns);
-    if (chance_.null_score.size() == 0) renew_chance(families, background);
-    Scan seen = scan(families, {background}, problem.residual(), chance_);
-    const auto open = [&](std::size_t f) { return !is_closed(*families[f], seen.best[f]); };
-    auto best = seen.strongest(open);
-    if (best && is_close(seen.score[*best]) && renewed_for_ != result_.accepted.size() + result_.unnamed.size()) {
-      renew_chance(families, background);
-      seen = scan(families, {background}, problem.residual(), chance_);
-      best = seen.strongest(open);
-    }
-    if (!best || seen.score[*best] < chance_.limit) return false;
-    auto named = seen.strongest([&](std::size_t f) { return open(f) && families[f]->named(); });
-    if (named) named = simplest(families, seen, *named, open);
-    const bool unnamed_wins =
-        !families[*best]->named() && (!named || seen.score[*best] > seen.score[*named] + kUnnamedMargin);
-    if (unnamed_wins) {
-      const bool path = named && named_path_score(families, columns, problem.residual(), open) >= seen.score[*best];
-      if (!path) return take_unnamed(problem, *families[*best], seen, *best);
-    }
-    return take_named(problem, families, background, columns, seen, *named, open);
-  }
-
-  /// Drops what does not pass any more beside all the rest.
-  Result<bool> prune() {
-    const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-    const Background all(background_columns(problem, result_.unnamed));
-    const VectorXd change = all.estimate(problem.residual());
-    const MatrixXd covariance = all.covariance();
-    for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
-      if (result_.accepted[k].source.empty()) continue;
-      const double score = remaining_score(problem, change, covariance, result_.accepted[k]);
-      if (score >= chance_.limit) continue;
-      closed_.push_back(result_.accepted[k].cause);
-      remove_from(result_.after, result_.accepted[k].in_model);
-      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
-      refine(result_.after, result_.batch, result_.unnamed);
-      return true;
-    }
-    return prune_unnamed(problem);
-  }
-
-  /// Chooses the form of the compliance anew beside all that was found since: chosen while much was missing it may be
-  /// another, and what a wrong form leaves over would be given other names.
-  void reform() {
-    const auto& sources = result_.after.model.sources;
-    const auto present = std::find_if(sources.begin(), sources.end(), [](const ErrorSourcePtr& source) {
-      return source->name().starts_with(fmt::format("{}_", kOfManyForms));
-    });
-    if (present == sources.end()) return;
-    const std::string form = (*present)->name();
-    const auto finding = std::find_if(result_.accepted.begin(), result_.accepted.end(),
-                                      [&](const Accepted& one) { return one.in_model == form; });
-    if (finding == result_.accepted.end() && !form_is_open_) return;
-    const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
-    const VectorXd values = result_.after.model.values(places_of_source(result_.after.model, form));
-    const PriorModel now = result_.after;
-    double least = held_out_square(now, weight);
-    for (const std::string& other : alternatives(kOfManyForms, *cell_)) {
-      if (other == form) continue;
-      PriorModel changed = now;
-      remove_from(changed, form);
-      if (!add_to(changed, other)) continue;
-      const std::vector<Index> places = places_of_source(changed.model, other);
-      if (static_cast<Index>(places.size()) == values.size()) changed.model.values(places) = values;
-      refine(changed, result_.batch, result_.unnamed);
-      const double square = held_out_square(changed, weight);
-      if (square >= least) continue;
-      least = square;
-      result_.after = std::move(changed);
-      if (finding != result_.accepted.end()) {
-        finding->in_model = other;
-      } else {
-        if (result_.reformed_from.empty()) result_.reformed_from = form;
-        result_.reformed_to = other;
-      }
-    }
-  }
-
-  /// Asks of every finding again, all others in place, what it is: while they were missing another cause may have
-  /// looked more like it.
-  Status reconsider() {
-    if (result_.accepted.size() < 2) return {};
-    for (std::size_t k = 0; k < result_.accepted.size(); ++k) {
-      Accepted& one = result_.accepted[k];
-      const bool beyond_doubt = one.could_also_be.empty() && one.best.evidence > kBeyondDoubt * chance_.limit;
-      if (one.source.empty() || beyond_doubt) continue;
-      const PriorModel with = result_.after;
-      remove_from(result_.after, one.in_model);
-      refine(result_.after, result_.batch, result_.unnamed);
-      const Result<bool> named = name_again(one);
-      if (!named) return tl::make_unexpected(named.error());
-      if (!*named) result_.after = with;
-    }
-    return {};
-  }
-
-  /// What has the sign that play cannot have is a dependence on the side of approach that has no name.
-  void open_negative_play() {
-    for (std::size_t k = 0; k < result_.accepted.size();) {
-      const Accepted one = result_.accepted[k];
-      const std::optional<PlaySign> sign = one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
-      if (!sign || !sign->negative) {
-        ++k;
-        continue;
-      }
-      const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-      const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
-      const std::string joint = std::to_string(one.cause.joint + 1);
-      result_.unnamed.push_back({{"q" + joint, "dir" + joint},
-                                 problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
-                                 one.best.evidence - one.penalty,
-                                 one.p_value});
-      result_.negative_play.push_back(*sign);
-      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
-      remove_from(result_.after, one.in_model);
-      refine(result_.after, result_.batch, result_.unnamed);
-    }
-  }
-
-  SearchResult take() {
-    const bool extended = std::any_of(result_.accepted.begin(), result_.accepted.end(),
-                                      [](const Accepted& one) { return !one.source.empty(); });
-    // What was tried and dropped leaves no trace.
-    if (!extended) {
-      result_.after = result_.before;
-      result_.reformed_from.clear();
-      refine(result_.after, result_.batch, result_.unnamed);
-    }
-    // Of the pose itself nothing was learned, and by now all else is known.
-    for (Accepted& one : result_.accepted) {
-      const auto& poses = result_.all.measurements;
-      const auto pose =
-          std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
-      if (one.source.empty() && pose != poses.end())
-        one.pose.distance = (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
-    }
-    result_.chance = std::move(chance_);
-    return std::move(result_);
-  }
+  [[nodiscard]] Status start(const std::vector<std::string>& sources, const MeasurementBatch& batch);
+  /// Accepts one more cause or function, or closes one that does not hold; false where nothing passes.
+  [[nodiscard]] Result<bool> step();
+  /// Drops one that does not pass any more beside all the rest; false where all pass.
+  [[nodiscard]] bool prune();
+  void choose_compliance_again() { trammel::choose_compliance_again(result_, own_compliance_is_open_); }
+  /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
+  /// more like it.
+  [[nodiscard]] Status reconsider();
+  /// Play of the wrong sign becomes a dependence on the side of approach that has no name.
+  void open_negative_play();
+  [[nodiscard]] SearchResult take();
 
  private:
-  /// Of a joint's play, beside all the rest.
-  PlaySign sign_of(const Accepted& one) const {
-    const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-    const Background all(background_columns(problem, result_.unnamed));
-    return sign_of_play(problem, one.in_model, one.cause.joint, all.estimate(problem.residual()), all.covariance());
-  }
+  [[nodiscard]] Scan scan_beside_all(const Standing& standing);
+  void renew_chance(const Standing& standing);
+  [[nodiscard]] Choice choice_of(const Standing& standing, Scan seen) const;
+  [[nodiscard]] bool is_closed(const Cause& cause) const;
+  [[nodiscard]] bool is_function(const Standing& standing, const Choice& choice, std::size_t best,
+                                 std::optional<std::size_t> named) const;
+  [[nodiscard]] double named_path_score(const Standing& standing, const Admitted& open) const;
+  [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const;
+  [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen, std::size_t place) const;
 
-  /// Sum of squares of the poses held out, each predicted from the others, in units of `weight`.
-  double held_out_square(const PriorModel& prior_model, const VectorXd& weight) const {
-    const LinearProblem problem(prior_model.model, result_.batch, prior_model.priors, {});
-    const VectorXd left =
-        Folds(problem, background_columns(problem, result_.unnamed)).held_out_residual(problem.residual());
-    return left.cwiseQuotient(problem.weight()).cwiseProduct(weight).squaredNorm();
-  }
+  void take_function(const Standing& standing, const Scan& seen, std::size_t place);
+  [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice, std::size_t place);
+  void take_outlier(const LinearProblem& problem, Accepted one);
+  [[nodiscard]] Status take_cause(Accepted one);
+  [[nodiscard]] Result<bool> name_again(Accepted& one);
 
-  /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
-  std::vector<std::string> spellings(const std::string& source) const {
-    if (!source.starts_with("joint_map")) return alternatives(source, *cell_);
-    const std::size_t at = source.find('@');
-    std::vector<std::string> all;
-    for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
-      all.push_back(source.substr(0, at + 1) + std::to_string(harmonics));
-    return all;
-  }
-
-  /// Adds `one`'s source, instead of that of `poorer` where there is one, in the form that predicts best, and
-  /// identifies everything anew. False, and nothing is changed, where poses held out are predicted no better with it.
-  Result<bool> extend(Accepted& one, const Accepted* poorer = nullptr) {
-    const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
-    double least = held_out_square(result_.after, weight);
-    PriorModel start = result_.after;
-    if (poorer != nullptr) remove_from(start, poorer->in_model);
-    std::optional<PriorModel> best;
-    for (const std::string& spelling : spellings(one.source)) {
-      PriorModel extended = start;
-      if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
-      refine(extended, result_.batch, result_.unnamed);
-      const double square = held_out_square(extended, weight);
-      if (square >= least) continue;
-      least = square;
-      one.in_model = spelling;
-      if (one.source.starts_with("joint_map")) one.source = spelling;
-      best = std::move(extended);
-    }
-    if (!best) return false;
-    result_.after = std::move(*best);
-    return true;
-  }
-
-  /// The map of that joint among what is accepted: a second one is more of the first.
-  auto known_map(const Cause& cause) {
-    return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
-      return cause.cause == "joint_map" && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
-    });
-  }
-
-  void renew_chance(const std::vector<FamilyPtr>& families, const Background& background) {
-    chance_ = chance_of(families, background, options_.draws, options_.seed);
-    renewed_for_ = result_.accepted.size() + result_.unnamed.size();
-  }
-  /// So near to the line that it must be known for the present background.
-  bool is_close(double score) const { return score > 0.6 * chance_.limit && score < 1.6 * chance_.limit; }
-
-  bool is_closed(const Family& family, const Best& best) const {
-    const Cause cause = family.cause(best);
-    return std::any_of(closed_.begin(), closed_.end(), [&](const Cause& one) {
-      return one.cause == cause.cause && one.joint == cause.joint && one.parameter == cause.parameter &&
-             one.pose_id == cause.pose_id && (!one.order || !cause.order || std::abs(*one.order - *cause.order) < 0.5);
-    });
-  }
-
-  /// The strongest cause in the place of `one`, which the model is without.
-  Result<bool> name_again(Accepted& one) {
-    const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors,
-                                candidate_sources(*cell_, result_.batch, nullptr));
-    const std::vector<FamilyPtr> families = make_families(problem);
-    const Background background(background_columns(problem, result_.unnamed));
-    const Scan seen = scan(families, {background}, problem.residual(), chance_);
-    const auto open = [&](std::size_t f) {
-      const auto map = known_map(families[f]->cause(seen.best[f]));
-      return families[f]->named() && families[f]->predicts() && !is_closed(*families[f], seen.best[f]) &&
-             (map == result_.accepted.end() || &*map == &one);
-    };
-    auto place = seen.strongest(open);
-    if (place) place = simplest(families, seen, *place, open);
-    if (place && seen.score[*place] >= chance_.limit) {
-      const Family& family = *families[*place];
-      const Naming naming = name_or_doubt(problem, families, background, seen, chance_, *place, options_.seed + 1);
-      Accepted again = {family.cause(seen.best[*place]),
-                        family.source(seen.best[*place]),
-                        "",
-                        seen.best[*place],
-                        chance_.penalty_of(family),
-                        chance_.p_value(seen.score[*place]),
-                        naming.frequency,
-                        naming.could_also_be,
-                        {}};
-      const Result<bool> extended = extend(again);
-      if (extended && *extended) one = again;
-      return extended;
-    }
-    return false;
-  }
-
-  /// A step that a cause acting from the first pose on explains nearly as well is that cause; and a map of a joint's
-  /// angle that an off-centre disc explains nearly as well is that disc.
-  static std::size_t simplest(const std::vector<FamilyPtr>& families, const Scan& seen, std::size_t strongest,
-                              const std::function<bool(std::size_t)>& open) {
-    const Cause cause = families[strongest]->cause(seen.best[strongest]);
-    const auto simpler = seen.strongest([&](std::size_t f) {
-      if (!open(f) || !families[f]->named()) return false;
-      const Cause other = families[f]->cause(seen.best[f]);
-      return is_whole_of(other, cause) ||
-             (cause.cause == "joint_map" && other.cause == "encoder_eccentricity" && other.joint == cause.joint);
-    });
-    return simpler && seen.score[*simpler] > seen.score[strongest] - kSimplerMargin ? *simpler : strongest;
-  }
-
-  /// nat: what the best few named causes, taken one after the other, explain together.
-  double named_path_score(const std::vector<FamilyPtr>& families, MatrixXd columns, const VectorXd& data,
-                          const std::function<bool(std::size_t)>& open) const {
-    double total = 0;
-    for (int k = 0; k < kPathLength; ++k) {
-      const Background background(columns);
-      const MatrixXd projected = background.project(data);
-      double highest = 0;
-      MatrixXd chosen;
-      for (std::size_t f = 0; f < families.size(); ++f) {
-        if (!families[f]->named() || !open(f)) continue;
-        const Best best = families[f]->scan({background}, projected).front();
-        const double score = best.evidence - chance_.penalty_of(*families[f]);
-        if (score <= highest) continue;
-        highest = score;
-        chosen = families[f]->columns(best);
-      }
-      if (highest < chance_.limit) break;
-      total += highest;
-      columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
-      columns.rightCols(chosen.cols()) = chosen;
-    }
-    return total;
-  }
-
-  Result<bool> take_unnamed(const LinearProblem& problem, const Family& family, const Scan& seen, std::size_t place) {
-    const MatrixXd all = family.columns(seen.best[place]);
-    std::vector<Index> telling;
-    for (Index k = 0; k < all.cols(); ++k) {
-      if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
-    }
-    result_.unnamed.push_back({family.depends_on(),
-                               problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling),
-                               seen.score[place], chance_.p_value(seen.score[place])});
-    refine(result_.after, result_.batch, result_.unnamed);
-    return true;
-  }
-
-  Result<bool> take_named(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
-                          const Background& background, const MatrixXd& columns, const Scan& seen, std::size_t place,
-                          const std::function<bool(std::size_t)>& open) {
-    const Family& family = *families[place];
-    const Best& best = seen.best[place];
-    if (family.predicts() && seen.score[place] < kBeyondDoubt * chance_.limit) {
-      // What scores little on all poses is not chosen in a fold that has most of them.
-      const auto contends = [&](std::size_t f) {
-        return families[f]->named() && families[f]->predicts() && open(f) &&
-               seen.score[f] > kContender * seen.score[place];
-      };
-      const auto gain = Folds(problem, columns).gain_of_selection(problem.residual(), families, chance_, contends);
-      if (!(gain.after < gain.before)) {
-        closed_.push_back(family.cause(best));
-        return true;
-      }
-    }
-    Accepted one{family.cause(best),
-                 family.source(best),
-                 "",
-                 best,
-                 chance_.penalty_of(family),
-                 chance_.p_value(seen.score[place]),
-                 1,
-                 {},
-                 {}};
-    if (!family.predicts()) return take_outlier(problem, std::move(one));
-    const Naming naming = name_or_doubt(problem, families, background, seen, chance_, place, options_.seed + 1);
-    one.naming_frequency = naming.frequency;
-    one.could_also_be = naming.could_also_be;
-    const auto poorer = known_map(one.cause);
-    const Result<bool> extended = extend(one, poorer == result_.accepted.end() ? nullptr : &*poorer);
-    if (!extended) return extended;
-    if (*extended) {
-      if (poorer != result_.accepted.end()) {
-        one.p_value = std::min(one.p_value, poorer->p_value);
-        result_.accepted.erase(poorer);
-      }
-      result_.accepted.push_back(std::move(one));
-    } else {
-      closed_.push_back(one.cause);
-    }
-    return true;
-  }
-
-  Result<bool> take_outlier(const LinearProblem& problem, Accepted one) {
-    const auto pose = static_cast<std::size_t>(one.best.at);
-    const auto outliers = std::count_if(result_.accepted.begin(), result_.accepted.end(),
-                                        [](const Accepted& a) { return a.source.empty(); });
-    if (static_cast<double>(outliers) >= kMostOutliers * static_cast<double>(result_.all.measurements.size())) {
-      closed_.push_back(one.cause);
-      result_.too_many_outliers = true;
-      return true;
-    }
-    const Measurement& m = result_.batch.measurements[pose];
-    const Index row = problem.first_row(static_cast<Index>(pose));
-    const Index count = problem.row_count(static_cast<Index>(pose));
-    one.pose = {m.pose_id, m.row, problem.positions(problem.residual()).col(static_cast<Index>(pose)).norm(),
-                "single pose, cause not separable: repeat it and its neighbours"};
-    result_.batch.measurements.erase(result_.batch.measurements.begin() + static_cast<std::ptrdiff_t>(pose));
-    for (Unnamed& unnamed : result_.unnamed) {
-      MatrixXd kept(unnamed.columns.rows() - count, unnamed.columns.cols());
-      kept << unnamed.columns.topRows(row), unnamed.columns.bottomRows(unnamed.columns.rows() - row - count);
-      unnamed.columns = std::move(kept);
-    }
-    result_.accepted.push_back(std::move(one));
-    refine(result_.after, result_.batch, result_.unnamed);
-    return true;
-  }
-
-  /// nat: of a finding beside all the rest, from the joint estimate of everything.
-  double remaining_score(const LinearProblem& problem, const VectorXd& change, const MatrixXd& covariance,
-                         const Accepted& one) const {
-    const OwnEstimate own = own_estimate(problem, one.in_model, change, covariance);
-    return log_evidence(own.strength(), std::min<double>(one.best.freedom, static_cast<double>(own.size.size()))) -
-           one.penalty;
-  }
-
-  Result<bool> prune_unnamed(const LinearProblem& problem) {
-    for (std::size_t k = 0; k < result_.unnamed.size(); ++k) {
-      std::vector<Unnamed> others = result_.unnamed;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      const Background rest(background_columns(problem, others));
-      const MatrixXd C = problem.weight().asDiagonal() * result_.unnamed[k].columns;
-      const MatrixXd information = C.transpose() * rest.project(C) + MatrixXd::Identity(C.cols(), C.cols());
-      const VectorXd right = C.transpose() * rest.project(problem.residual());
-      const Eigen::LLT<MatrixXd> factor(information);
-      const double log_det = 2 * MatrixXd(factor.matrixL()).diagonal().array().log().sum();
-      const double evidence = 0.5 * (right.dot(factor.solve(right)) - log_det);
-      if (evidence >= chance_.limit) continue;
-      result_.unnamed = std::move(others);
-      return true;
-    }
-    return false;
-  }
+  [[nodiscard]] std::vector<Accepted>::iterator known_map(const Cause& cause);
+  [[nodiscard]] PlaySign sign_of(const Accepted& one) const;
+  void make_unnamed(const Accepted& play);
+  void refine_all() { refine(result_.after, result_.batch, result_.unnamed); }
 
   std::shared_ptr<const Cell> cell_;
   const DiagnoseOptions& options_;
   SearchResult result_;
   Chance chance_;
-  bool form_is_open_ = false;    // of the compliance that the cell's own list has
+  bool own_compliance_is_open_ = false;
   std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
   std::vector<Cause> closed_;    // were tried and did not hold
 };
+
+Status Search::start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
+  result_.all = result_.batch = batch;
+  const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
+  if (!calibration) return tl::make_unexpected(calibration.error());
+  own_compliance_is_open_ = leaves_compliance_open(sources);
+  result_.before = {calibration->model, priors_of(*calibration)};
+  result_.after = result_.before;
+  return {};
+}
+
+Result<bool> Search::step() {
+  const Standing standing(result_);
+  const Choice choice = choice_of(standing, scan_beside_all(standing));
+  const auto best = choice.best();
+  if (!best || choice.seen.score[*best] < chance_.limit) return false;
+  const auto named = best_named(standing.families, choice);
+  if (is_function(standing, choice, *best, named)) {
+    take_function(standing, choice.seen, *best);
+    return true;
+  }
+  if (const Status taken = take_named(standing, choice, *named); !taken) return tl::make_unexpected(taken.error());
+  return true;
+}
+
+/// Draws the line anew where it was never drawn, and where the best is so near to it that it must be known for the
+/// present background.
+Scan Search::scan_beside_all(const Standing& standing) {
+  if (chance_.null_score.size() == 0) renew_chance(standing);
+  Scan seen = standing.scan(chance_);
+  const auto best = choice_of(standing, seen).best();
+  const bool renewed = renewed_for_ == result_.accepted.size() + result_.unnamed.size();
+  if (!best || renewed) return seen;
+  const double score = seen.score[*best];
+  const auto& [below, above] = thresholds::kNearLine;
+  if (!(score > below * chance_.limit && score < above * chance_.limit)) return seen;
+  renew_chance(standing);
+  return standing.scan(chance_);
+}
+
+void Search::renew_chance(const Standing& standing) {
+  chance_ = chance_of(standing.families, standing.background, options_.draws, options_.seed);
+  renewed_for_ = result_.accepted.size() + result_.unnamed.size();
+}
+
+Choice Search::choice_of(const Standing& standing, Scan seen) const {
+  std::vector<bool> open;
+  for (std::size_t f = 0; f < seen.best.size(); ++f)
+    open.push_back(!is_closed(standing.families[f]->cause(seen.best[f])));
+  return {std::move(seen), [open = std::move(open)](std::size_t f) { return open[f]; }};
+}
+
+bool Search::is_closed(const Cause& cause) const {
+  return std::any_of(closed_.begin(), closed_.end(), [&](const Cause& one) {
+    return one.cause == cause.cause && one.joint == cause.joint && one.parameter == cause.parameter &&
+           one.pose_id == cause.pose_id &&
+           (!one.order || !cause.order || std::abs(*one.order - *cause.order) < thresholds::kSameOrder);
+  });
+}
+
+/// Whether an anonymous function explains more than any named cause, and more than a few of them together.
+bool Search::is_function(const Standing& standing, const Choice& choice, std::size_t best,
+                         std::optional<std::size_t> named) const {
+  if (standing.families[best]->named()) return false;
+  if (!named) return true;
+  const std::vector<double>& score = choice.seen.score;
+  return score[best] > score[*named] + thresholds::kUnnamedMargin &&
+         named_path_score(standing, choice.open) < score[best];
+}
+
+/// nat: what the best few named causes, taken one after the other, explain together.
+double Search::named_path_score(const Standing& standing, const Admitted& open) const {
+  MatrixXd columns = standing.columns;
+  double total = 0;
+  for (int k = 0; k < thresholds::kNamedPath; ++k) {
+    const Background background(columns);
+    const Scan seen = scan(standing.families, {background}, standing.problem.residual(), chance_,
+                           [&](std::size_t f) { return standing.families[f]->named() && open(f); });
+    const auto best = seen.strongest([](std::size_t) { return true; });
+    if (!best || seen.score[*best] < chance_.limit) break;
+    total += seen.score[*best];
+    const MatrixXd chosen = standing.families[*best]->columns(seen.best[*best]);
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
+    columns.rightCols(chosen.cols()) = chosen;
+  }
+  return total;
+}
+
+/// Whether poses held out are predicted better where every fold chooses its cause by itself.
+bool Search::holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const {
+  const std::vector<double>& score = choice.seen.score;
+  if (!standing.families[place]->predicts() || score[place] >= thresholds::kBeyondFolds * chance_.limit) return true;
+  const auto contends = [&](std::size_t f) {
+    return standing.families[f]->named() && standing.families[f]->predicts() && choice.open(f) &&
+           score[f] > thresholds::kFoldContender * score[place];
+  };
+  const auto gain = Folds(standing.problem, standing.columns)
+                        .gain_of_selection(standing.problem.residual(), standing.families, chance_, contends);
+  return gain.after < gain.before;
+}
+
+/// The cause at `place`, and how sure its name is.
+Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_t place) const {
+  const Family& family = *standing.families[place];
+  Accepted one;
+  one.cause = family.cause(seen.best[place]);
+  one.source = family.source(seen.best[place]);
+  one.best = seen.best[place];
+  one.penalty = chance_.penalty_of(family);
+  one.p_value = chance_.p_value(seen.score[place]);
+  if (!family.predicts()) return one;
+  Naming naming = name_or_doubt(standing.problem, standing.families, standing.background, seen, chance_, place,
+                                options_.seed + kNamingDraw);
+  one.naming_frequency = naming.frequency;
+  one.could_also_be = std::move(naming.could_also_be);
+  return one;
+}
+
+void Search::take_function(const Standing& standing, const Scan& seen, std::size_t place) {
+  const Family& family = *standing.families[place];
+  const MatrixXd all = family.columns(seen.best[place]);
+  std::vector<Index> telling;
+  for (Index k = 0; k < all.cols(); ++k) {
+    if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
+  }
+  result_.unnamed.push_back({family.depends_on(),
+                             standing.problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling),
+                             seen.score[place], chance_.p_value(seen.score[place])});
+  refine_all();
+}
+
+Status Search::take_named(const Standing& standing, const Choice& choice, std::size_t place) {
+  if (!holds_in_folds(standing, choice, place)) {
+    closed_.push_back(standing.families[place]->cause(choice.seen.best[place]));
+    return {};
+  }
+  Accepted one = accepted(standing, choice.seen, place);
+  if (standing.families[place]->predicts()) return take_cause(std::move(one));
+  take_outlier(standing.problem, std::move(one));
+  return {};
+}
+
+void Search::take_outlier(const LinearProblem& problem, Accepted one) {
+  const auto outliers =
+      std::count_if(result_.accepted.begin(), result_.accepted.end(), [](const Accepted& a) { return a.is_outlier(); });
+  const auto poses = static_cast<double>(result_.all.measurements.size());
+  if (static_cast<double>(outliers) >= thresholds::kMostOutliers * poses) {
+    closed_.push_back(one.cause);
+    result_.too_many_outliers = true;
+    return;
+  }
+  const auto pose = static_cast<Index>(one.best.at);
+  const auto out = result_.batch.measurements.begin() + pose;
+  one.pose = {.pose_id = out->pose_id,
+              .row = out->row,
+              .distance = problem.positions(problem.residual()).col(pose).norm(),
+              .reason = "single pose, cause not separable: repeat it and its neighbours"};
+  result_.batch.measurements.erase(out);
+  for (Unnamed& function : result_.unnamed) {
+    drop_rows(function.columns, problem.first_row(pose), problem.row_count(pose));
+  }
+  result_.accepted.push_back(std::move(one));
+  refine_all();
+}
+
+/// Puts the cause into the model. A second map of a joint is more of the first, and takes its place.
+Status Search::take_cause(Accepted one) {
+  const auto poorer = known_map(one.cause);
+  const bool is_known = poorer != result_.accepted.end();
+  const Result<bool> added = add_in_best_form(result_, one, is_known ? &*poorer : nullptr);
+  if (!added) return tl::make_unexpected(added.error());
+  if (!*added) {
+    closed_.push_back(one.cause);
+    return {};
+  }
+  if (is_known) {
+    one.p_value = std::min(one.p_value, poorer->p_value);
+    result_.accepted.erase(poorer);
+  }
+  result_.accepted.push_back(std::move(one));
+  return {};
+}
+
+/// The map of that joint among what is accepted.
+std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
+  return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
+    return cause.cause == "joint_map" && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
+  });
+}
+
+bool Search::prune() {
+  if (const auto weak = weak_cause(result_, chance_.limit)) {
+    const auto one = result_.accepted.begin() + static_cast<std::ptrdiff_t>(*weak);
+    closed_.push_back(one->cause);
+    remove_from(result_.after, one->in_model);
+    result_.accepted.erase(one);
+    refine_all();
+    return true;
+  }
+  const auto weak = weak_function(result_, chance_.limit);
+  if (weak) result_.unnamed.erase(result_.unnamed.begin() + static_cast<std::ptrdiff_t>(*weak));
+  return weak.has_value();
+}
+
+Status Search::reconsider() {
+  if (result_.accepted.size() < 2) return {};
+  for (Accepted& one : result_.accepted) {
+    const bool beyond_doubt = one.could_also_be.empty() && one.best.evidence > thresholds::kBeyondFolds * chance_.limit;
+    if (one.is_outlier() || beyond_doubt) continue;
+    const PriorModel with = result_.after;
+    remove_from(result_.after, one.in_model);
+    refine_all();
+    const Result<bool> named = name_again(one);
+    if (!named) return tl::make_unexpected(named.error());
+    if (!*named) result_.after = with;
+  }
+  return {};
+}
+
+/// The strongest cause in the place of `one`, which the model is without; false where none passes.
+Result<bool> Search::name_again(Accepted& one) {
+  const Standing standing(result_);
+  Choice choice = choice_of(standing, standing.scan(chance_));
+  choice.open = [&, open = choice.open](std::size_t f) {
+    const auto map = known_map(standing.families[f]->cause(choice.seen.best[f]));
+    return open(f) && standing.families[f]->predicts() && (map == result_.accepted.end() || &*map == &one);
+  };
+  const auto place = best_named(standing.families, choice);
+  if (!place || choice.seen.score[*place] < chance_.limit) return false;
+  Accepted again = accepted(standing, choice.seen, *place);
+  const Result<bool> added = add_in_best_form(result_, again, nullptr);
+  if (added && *added) one = again;
+  return added;
+}
+
+void Search::open_negative_play() {
+  for (std::size_t k = 0; k < result_.accepted.size();) {
+    const Accepted one = result_.accepted[k];
+    const std::optional<PlaySign> sign = one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
+    if (!sign || !sign->negative) {
+      ++k;
+      continue;
+    }
+    make_unnamed(one);
+    result_.negative_play.push_back(*sign);
+    result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
+    remove_from(result_.after, one.in_model);
+    refine_all();
+  }
+}
+
+/// Of a joint's play, beside all the rest.
+PlaySign Search::sign_of(const Accepted& one) const {
+  const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
+  const Background all(background_columns(problem, result_.unnamed));
+  return sign_of_play(problem, one.in_model, one.cause.joint, all.estimate(problem.residual()), all.covariance());
+}
+
+/// What `play` does to the poses becomes a function of the joint and of the side that it comes from.
+void Search::make_unnamed(const Accepted& play) {
+  const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
+  const std::vector<Index> places = places_of_source(problem.model(), play.in_model);
+  const std::string joint = std::to_string(play.cause.joint + 1);
+  result_.unnamed.push_back({{"q" + joint, "dir" + joint},
+                             problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
+                             play.best.evidence - play.penalty,
+                             play.p_value});
+}
+
+SearchResult Search::take() {
+  const bool extended = std::any_of(result_.accepted.begin(), result_.accepted.end(),
+                                    [](const Accepted& one) { return !one.is_outlier(); });
+  // What was tried and dropped leaves no trace.
+  if (!extended) {
+    result_.after = result_.before;
+    result_.reformed_from.clear();
+    refine_all();
+  }
+  // Of the pose itself nothing was learned, and by now all else is known.
+  for (Accepted& one : result_.accepted) {
+    const auto& poses = result_.all.measurements;
+    const auto pose =
+        std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
+    if (one.is_outlier() && pose != poses.end())
+      one.pose.distance = (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
+  }
+  result_.chance = std::move(chance_);
+  return std::move(result_);
+}
 
 }  // namespace
 
@@ -464,13 +382,12 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
   if (const Status started = search.start(sources, batch); !started) return tl::make_unexpected(started.error());
   bool changed = true;
   for (int k = 0; k < kMostSteps && changed; ++k) {
-    if (options.progress && !options.progress("looking for causes", 0.6 * k / kMostSteps))
-      return given_up();
-    Result<bool> more = search.step();
-    if (more && !*more) more = search.prune();
+    const Status wanted = report_progress(options, "looking for causes", kShareOfWork * k / kMostSteps);
+    if (!wanted) return tl::make_unexpected(wanted.error());
+    const Result<bool> more = search.step();
     if (!more) return tl::make_unexpected(more.error());
-    changed = *more;
-    if (changed) search.reform();
+    changed = *more || search.prune();
+    if (changed) search.choose_compliance_again();
   }
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
   search.open_negative_play();

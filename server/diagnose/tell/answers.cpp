@@ -4,12 +4,15 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/diagnose/evidence/dependence.h"
 #include "server/diagnose/evidence/effect.h"
 #include "server/diagnose/evidence/validation.h"
+#include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/search/recovery.h"
 #include "server/diagnose/tell/findings.h"
+#include "server/diagnose/tell/next_poses.h"
 #include "server/diagnose/tell/separability.h"
 #include "server/diagnose/tell/wording.h"
 
@@ -217,6 +220,16 @@ void tell_periodograms(const Explained& explained, Diagnosis& diagnosis) {
     lines.limit = strength_for(chance.limit_at(kPeriodogramLine) + chance.penalty_of(*gears), 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
+}
+
+void tell_next_poses(const Explained& explained, const DiagnoseOptions& options, Diagnosis& diagnosis) {
+  diagnosis.next_poses = next_poses_for(explained.found, explained.before, options);
+  if (diagnosis.next_poses.q.empty()) diagnosis.next_poses.none_because = why_no_next_poses(diagnosis.findings);
+}
+
+void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis) {
+  const VectorXd left = explained.all.project(explained.after.residual());
+  diagnosis.leftover = dependence_of(explained.after, explained.all, left, seed);
 }
 
 void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,

@@ -3,7 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnose/search/search.h"
+#include "server/diagnose/diagnose_options.h"
+#include "server/diagnose/search/search_result.h"
 #include "server/diagnose/search/surrogates.h"
 #include "server/measurement/repeats.h"
 
@@ -43,6 +44,10 @@ void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Di
 void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& families, const Cell& cell,
                     const Surrogates& surrogates, const MeasurementBatch& recorded, Diagnosis& diagnosis);
 void tell_periodograms(const Explained& explained, Diagnosis& diagnosis);
+/// What to measure next, or why nothing would help.
+void tell_next_poses(const Explained& explained, const DiagnoseOptions& options, Diagnosis& diagnosis);
+/// What is left after all that was found, and what it still depends on.
+void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis);
 /// What hiding effects of the causes found, and of some common ones, in these poses brings back.
 void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,
                    Diagnosis& diagnosis);

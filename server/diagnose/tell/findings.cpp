@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/diagnose/evidence/beginning.h"
 #include "server/diagnose/evidence/effect.h"
+#include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
 #include "server/diagnose/tell/wording.h"
 

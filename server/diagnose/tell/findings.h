@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/diagnose/search/search.h"
+#include "server/diagnose/search/search_result.h"
 
 namespace trammel {
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/base/check.h"
+#include "server/diagnose/families/candidates.h"
 #include "server/plan/approach.h"
 #include "server/plan/plan.h"
 

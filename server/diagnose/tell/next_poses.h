@@ -1,6 +1,7 @@
 #pragma once
 
-#include "server/diagnose/search/search.h"
+#include "server/diagnose/diagnose_options.h"
+#include "server/diagnose/search/search_result.h"
 
 namespace trammel {
 

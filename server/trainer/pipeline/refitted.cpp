@@ -29,11 +29,11 @@ Status check_same_frame(const Cell& cell, const std::string& what, const std::op
   if (!said) return {};
   const Vector6 difference = pose_difference(*said, kept);
   if (difference.cwiseAbs().maxCoeff() <= kSameFrame) return {};
-  return refused(
-      "cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from: name {} among what is refitted, "
-      "or "
-      "leave it in the cell file as the model has it",
-      cell.name, what, to_mm(difference.head<3>().norm()), to_deg(difference.tail<3>().norm()), source);
+  return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from", cell.name, what,
+                 to_mm(difference.head<3>().norm()), to_deg(difference.tail<3>().norm()))
+      .of(source)
+      .with_value(to_mm(difference.head<3>().norm()))
+      .next(fmt::format("name {} among what is refitted, or leave it in the cell file as the model has it", source));
 }
 
 std::vector<std::string> names_of(const CompensatedModel& model) {
@@ -48,7 +48,7 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
                             const std::vector<std::string>& only) {
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
-    return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell.name);
+    return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);
   }
   if (!contains(only, "base")) {
     if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
@@ -64,10 +64,12 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
     const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
                                       [&](const auto& known) { return known.first == tool; });
     if (of_model || cell.tools.at(tool) || contains(only, "tool")) continue;
-    return refused(
-        "batch {} row {}: where tool '{}' sits is known to neither cell {} nor the model to start from: name "
-        "tool among what is refitted",
-        batch.id, m.row, tool, cell.name);
+    return refused("where tool '{}' sits is known to neither cell {} nor the model to start from", tool, cell.name)
+        .in("batch " + batch.id)
+        .at_row(m.row)
+        .of("tool_id")
+        .with_text(tool)
+        .next("name tool among what is refitted");
   }
   return {};
 }
@@ -226,9 +228,10 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   const bool is_its_own = batch.hash() == from.provenance().batch_hash;
   if (of_this_batch && !is_its_own && lasting_sources(sources) != sources) {
     return refused(
-        "batch {}: the model to start from has sources that began during batch {}: none that began during this one can "
-        "be added",
-        batch.id(), from.provenance().batch_id);
+               "the model to start from has sources that began during batch {}: none that began during this one can be "
+               "added",
+               from.provenance().batch_id)
+        .in("batch " + batch.id());
   }
   Refitted result;
   result.poses = as_met(from, *cell, trained, of_this_batch || is_its_own);

@@ -1,0 +1,118 @@
+#include "server/diagnose/search/forms.h"
+
+#include <algorithm>
+
+#include "server/diagnose/evidence/effect.h"
+#include "server/diagnose/search/folds.h"
+
+namespace trammel {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr int kFewestHarmonics = 4;  // of a map: the fewest that the search looks for
+constexpr const char* kOfManyForms = "compliance";
+
+VectorXd weight_of(const PriorModel& prior_model, const MeasurementBatch& batch) {
+  return LinearProblem(prior_model.model, batch, prior_model.priors, {}).weight();
+}
+
+/// Sum of squares of the poses held out, each predicted from the others, in units of `weight`.
+double held_out_square(const PriorModel& prior_model, const SearchResult& result, const VectorXd& weight) {
+  const LinearProblem problem(prior_model.model, result.batch, prior_model.priors, {});
+  const VectorXd left =
+      Folds(problem, background_columns(problem, result.unnamed)).held_out_residual(problem.residual());
+  return left.cwiseQuotient(problem.weight()).cwiseProduct(weight).squaredNorm();
+}
+
+/// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
+std::vector<std::string> spellings(const std::string& source, const Cell& cell) {
+  if (!source.starts_with("joint_map")) return alternatives(source, cell);
+  const std::size_t at = source.find('@');
+  std::vector<std::string> all;
+  for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
+    all.push_back(source.substr(0, at + 1) + std::to_string(harmonics));
+  return all;
+}
+
+/// The form of the compliance that `model` has; empty where it has none.
+std::string form_in(const PhysicalModel& model) {
+  const auto present = std::find_if(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
+    return source->name().starts_with(fmt::format("{}_", kOfManyForms));
+  });
+  return present == model.sources.end() ? "" : (*present)->name();
+}
+
+/// `now` with `other` in place of `form`, starting at its values; empty where the cell cannot have it.
+std::optional<PriorModel> with_other_form(const PriorModel& now, const std::string& form, const std::string& other,
+                                          const SearchResult& result) {
+  const VectorXd values = now.model.values(places_of_source(now.model, form));
+  PriorModel changed = now;
+  remove_from(changed, form);
+  if (!add_to(changed, other)) return std::nullopt;
+  const std::vector<Index> places = places_of_source(changed.model, other);
+  if (static_cast<Index>(places.size()) == values.size()) changed.model.values(places) = values;
+  refine(changed, result.batch, result.unnamed);
+  return changed;
+}
+
+}  // namespace
+
+Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepted* poorer) {
+  const VectorXd weight = weight_of(result.after, result.batch);
+  double least = held_out_square(result.after, result, weight);
+  PriorModel start = result.after;
+  if (poorer != nullptr) remove_from(start, poorer->in_model);
+  std::optional<PriorModel> best;
+  for (const std::string& spelling : spellings(one.source, *start.model.cell)) {
+    PriorModel extended = start;
+    if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
+    refine(extended, result.batch, result.unnamed);
+    const double square = held_out_square(extended, result, weight);
+    if (square >= least) continue;
+    least = square;
+    one.in_model = spelling;
+    if (one.source.starts_with("joint_map")) one.source = spelling;
+    best = std::move(extended);
+  }
+  if (!best) return false;
+  result.after = std::move(*best);
+  return true;
+}
+
+void choose_compliance_again(SearchResult& result, bool own_is_open) {
+  const std::string form = form_in(result.after.model);
+  if (form.empty()) return;
+  const auto finding = std::find_if(result.accepted.begin(), result.accepted.end(),
+                                    [&](const Accepted& one) { return one.in_model == form; });
+  if (finding == result.accepted.end() && !own_is_open) return;
+  const VectorXd weight = weight_of(result.after, result.batch);
+  const PriorModel now = result.after;
+  double least = held_out_square(now, result, weight);
+  std::string chosen = form;
+  for (const std::string& other : alternatives(kOfManyForms, *now.model.cell)) {
+    if (other == form) continue;
+    std::optional<PriorModel> changed = with_other_form(now, form, other, result);
+    if (!changed) continue;
+    const double square = held_out_square(*changed, result, weight);
+    if (square >= least) continue;
+    least = square;
+    chosen = other;
+    result.after = std::move(*changed);
+  }
+  if (chosen == form) return;
+  if (finding != result.accepted.end()) {
+    finding->in_model = chosen;
+    return;
+  }
+  if (result.reformed_from.empty()) result.reformed_from = form;
+  result.reformed_to = chosen;
+}
+
+bool leaves_compliance_open(const std::vector<std::string>& sources) {
+  return std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
+}
+
+}  // namespace trammel

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "server/diagnose/search/search_result.h"
+
+namespace trammel {
+
+/// The place in `result.accepted` of the first cause that does not pass `limit` (nat) any more beside all the rest;
+/// empty where all pass.
+[[nodiscard]] std::optional<std::size_t> weak_cause(const SearchResult& result, double limit);
+
+/// The same of an anonymous function in `result.unnamed`.
+[[nodiscard]] std::optional<std::size_t> weak_function(const SearchResult& result, double limit);
+
+}  // namespace trammel

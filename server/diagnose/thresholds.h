@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+/// Every number that decides what a diagnosis finds, names and doubts: one name, one value, one place. Evidence and
+/// scores are in nat: 2.3 nat are odds of 10 to 1. A strength is a squared size in standard deviations of the noise;
+/// half of it is the evidence that it brings at most. What only steers a computation stands beside that computation.
+namespace trammel::thresholds {
+
+// Finding: what passes.
+
+/// Share of batches with nothing to find in which the best of all candidates passes the line of one scan. A diagnosis
+/// scans at least twice; all of it stays below 1 false alarm in 100 batches.
+inline constexpr double kFalseAlarms = 0.003;
+/// Times the line: a score between these is so near that the line is drawn anew for the present background. No
+/// background has moved it as far.
+inline constexpr double kNearLine[] = {0.6, 1.6};
+/// Times the line: a cause above it needs no folds. A fold has seven eighths of the poses, and so of the score; it
+/// still sees five times the line.
+inline constexpr double kBeyondFolds = 6;
+/// Share of the best score that a cause needs to be among those that folds choose from. A fold has seven eighths of the
+/// poses: a third on all of them is not the most on those.
+inline constexpr double kFoldContender = 0.3;
+/// Nat by which an anonymous function must beat the best named cause: odds of 7 to 1.
+inline constexpr double kUnnamedMargin = 2;
+/// How many named causes together may beat one anonymous function.
+inline constexpr int kNamedPath = 3;
+/// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and a map of a joint an
+/// eccentric encoder: what choosing one of 150 poses is worth (log 150).
+inline constexpr double kSimplerMargin = 5;
+/// Cycles a joint turn: orders that are nearer are one. A full turn of the joint just tells a whole cycle apart.
+inline constexpr double kSameOrder = 0.5;
+/// Share of the poses that may be out, in a diagnosis and in triage. With more of them it is not single poses that are
+/// wrong.
+inline constexpr double kMostOutliers = 0.1;
+/// rad: a joint that moves less shows no function of its angle. Two degrees.
+inline constexpr double kSmallestSpan = 0.035;
+/// K between the coldest and the warmest pose: less is one temperature, and nothing grows.
+inline constexpr double kSameTemperature = 0.5;
+/// Nat by which bent links must beat compliant joints while the model has neither: joints give way before links do.
+inline constexpr double kBendingFirst = 4;
+
+// Naming: which other causes explain a finding as well.
+
+/// Canonical correlation above which two causes do the same to the poses.
+inline constexpr double kSameEffect = 0.95;
+/// Share of an effect's strength that a cause of the same effect makes at least.
+inline constexpr double kSameShare = kSameEffect * kSameEffect;
+/// The same of a cause that makes all of it: no strength of the effect tells the two apart.
+inline constexpr double kWholeShare = 0.995;
+/// The same of a cause that is related, and may be there instead. A correlation of 0.63.
+inline constexpr double kRelatedShare = 0.4;
+/// The same below which a cause that wins a repetition has won it by another effect than this one. A correlation of
+/// 0.32.
+inline constexpr double kCoincidenceShare = 0.1;
+/// Share of simulated repetitions that must give a name for it to be sure.
+inline constexpr double kSureFrequency = 0.9;
+/// Share of them that another cause must win to be a rival: three of a hundred, for one is chance.
+inline constexpr double kRivalFrequency = 0.03;
+/// Share of the best score that a cause needs to be among those that repetitions choose from. Others won none.
+inline constexpr double kNamingContender = 0.15;
+/// Nat by which these data favour a cause when they have decided for it: odds of 4.5 to 1. At 3 nat 87 % of the effects
+/// of strength 60 were named, at 1.5 nat 92 %, and 6 of 1510 names were wrong.
+inline constexpr double kDecided = 1.5;
+/// The same where less than kSureFrequency of the repetitions give the name: odds of 12 to 1.
+inline constexpr double kDecidedUnsure = 2.5;
+/// Strength by which a cause of the same effect may explain less and is as good: 3 nat of likelihood.
+inline constexpr double kAsGoodStrength = 6;
+/// Nat of score by which a cause of the same effect must lose to be out however well it fits: nearly the same effect
+/// from so many more numbers is no accident.
+inline constexpr double kMoreNumbers = 8;
+/// Share of an effect's strength by which real causes differ from their models.
+inline constexpr double kShapeError = 0.02;
+/// Share of the poses: a step before it stands for something that always acted.
+inline constexpr double kAtOnce = 0.05;
+/// rad that no joint exceeds from pose to pose along a path that was measured in motion.
+inline constexpr double kPathStep = 0.2;
+
+// Doubting: what makes a finding unsure once everything was found.
+
+/// Share of the size of what is unknown: an effect that is smaller may be part of it.
+inline constexpr double kDwarfed = 0.25;
+/// Nat that the other numbers of its source must explain for a cause to be named as a whole instead of by one number.
+/// Below it 14 of the intervals of single numbers were wrong.
+inline constexpr double kOthersSpeak = 5;
+/// Orders of one joint's gear that are believed beside each other. More are an error that has no single order.
+inline constexpr std::ptrdiff_t kMostOrders = 2;
+/// Standard deviations below zero at which the play of a joint has the wrong sign: 95 %, one side.
+inline constexpr double kWrongSign = 1.645;
+/// The same of the play at one pose, of which there are many: 98 %, one side.
+inline constexpr double kWrongSignOfPose = 2;
+/// Share of the poses that may have play of the wrong sign. A quarter is more than the side of a pose is mistaken.
+inline constexpr double kPosesOfWrongSign = 0.25;
+/// Chance that any of the held-out poses that fit is called one that fits neither model.
+inline constexpr double kMisjudgedHeldOut = 0.01;
+
+// What is left, against what is stated for one measurement.
+
+/// Times the stated standard deviation, which is known to a tenth: worth a note.
+inline constexpr double kLargerNoise = 1.1;
+/// Times the stated standard deviation: something is there that is not the measurement.
+inline constexpr double kMoreThanNoise = 1.3;
+/// Standard deviations that chance exceeds in 1 of 100 batches.
+inline constexpr double kOneInHundred = 2.326;
+
+// What these poses could not have shown, and what they cannot tell apart.
+
+/// Standard deviations by which an effect must exceed the line to pass it in nine of ten batches.
+inline constexpr double kPower = 1.2816;
+/// Share of an effect's length that the model's own parameters leave over: with less there is nothing to go by.
+inline constexpr double kAbsorbed = 0.05;
+/// Strength that must lie between a cause and its closest imitator for one to be told from the other: 10 nat.
+inline constexpr double kToldApart = 20;
+/// Cosine between an effect and one parameter, above which it is said to be that parameter.
+inline constexpr double kLikeOneParameter = 0.9;
+/// Share of the present uncertainty that next poses may leave. What they do not lower by a tenth is not worth
+/// measuring.
+inline constexpr double kWorthMeasuring = 0.9;
+
+}  // namespace trammel::thresholds
