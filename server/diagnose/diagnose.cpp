@@ -13,7 +13,7 @@
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/velocity.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -106,10 +106,8 @@ void tell_provenance(const Cell& cell, const MeasurementBatch& batch, std::uint6
   diagnosis.seed = seed;
 }
 
-}  // namespace
-
-Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                           const DiagnoseOptions& options) {
+Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                            const DiagnoseOptions& options) {
   const Result<PreparedBatch> prepared = prepare(*cell, batch, options.seed);
   if (!prepared) return tl::make_unexpected(prepared.error());
   Result<SearchResult> result = searched(cell, *prepared, options);
@@ -144,6 +142,17 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Measur
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
   diagnosis.sentence = sentence_for(diagnosis);
   return diagnosis;
+}
+
+}  // namespace
+
+}  // namespace trammel::cause_search
+
+namespace trammel {
+
+Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                           const DiagnoseOptions& options) {
+  return cause_search::diagnosed(cell, batch, options);
 }
 
 }  // namespace trammel

@@ -4,6 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/search/surrogates.h"
+#include "server/diagnose/thresholds.h"
 #include "server/plan/separation.h"
 
 namespace trammel {
@@ -11,7 +12,6 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
-constexpr double kMuchMore = 1.3;         // than what is stated for the measurement: what the model lacks is in it
 
 struct Words {
   const char* cause;
@@ -105,11 +105,12 @@ std::string what_it_needs(const Cause& cause) {
 }
 
 bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
-  return !unseen.detectable && is_by_surrogate(put_in_surrogates(recorded), unseen.cause);
+  return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
 }
 
 std::string noise_name(double noise, double instrument) {
-  return noise > kMuchMore * instrument ? "what stays unexplained of a pose" : "noise of one measurement";
+  return noise > cause_search::thresholds::kMoreThanNoise * instrument ? "what stays unexplained of a pose"
+                                                                       : "noise of one measurement";
 }
 
 std::string why_no_next_poses(const std::vector<Finding>& findings) {
