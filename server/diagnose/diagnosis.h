@@ -23,8 +23,14 @@ struct Cause {
 
   friend bool operator==(const Cause&, const Cause&) = default;
 };
-/// For people and for lists: `gear_transmission:3`, `geometry:d6`, `tracker_moved`.
+/// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
+/// The cause that is spelled so; one that is not known has the spelling for its cause.
+[[nodiscard]] Cause cause_from(std::string_view spelling);
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved at pose p40`. No order.
+[[nodiscard]] std::string in_words(const Cause& cause);
+/// The same without its joint and pose, where a table has columns for them.
+[[nodiscard]] std::string kind_in_words(const Cause& cause);
 
 /// A number found, in the unit people read it in.
 struct Estimate {
