@@ -3,7 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "server/bias/bias_model.h"
+#include "server/base/result.h"
+#include "server/bias/bias_data.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
 /// What a bias cannot be learned or restored from, in sentences that name row, value and limit.

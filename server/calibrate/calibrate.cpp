@@ -39,7 +39,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
-    return refused("batch {}: no measurements to calibrate with", problem.batch.id);
+    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
   CalibrationProblem complete = problem;
   if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {
@@ -50,11 +50,6 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   localise_base(complete.model, complete.batch);
   if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
   return identify(complete, options);
-}
-
-Eigen::MatrixXd CalibrationResult::correlation() const {
-  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
 }
 
 Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,

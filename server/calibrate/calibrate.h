@@ -5,60 +5,9 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/calibrate/identify/identifiability.h"
-#include "server/error_sources/physical_model.h"
-#include "server/measurement/measurement.h"
+#include "server/calibrate/calibration.h"
 
 namespace trammel {
-
-/// A model to start from and the measurements to explain. Unknown base and tools are found first.
-struct CalibrationProblem {
-  PhysicalModel model;
-  MeasurementBatch batch;  ///< checked against the cell
-};
-
-struct CalibrateOptions {
-  int max_iterations = 100;
-  std::vector<bool> held;  ///< parameters that stay as the model has them, one flag each; empty: none
-  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
-};
-
-/// A pose that the identified model misses by far more than its sigma.
-struct SuspectPose {
-  std::string pose_id;
-  int row = 0;          ///< in its file
-  double distance = 0;  ///< m, of the position
-  double sigmas = 0;    ///< the same over the expected deviation of one axis
-};
-
-struct IdentifiedParameter {
-  Parameter parameter;
-  double value = 0;         ///< SI
-  double stddev = 0;        ///< SI, of the posterior
-  bool identified = false;  ///< false: more than half of the prior's standard deviation is left
-};
-
-struct CalibrationResult {
-  PhysicalModel model;  ///< with identified values
-  std::vector<IdentifiedParameter> parameters;
-  Eigen::MatrixXd covariance;  ///< P x P, SI
-  /// P x P, in [-1, 1].
-  [[nodiscard]] Eigen::MatrixXd correlation() const;
-  int rank = 0;  ///< directions with singular value >= 1
-  std::vector<UnidentifiableCombination> unidentifiable;
-  double condition_number = 0;      ///< of the identified directions, prior units
-  double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
-  double rms = 0;                   ///< m, Euclidean residual of the training positions
-  double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
-  double discrepancy_rotation = 0;  ///< rad per axis
-  double observability_index =
-      0;  ///< geometric mean of the identified singular values over sqrt(poses) (Borm and Menq)
-  std::vector<SuspectPose> suspects;  ///< farthest first
-  std::vector<double> cost_record;  ///< half the weighted sum of squares, iteration by iteration, over all reweightings
-  bool converged = false;
-  int iterations = 0;
-  std::string message;  ///< of the solver
-};
 
 /// Identifies the parameters of the model's sources by maximum a posteriori (Gaussian priors in the parameters' own
 /// scales, residuals in units of sigma), source section 3.3.2. Orientation errors are rotation vectors. Where the model

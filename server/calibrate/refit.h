@@ -1,6 +1,7 @@
 #pragma once
 
-#include "server/calibrate/calibrate.h"
+#include "server/base/result.h"
+#include "server/calibrate/calibration.h"
 
 namespace trammel {
 

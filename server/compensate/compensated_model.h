@@ -1,53 +1,21 @@
 #pragma once
 
-#include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/base/result.h"
 #include "server/bias/bias_model.h"
-#include "server/bias/choose_bias.h"
-#include "server/calibrate/calibrate.h"
 #include "server/compensate/bias_physics.h"
+#include "server/compensate/correction.h"
+#include "server/compensate/evaluation.h"
+#include "server/compensate/model_parts.h"
+#include "server/compensate/paired_gain.h"
 #include "server/robot/inverse_kinematics.h"
 
 namespace trammel {
-
-/// Error figures of a set of poses: |measured - predicted|, m.
-struct ErrorFigures {
-  double rms = 0, mean = 0, p997 = 0, max = 0;
-  Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
-};
-/// Of the errors in the columns of `e_B` (3 x N, m, not empty).
-[[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
-
-/// Orientation errors of the poses that have a measured orientation, rms of the rotation angle, rad.
-struct OrientationFigures {
-  int poses = 0;
-  double nominal = 0, calibrated = 0, compensated = 0;
-  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; where orientation is learned
-};
-
-/// The three levels of one model on one set of poses.
-struct Evaluation {
-  int poses = 0;
-  ErrorFigures nominal, calibrated, compensated;
-  double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
-  int in_domain = 0;
-  /// Mean over coordinates of -log N(error; 0, stddev²), compensated, nat, of positions in m; in mm it is 6.9 more
-  /// (nlpd_in_mm). Less is better: it rewards small errors and honest stddevs. Empty where a stddev is 0, and in models
-  /// of before it was kept.
-  std::optional<double> nlpd;
-  std::optional<OrientationFigures> orientation;  ///< where orientations were measured
-  /// Of a model with a bias, PairedGain::z() of compensated over calibrated, pose by pose; empty in models of before.
-  std::optional<double> bias_gain_z;
-};
-[[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
 
 /// The error expected at one joint vector, all in B.
 struct ErrorPrediction {
@@ -65,109 +33,12 @@ struct ErrorPrediction {
   double bias_weight = 0;  ///< how much of it is, in [0, 1]: 1 in domain, 0 well outside. Blocks of a bias stay
 };
 
-enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
-/// As files and the wire spell it: `ok`, `out_of_domain`, ...
-[[nodiscard]] std::string_view to_string(CorrectionStatus status);
-
-/// A tool pose that is wanted, or the joints that a program commands.
-struct Target {
-  Pose X_BT = Pose::Identity();
-  std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
-  std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
-  bool joint_target = false;        ///< X_BT is unset: the pose wanted is the nominal one of `seed`
-};
-
-/// A target as corrected; one that is neither ok nor out of domain is left alone: commanded as it was wanted. What to
-/// expect are root mean squares of the true distance from the target, without the instrument's own noise; NaN where no
-/// joints bring the tool there, so that nothing can be said.
-struct Correction {
-  CorrectionStatus status = CorrectionStatus::kRefused;
-  Pose X_BT_wanted = Pose::Identity();
-  Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
-  JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
-  double error_before = kNothingToSay;     ///< m, to expect without correction
-  double error_after = kNothingToSay;      ///< m, to expect with it; left alone, the same as before
-  double stddev = kNothingToSay;           ///< m, of the true position reached, per axis: root mean square of the three
-  double left = 0;                         ///< m, what the iteration left; part of error_after
-  int iterations = 0;
-  std::string message;  ///< why not ok
-
-  static constexpr double kNothingToSay = std::numeric_limits<double>::quiet_NaN();
-};
-
-struct CorrectOptions {
-  double tolerance = 1e-7;  ///< m, last step (1e-4 mm)
-  int max_iterations = 10;
-};
-
-/// A batch on which some sources of a finished model were identified anew.
-struct RefitRecord {
-  std::string model;                 ///< id of the model that it started from
-  std::vector<std::string> sources;  ///< as they were named
-  std::string batch_id;
-  std::string batch_hash;
-  int poses = 0;
-};
-
-/// Where a model comes from. What was identified anew since then is told by `refits`, the last one last.
-struct ModelProvenance {
-  std::string id;     ///< first 12 characters of the hash
-  std::string hash;   ///< SHA-256 of the model's content
-  std::string level;  ///< source names joined by commas
-  std::string batch_id;
-  std::string batch_hash;       ///< of the batch text
-  std::int64_t trained_at = 0;  ///< Unix time, s
-  /// Unix time, s, of the newest measurement that it was made from; empty where nobody recorded it.
-  std::optional<std::int64_t> measured_at;
-  int training_poses = 0;
-  std::uint64_t seed = 0;
-  std::string program_version;
-  std::vector<RefitRecord> refits;
-
-  /// The batch that the model's figures are of: the last one.
-  [[nodiscard]] const std::string& figures_batch_id() const {
-    return refits.empty() ? batch_id : refits.back().batch_id;
-  }
-};
-
 /// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap
 /// to copy, thread-safe.
 class CompensatedModel {
  public:
-  struct Parts {
-    PhysicalModel physics;
-    std::vector<IdentifiedParameter> parameters;
-    std::vector<UnidentifiableCombination> unidentifiable;
-    Eigen::MatrixXd covariance;  ///< of the parameters, SI
-    int rank = 0;
-    double condition_number = 0;
-    double observability_index = 0;  ///< see CalibrationResult, as the next two
-    std::vector<SuspectPose> suspects;
-    std::vector<double> cost_record;
-    double discrepancy = 0;                  ///< m per axis, see CalibrationResult
-    std::optional<BiasChoice> bias_choice;   ///< of `auto`: what was asked and what it is worth
-    std::optional<BiasState> bias;           ///< without features: they follow from the physics and bias_contexts
-    std::optional<BiasState> rotation_bias;  ///< of the same poses: residual rotation vectors in B and sigma, rad
-    /// Of a bias that was kept while sources were identified anew: the physics that it was learned beside, with all the
-    /// parameters that a block of it knew, and P x P, SI, what is uncertain of the model's parameters beyond what the
-    /// bias knows: what was identified since.
-    struct BiasOrigin {
-      PhysicalModel physics;
-      Eigen::MatrixXd covariance;
-    };
-    std::optional<BiasOrigin> bias_origin;
-    int oriented_poses = 0;                  ///< where only some poses of a bias had an orientation: none is learned
-    std::vector<PoseContext> bias_contexts;  ///< of the bias' observations, in their order; empty without blocks
-    std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where none was recorded
-    double temperature_stddev = 0;           ///< K
-    JointVector q_min, q_max;                ///< range of the training poses, rad
-    JointVector extrapolation_slope;         ///< see Domain::growth(); empty in models of before it was learned
-    double prior_share_limit = 0;            ///< in domain: prior share not above this
-    std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
-    ModelProvenance provenance;                                  ///< id and hash are filled in by make()
-    Evaluation training;                                         ///< on the poses it was trained on
-    std::optional<Evaluation> validation;                        ///< on poses held out from training
-  };
+  using Parts = ModelParts;
+  /// Refuses parts that do not fit each other, and what BiasModel::restore() refuses.
   [[nodiscard]] static Result<CompensatedModel> make(Parts parts);
 
   [[nodiscard]] const Parts& parts() const { return inside_->parts; }
@@ -220,6 +91,8 @@ class CompensatedModel {
     Vector3 bias_size_B = Vector3::Zero();           // m, rms over the training poses; 0 with blocks
     Vector3 rotation_bias_size_B = Vector3::Zero();  // rad, likewise; 0 with the block `parameters`
   };
+  /// Restores the biases that `parts` have; `then`: the physics that they were learned beside.
+  [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside);
   /// What the biases say at a pose.
   struct Learned {
     BiasPrediction position;
@@ -231,6 +104,24 @@ class CompensatedModel {
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned,
                                         std::optional<double> bias_weight) const;
+  /// The arm at a pose as the calibration has it.
+  struct CalibratedPose {
+    PoseContext context;  ///< completed
+    Pose X_BW = Pose::Identity();
+    Eigen::MatrixXd J_W;  ///< 6 x P, by the parameters
+    double growth = 0;    ///< m², Domain::growth()
+  };
+  /// 3 x 3, in B: what the parameters leave uncertain of a position or rotation with these derivatives (3 x P, in B);
+  /// and the part of it that was identified after the bias was learned.
+  [[nodiscard]] Matrix3 identified(const Eigen::MatrixXd& J_B) const;
+  [[nodiscard]] Matrix3 identified_since(const Eigen::MatrixXd& J_B) const;
+  /// m²: variance of one axis that the physics leaves over at a pose.
+  [[nodiscard]] double unlearned(const CalibratedPose& pose) const;
+  /// Adds what the bias says with the weight that stands in `prediction`; the covariance then, what was unsaid left
+  /// out.
+  [[nodiscard]] Matrix3 add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,
+                                          ErrorPrediction* prediction) const;
+  void add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias, ErrorPrediction* prediction) const;
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
   /// As it was learned, in B of today.
   [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
@@ -263,10 +154,8 @@ class CompensatedModel {
   std::shared_ptr<const Inside> inside_;
 };
 
-/// The model as text (JSON, one object) and back. Refuses a text that is no model or whose hash does not fit its
-/// content. The hash covers what the model is, not when it was made: same data, same seed, same id.
-[[nodiscard]] std::string serialize(const CompensatedModel& model);
-[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where);
-[[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
+/// Of the compensated positions of `batch`, which both models know the tools of.
+[[nodiscard]] PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
+                                     const MeasurementBatch& batch);
 
 }  // namespace trammel

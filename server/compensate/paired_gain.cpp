@@ -52,10 +52,6 @@ PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& a
   return gain;
 }
 
-PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after, const MeasurementBatch& batch) {
-  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated);
-}
-
 std::string to_string(const PairedGain& gain) {
   return fmt::format("{:.4f} mm rms, before {:.4f} mm on the same {} poses held out: {} (z {:.2f}, limit {:.2f}){}",
                      to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses, verdict(gain), gain.z(),

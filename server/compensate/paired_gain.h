@@ -1,9 +1,8 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <string>
 #include <vector>
-
-#include "server/compensate/compensated_model.h"
 
 namespace trammel {
 
@@ -32,9 +31,6 @@ struct PairedGain {
 
 /// `before`, `after`: 3 x N, m: errors of the same poses.
 [[nodiscard]] PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after);
-/// Of the compensated positions of `batch`, which both models know the tools of.
-[[nodiscard]] PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
-                                     const MeasurementBatch& batch);
 /// `0.0210 mm rms, before 0.0250 mm on the same 30 poses held out: better beyond chance (z 4.10, limit 2.58);
 /// judged without p7, which fits neither model`. Where only the rms speaks against it: `better at most poses,
 /// but much worse at others (...)`.

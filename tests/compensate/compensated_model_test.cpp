@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"

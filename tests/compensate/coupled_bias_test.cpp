@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/compensate/bias_physics.h"
 #include "server/compensate/compensated_model.h"
+#include "server/compensate/model_file.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"

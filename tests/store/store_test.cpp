@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "server/base/hash.h"
+#include "server/compensate/model_file.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 

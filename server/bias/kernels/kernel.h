@@ -55,12 +55,10 @@ class Kernel {
 
 using KernelPtr = std::shared_ptr<const Kernel>;
 
-/// The kernel that is spelled so (kernel_spelling.h), or null. `kernel_names` lists the words for messages.
-[[nodiscard]] KernelPtr make_kernel(std::string_view spelling);
-[[nodiscard]] std::string kernel_names();
-
 /// The kernel of one word; null when there is none.
 [[nodiscard]] KernelPtr make_leaf_kernel(std::string_view word);
+/// These words, for messages.
+[[nodiscard]] std::string kernel_names();
 
 /// Squared exponential (eq. 3.19, one length scale per joint) and Matérn 3/2, 5/2 (eq. 3.20): `se`, `matern32`,
 /// `matern52`; null otherwise. Parameters: log length scale of each joint, rad.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "server/base/result.h"
 #include "server/calibrate/identify/gauss_newton.h"
 
 namespace trammel {

@@ -3,7 +3,8 @@
 #include <map>
 #include <string>
 
-#include "server/calibrate/calibrate.h"
+#include "server/base/result.h"
+#include "server/calibrate/calibration.h"
 
 /// Orders of periodic sources that nobody told.
 namespace trammel {

@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
-#include "server/calibrate/calibrate.h"
+#include "server/calibrate/calibration.h"
 
 /// What a model leaves over, and with what sigma it is therefore weighed.
 namespace trammel {
