@@ -7,6 +7,19 @@ std::string to_string(const Cause& cause) {
   return cause.joint < 0 ? cause.cause : fmt::format("{}:{}", cause.cause, cause.joint + 1);
 }
 
+const CauseRecord& record_of(const Cause& cause) { return cause_spelled(cause.cause); }
+
+std::string in_words(const Cause& cause) {
+  const CauseRecord& record = record_of(cause);
+  std::string words = plain_name(record, cause.joint);
+  if (!cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
+  if (cause.pose_id.empty()) return words;
+  const bool begins = record.lasting == causes::Lasting::kFromAPose;
+  return words + fmt::format(fmt::runtime(begins ? " from pose {} on" : ", pose {}"), cause.pose_id);
+}
+
+Cause unknown_cause(int joint) { return {"unknown", joint, "", "", {}}; }
+
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {
     case Verdict::kNamed:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/error_sources/catalogue.h"
 
 /// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
 namespace trammel {
@@ -20,8 +21,14 @@ struct Cause {
 
   friend bool operator==(const Cause&, const Cause&) = default;
 };
-/// For people and for lists: `gear_transmission:3`, `geometry:d6`, `tracker_moved`.
+/// For files and programs: `gear_transmission:3`, `geometry:d6`, `tracker_moved`.
 [[nodiscard]] std::string to_string(const Cause& cause);
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`.
+[[nodiscard]] std::string in_words(const Cause& cause);
+/// What is known of it, wherever on the arm it is.
+[[nodiscard]] const CauseRecord& record_of(const Cause& cause);
+/// Something is there, of `joint` (-1: of any), and no known cause is it.
+[[nodiscard]] Cause unknown_cause(int joint = -1);
 
 /// A number found, in the unit people read it in.
 struct Estimate {

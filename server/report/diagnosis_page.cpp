@@ -27,12 +27,12 @@ std::string table(const char* kind, const std::vector<std::string>& head, const 
 
 std::string paragraph(const std::string& text) { return "<p>" + html_text(text) + "</p>\n"; }
 
-/// The cause in words; the spelling of files only where words say less.
+/// Without the joint and the pose, which stand in a column of their own.
 std::string cause_in_words(const Cause& cause) {
-  std::string words = cause.cause;
-  std::replace(words.begin(), words.end(), '_', ' ');
-  if (!cause.parameter.empty()) words += " " + cause.parameter;
-  return words;
+  Cause anywhere = cause;
+  anywhere.joint = -1;
+  anywhere.pose_id.clear();
+  return in_words(anywhere);
 }
 
 std::string where_of(const Cause& cause) {
@@ -45,8 +45,7 @@ std::string where_of(const Cause& cause) {
 std::string causes_in_words(const std::vector<Cause>& causes) {
   std::string list;
   for (const Cause& cause : causes) {
-    list += (list.empty() ? "" : ", ") + cause_in_words(cause) +
-            (cause.joint >= 0 ? fmt::format(" (joint {})", cause.joint + 1) : "");
+    list += (list.empty() ? "" : ", ") + in_words(cause);
   }
   return list;
 }
@@ -92,7 +91,7 @@ std::string beginning_of(const Finding& finding) {
 std::string finding_rows(const Finding& finding) {
   const std::string others = causes_in_words(finding.could_also_be);
   const std::string row =
-      html_row({"<b>" + html_text(cause_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
+      html_row({"<b>" + html_text(in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
                 estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
                 millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
                 fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),

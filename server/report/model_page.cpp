@@ -182,7 +182,7 @@ std::string parameter_table(const CompensatedModel& model) {
   std::size_t next = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     table += fmt::format("<tr class=\"cause\"><td colspan=\"5\">{} <span>{}</span></td></tr>\n",
-                         html_text(source->name()), html_text(source->explanation()));
+                         html_text(in_words(source->name())), html_text(source->explanation()));
     for (std::size_t k = 0; k < source->parameters().size(); ++k) table += parameter_row(parts.parameters[next++]);
   }
   return table + "</table>\n";

@@ -1,7 +1,9 @@
 #include "clients/cli/text/diagnose_text.h"
 
 #include "server/base/units.h"
+#include "server/diagnose/diagnosis.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/error_sources/spelling.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
 #include "server/report/html.h"
@@ -14,13 +16,15 @@ using nlohmann::ordered_json;
 
 constexpr double kMicrometres = 1000;  // per mm
 
-/// `gear_transmission of joint 3`, `outlier at pose p28`.
-std::string cause_text(const ordered_json& cause) {
-  std::string text = cause.at("cause");
-  if (cause.contains("parameter")) text += fmt::format(" {}", cause.at("parameter").get<std::string>());
-  if (!cause.at("joint").is_null()) text += fmt::format(" of joint {}", cause.at("joint").get<int>());
-  if (cause.contains("pose_id")) text += fmt::format(" at pose {}", cause.at("pose_id").get<std::string>());
-  return text;
+/// `gear ripple in joint 3`, `single bad pose, pose p28`. What another version of the program calls a cause that this
+/// one does not know comes as it is spelled.
+std::string cause_text(const ordered_json& json) {
+  Cause cause;
+  cause.cause = json.at("cause");
+  if (!json.at("joint").is_null()) cause.joint = json.at("joint").get<int>() - 1;
+  cause.parameter = json.value("parameter", "");
+  cause.pose_id = json.value("pose_id", "");
+  return find_cause(cause.cause) != nullptr ? in_words(cause) : to_string(cause);
 }
 
 std::string causes_text(const ordered_json& causes) {
@@ -69,7 +73,7 @@ std::string p_text(const ordered_json& value) {
 
 std::string finding_lines(const ordered_json& finding) {
   std::string text =
-      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding),
+      fmt::format("  {:<40}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding),
                   kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
                   p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
@@ -89,7 +93,7 @@ std::string finding_lines(const ordered_json& finding) {
 std::string findings_table(const ordered_json& findings) {
   if (findings.empty()) return "";
   std::string text =
-      fmt::format("\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
+      fmt::format("\n  {:<40}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<40}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
                   "strength", "p", "held out", "", "cause", "um rms", "lambda", "", "before mm", "after mm");
   for (const ordered_json& finding : findings) text += finding_lines(finding);
   return text + "  (± is U(k=2): two standard uncertainties)\n";
@@ -143,7 +147,7 @@ std::string unseen_lines(const ordered_json& unseen) {
     const std::string what =
         fmt::format("would not have {}: {}: needs {}",
                     by_order ? "been named for certain (looked for by the order of the poses)" : "shown",
-                    one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
+                    in_words(one.at("cause").get<std::string>()), one.at("needs").get<std::string>());
     const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
     const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == what; });
     if (known == lines.end()) {
@@ -174,7 +178,8 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
   for (const ordered_json& group : diagnosis.at("not_separable")) {
     const auto name = group.front().get<std::string>();
     std::string others;
-    for (std::size_t k = 1; k < group.size(); ++k) others += (k > 1 ? ", " : "") + group[k].get<std::string>();
+    for (std::size_t k = 1; k < group.size(); ++k)
+      others += (k > 1 ? ", " : "") + in_words(group[k].get<std::string>());
     const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == name; });
     if (known == lines.end()) {
       lines.emplace_back(name, others);
@@ -185,7 +190,7 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
   std::string text;
   for (const auto& [name, others] : lines) {
     const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
-    text += fmt::format("  not told apart by these poses: {} from {}{}\n", name, others,
+    text += fmt::format("  not told apart by these poses: {} from {}{}\n", in_words(name), others,
                         need.empty() ? "" : fmt::format(" (needs {})", need));
   }
   return text;

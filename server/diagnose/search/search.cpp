@@ -10,6 +10,7 @@ namespace trammel {
 
 namespace {
 
+using causes::SearchFamily;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -22,7 +23,6 @@ constexpr double kUnnamedMargin = 2;    // nat, by which no name must be better 
 constexpr double kContender = 0.3;      // of the best score, to be among those that folds choose from
 constexpr double kSimplerMargin = 5;    // nat
 constexpr int kFewestHarmonics = 4;
-constexpr const char* kOfManyForms = "compliance";
 constexpr int kPathLength = 3;  // named causes that together may beat one anonymous function
 
 Failure given_up() { return failure(ErrorCode::kBusy, "diagnosis given up on request"); }
@@ -42,7 +42,7 @@ class Search {
     result_.all = result_.batch = batch;
     const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
     if (!calibration) return tl::make_unexpected(calibration.error());
-    form_is_open_ = std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
+    sources_ = sources;
     result_.before = {calibration->model, priors_of(*calibration)};
     result_.after = result_.before;
     return {};
@@ -95,23 +95,27 @@ class Search {
     return prune_unnamed(problem);
   }
 
-  /// Chooses the form of the compliance anew beside all that was found since: chosen while much was missing it may be
-  /// another, and what a wrong form leaves over would be given other names.
+  /// Chooses the forms of causes that have several anew beside all that was found since: chosen while much was missing
+  /// they may be others, and what a wrong form leaves over would be given other names.
   void reform() {
-    const auto& sources = result_.after.model.sources;
-    const auto present = std::find_if(sources.begin(), sources.end(), [](const ErrorSourcePtr& source) {
-      return source->name().starts_with(fmt::format("{}_", kOfManyForms));
-    });
-    if (present == sources.end()) return;
-    const std::string form = (*present)->name();
+    std::vector<std::string> forms;
+    for (const ErrorSourcePtr& source : result_.after.model.sources) {
+      if (source->cause().forms.size() > 1) forms.push_back(source->name());
+    }
+    for (const std::string& form : forms) reform(form);
+  }
+
+  void reform(const std::string& form) {
+    const std::string cause(cause_spelled(form).spelling);
+    const bool is_open = std::find(sources_.begin(), sources_.end(), cause) != sources_.end();
     const auto finding = std::find_if(result_.accepted.begin(), result_.accepted.end(),
                                       [&](const Accepted& one) { return one.in_model == form; });
-    if (finding == result_.accepted.end() && !form_is_open_) return;
+    if (finding == result_.accepted.end() && !is_open) return;
     const VectorXd weight = LinearProblem(result_.after.model, result_.batch, result_.after.priors, {}).weight();
     const VectorXd values = result_.after.model.values(places_of_source(result_.after.model, form));
     const PriorModel now = result_.after;
     double least = held_out_square(now, weight);
-    for (const std::string& other : alternatives(kOfManyForms, *cell_)) {
+    for (const std::string& other : alternatives(cause, *cell_)) {
       if (other == form) continue;
       PriorModel changed = now;
       remove_from(changed, form);
@@ -154,7 +158,8 @@ class Search {
   void open_negative_play() {
     for (std::size_t k = 0; k < result_.accepted.size();) {
       const Accepted one = result_.accepted[k];
-      const std::optional<PlaySign> sign = one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
+      const bool is_play = record_of(one.cause).search == SearchFamily::kPlay;
+      const std::optional<PlaySign> sign = is_play ? std::optional(sign_of(one)) : std::nullopt;
       if (!sign || !sign->negative) {
         ++k;
         continue;
@@ -212,7 +217,7 @@ class Search {
 
   /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
   std::vector<std::string> spellings(const std::string& source) const {
-    if (!source.starts_with("joint_map")) return alternatives(source, *cell_);
+    if (cause_spelled(source).search != SearchFamily::kMap) return alternatives(source, *cell_);
     const std::size_t at = source.find('@');
     std::vector<std::string> all;
     for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
@@ -236,7 +241,7 @@ class Search {
       if (square >= least) continue;
       least = square;
       one.in_model = spelling;
-      if (one.source.starts_with("joint_map")) one.source = spelling;
+      if (record_of(one.cause).search == SearchFamily::kMap) one.source = spelling;
       best = std::move(extended);
     }
     if (!best) return false;
@@ -247,7 +252,8 @@ class Search {
   /// The map of that joint among what is accepted: a second one is more of the first.
   auto known_map(const Cause& cause) {
     return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
-      return cause.cause == "joint_map" && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
+      return record_of(cause).search == SearchFamily::kMap && one.cause.cause == cause.cause &&
+             one.cause.joint == cause.joint;
     });
   }
 
@@ -299,16 +305,15 @@ class Search {
     return false;
   }
 
-  /// A step that a cause acting from the first pose on explains nearly as well is that cause; and a map of a joint's
-  /// angle that an off-centre disc explains nearly as well is that disc.
+  /// A step that a cause acting from the first pose on explains nearly as well is that cause; and what a simpler case
+  /// of it explains nearly as well is that case: a map of a joint's angle is the disc that is off centre.
   static std::size_t simplest(const std::vector<FamilyPtr>& families, const Scan& seen, std::size_t strongest,
                               const std::function<bool(std::size_t)>& open) {
     const Cause cause = families[strongest]->cause(seen.best[strongest]);
     const auto simpler = seen.strongest([&](std::size_t f) {
       if (!open(f) || !families[f]->named()) return false;
       const Cause other = families[f]->cause(seen.best[f]);
-      return is_whole_of(other, cause) ||
-             (cause.cause == "joint_map" && other.cause == "encoder_eccentricity" && other.joint == cause.joint);
+      return is_whole_of(other, cause) || is_simpler_case(other, cause);
     });
     return simpler && seen.score[*simpler] > seen.score[strongest] - kSimplerMargin ? *simpler : strongest;
   }
@@ -451,9 +456,9 @@ class Search {
   const DiagnoseOptions& options_;
   SearchResult result_;
   Chance chance_;
-  bool form_is_open_ = false;    // of the compliance that the cell's own list has
-  std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
-  std::vector<Cause> closed_;    // were tried and did not hold
+  std::vector<std::string> sources_;  // the cell's own list
+  std::size_t renewed_for_ = 0;       // how much had been found when chance_ was drawn
+  std::vector<Cause> closed_;         // were tried and did not hold
 };
 
 }  // namespace
@@ -464,8 +469,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
   if (const Status started = search.start(sources, batch); !started) return tl::make_unexpected(started.error());
   bool changed = true;
   for (int k = 0; k < kMostSteps && changed; ++k) {
-    if (options.progress && !options.progress("looking for causes", 0.6 * k / kMostSteps))
-      return given_up();
+    if (options.progress && !options.progress("looking for causes", 0.6 * k / kMostSteps)) return given_up();
     Result<bool> more = search.step();
     if (more && !*more) more = search.prune();
     if (!more) return tl::make_unexpected(more.error());

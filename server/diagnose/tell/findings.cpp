@@ -14,6 +14,7 @@ namespace trammel {
 
 namespace {
 
+using causes::Summary;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -77,12 +78,13 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
       covariance(i, j) = scale * priors[static_cast<std::size_t>(other)].prior_scale * estimated.covariance(k, other);
     }
   }
-  if (cause.cause == "gear_transmission") {
+  const Summary summary = record_of(cause).summary;
+  if (summary == Summary::kOrderAndAmplitude) {
     estimates.push_back({"order", "", values(0), kExpanded * std::sqrt(covariance(0, 0))});
     estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
-  } else if (cause.cause == "encoder_eccentricity") {
+  } else if (summary == Summary::kAmplitude) {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
-  } else if (cause.cause == "joint_map" && values.size() > 0) {
+  } else if (summary == Summary::kPeakToPeak && values.size() > 0) {
     estimates.push_back(peak_to_peak_of(problem.batch(), cause.joint, values, covariance));
   }
   if (!cause.parameter.empty()) {
@@ -98,8 +100,8 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   }
   for (Index i = 0; i < values.size(); ++i) {
     const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
-    if (parameter.name.starts_with("order")) continue;
-    if (cause.cause == "joint_map") break;  // a hundred harmonics tell people nothing
+    if (parameter.is_place) continue;
+    if (summary == Summary::kPeakToPeak) break;  // a hundred harmonics tell people nothing
     estimates.push_back(in_units(parameter, values(i), std::sqrt(covariance(i, i))));
   }
   return estimates;
@@ -210,28 +212,47 @@ void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings
   if (!unexplained.present) return;
   for (Finding& finding : findings) {
     if (finding.source.empty() || finding.effect_rms > kDwarfed * unexplained.rms) continue;
-    finding.could_also_be.push_back({"unknown", -1, "", "", {}});
+    finding.could_also_be.push_back(unknown_cause());
     finding.action = "find first what is unknown here: it is several times larger";
   }
 }
 
+namespace {
+
+/// The causes that describe a single one of its kind as well, and better where there are several: a map of the joint's
+/// angle for ripples of one gear.
+std::vector<const CauseRecord*> doubts_about(const CauseRecord& record) {
+  std::vector<const CauseRecord*> general;
+  for (const CauseRecord* other : all_causes()) {
+    if (std::any_of(other->rivals.begin(), other->rivals.end(), [&](const causes::Rival& rival) {
+          return rival.likeness == causes::Likeness::kDoubtfulCase && rival.cause == record.spelling;
+        }))
+      general.push_back(other);
+  }
+  return general;
+}
+
+}  // namespace
+
 void doubt_single_orders(std::vector<Finding>& findings) {
   constexpr int kFewOrders = 2;
-  const auto at_joint = [&](const char* cause, int joint) {
+  const auto at_joint = [&](const CauseRecord& cause, int joint) {
     return std::count_if(findings.begin(), findings.end(), [&](const Finding& other) {
-      return other.cause.cause == cause && other.cause.joint == joint;
+      return &record_of(other.cause) == &cause && other.cause.joint == joint;
     });
   };
   for (Finding& finding : findings) {
     const int joint = finding.cause.joint;
-    if (finding.cause.cause != "gear_transmission") continue;
-    if (at_joint("joint_map", joint) == 0 && at_joint("gear_transmission", joint) <= kFewOrders) continue;
-    const Cause map{"joint_map", joint, "", "", {}};
-    if (std::find(finding.could_also_be.begin(), finding.could_also_be.end(), map) != finding.could_also_be.end())
-      continue;
-    finding.could_also_be.push_back(map);
-    finding.action =
-        fmt::format("measure more poses over the range of joint {}: its error has no single order", joint + 1);
+    const CauseRecord& own = record_of(finding.cause);
+    for (const CauseRecord* general : doubts_about(own)) {
+      if (at_joint(*general, joint) == 0 && at_joint(own, joint) <= kFewOrders) continue;
+      const Cause map{std::string(general->spelling), joint, "", "", {}};
+      if (std::find(finding.could_also_be.begin(), finding.could_also_be.end(), map) != finding.could_also_be.end())
+        continue;
+      finding.could_also_be.push_back(map);
+      finding.action =
+          fmt::format("measure more poses over the range of joint {}: its error has no single order", joint + 1);
+    }
   }
 }
 
