@@ -18,7 +18,14 @@ std::string in_words(const Cause& cause) {
   return words + fmt::format(fmt::runtime(begins ? " from pose {} on" : ", pose {}"), cause.pose_id);
 }
 
-Cause unknown_cause(int joint) { return {"unknown", joint, "", "", {}}; }
+Cause cause_at(const CauseRecord& record, int joint) {
+  Cause cause;
+  cause.cause = record.spelling;
+  cause.joint = joint;
+  return cause;
+}
+
+Cause unknown_cause(int joint) { return cause_at(cause_spelled("unknown"), joint); }
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {

@@ -246,7 +246,7 @@ void doubt_single_orders(std::vector<Finding>& findings) {
     const CauseRecord& own = record_of(finding.cause);
     for (const CauseRecord* general : doubts_about(own)) {
       if (at_joint(*general, joint) == 0 && at_joint(own, joint) <= kFewOrders) continue;
-      const Cause map{std::string(general->spelling), joint, "", "", {}};
+      const Cause map = cause_at(*general, joint);
       if (std::find(finding.could_also_be.begin(), finding.could_also_be.end(), map) != finding.could_also_be.end())
         continue;
       finding.could_also_be.push_back(map);
