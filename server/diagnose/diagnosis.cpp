@@ -25,7 +25,14 @@ std::string kind_in_words(const Cause& cause) {
   return in_words(Cause{.cause = cause.cause, .parameter = cause.parameter});
 }
 
-Cause unknown_cause(int joint) { return {"unknown", joint}; }
+Cause cause_at(const CauseRecord& record, int joint) {
+  Cause cause;
+  cause.cause = record.spelling;
+  cause.joint = joint;
+  return cause;
+}
+
+Cause unknown_cause(int joint) { return cause_at(cause_spelled("unknown"), joint); }
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {

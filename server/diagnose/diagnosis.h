@@ -33,6 +33,8 @@ struct Cause {
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
 /// What is known of it, wherever on the arm it is.
 [[nodiscard]] const CauseRecord& record_of(const Cause& cause);
+/// The cause of that record, of `joint` (0-based; -1: of no single one).
+[[nodiscard]] Cause cause_at(const CauseRecord& record, int joint = -1);
 /// Something is there, of `joint` (-1: of any), and no known cause is it.
 [[nodiscard]] Cause unknown_cause(int joint = -1);
 

@@ -146,7 +146,7 @@ Triage Judge::told(const Tried& none) const {
       triage.learn = triage.learn && !tried_[k].alternative.harmful;
     }
     if (triage.cause.cause.empty() && !triage.outliers.empty()) {
-      triage.cause.cause = first_searched_by(causes::SearchFamily::kPose).spelling;
+      triage.cause = cause_at(first_searched_by(causes::SearchFamily::kPose));
       triage.cause.pose_id = triage.outliers.front();
     }
     triage.verdict = triage.cause.cause.empty() ? TriageVerdict::kClean : TriageVerdict::kExplained;

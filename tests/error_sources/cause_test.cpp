@@ -6,6 +6,7 @@
 #include <set>
 #include <thread>
 
+#include "server/base/text_file.h"
 #include "server/error_sources/catalogue.h"
 #include "server/error_sources/spelling.h"
 
@@ -56,6 +57,15 @@ TEST(Causes, SpellingsAndNamesForPeopleAreTheirOwn) {
     EXPECT_TRUE(spellings.insert(record->spelling).second) << record->spelling;
     EXPECT_TRUE(names.insert(record->plain_name).second) << record->plain_name;
     EXPECT_EQ(record->plain_name.find('_'), std::string_view::npos) << record->plain_name;
+  }
+}
+
+TEST(Causes, TheReadmeHasEveryCauseWithBothItsNames) {
+  const Result<std::string> readme = read_text_file(std::string(TRAMMEL_SOURCE_DIR) + "/README.md");
+  ASSERT_TRUE(readme);
+  for (const CauseRecord* record : all_causes()) {
+    EXPECT_NE(readme->find(fmt::format("`{}", record->spelling)), std::string::npos) << record->spelling;
+    EXPECT_NE(readme->find(record->plain_name), std::string::npos) << record->plain_name;
   }
 }
 

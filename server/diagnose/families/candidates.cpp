@@ -90,8 +90,6 @@ void for_each_cause(const Chain& robot, const Take& take) {
   }
 }
 
-Cause cause_at(const CauseRecord& record, int joint) { return {std::string(record.spelling), joint}; }
-
 /// As a list of error sources spells it, without the pose at which it begins.
 std::string spelled(const CauseRecord& record, int joint) { return to_string(cause_at(record, joint)); }
 

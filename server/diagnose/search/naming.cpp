@@ -102,7 +102,7 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
   std::vector<Cause> rivals;
   for (const CauseRecord* other : all_causes()) {
     if (own.goes_with_time && other->goes_with_time && other != &own && lacks(other->needs))
-      rivals.push_back({std::string(other->spelling)});
+      rivals.push_back(cause_at(*other));
   }
   // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
   const bool in_motion =
@@ -110,7 +110,7 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
                                      [](const Measurement& m) { return m.context.velocity.has_value(); });
   if (!in_motion || own.search == causes::SearchFamily::kPose) return rivals;
   for (const CauseRecord* other : all_causes()) {
-    if (other->needs.velocity) rivals.push_back({std::string(other->spelling)});
+    if (other->needs.velocity) rivals.push_back(cause_at(*other));
   }
   return rivals;
 }

@@ -120,9 +120,10 @@ std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model, const M
     for (const causes::Rival& rival : record->rivals) {
       if (rival.likeness != causes::Likeness::kWhereConstant) continue;
       for (int joint = of_joint ? 0 : -1; joint < (of_joint ? model.cell->robot.size() : 0); ++joint) {
-        const Cause taken_for{std::string(rival.cause), -1, parameter_of(rival, joint)};
+        Cause taken_for = cause_at(cause_spelled(rival.cause));
+        taken_for.parameter = parameter_of(rival, joint);
         if (is_constant(record->needs, recorded, joint) && is_free(model, taken_for))
-          pairs.push_back({{{std::string(record->spelling), joint}, taken_for}, 1});
+          pairs.push_back({{cause_at(*record, joint), taken_for}, 1});
       }
     }
   }

@@ -214,12 +214,12 @@ void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& fa
 void tell_periodograms(const Explained& explained, Diagnosis& diagnosis) {
   const LinearProblem& before = explained.before;
   const Chance& chance = explained.found.chance;
-  const std::string gear(first_searched_by(causes::SearchFamily::kOrder).spelling);
+  const CauseRecord& gear = first_searched_by(causes::SearchFamily::kOrder);
   const Background first(before.nuisance());
   const auto& robot = before.model().cell->robot;
   for (int joint = 0; joint < robot.size(); ++joint) {
     if (robot.joint(joint).type != JointType::kRevolute) continue;
-    const FamilyPtr orders = make_order_family(before, {gear, joint, "", "", {}});
+    const FamilyPtr orders = make_order_family(before, cause_at(gear, joint));
     if (!orders) continue;
     Periodogram lines = periodogram(before, joint, first);
     lines.limit = strength_for(chance.limit_at(kPeriodogramLine) + chance.penalty_of(*orders), 2);

@@ -32,7 +32,7 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   const bool too_many = at_joint(cause.cause) > thresholds::kMostOrders;
   std::vector<Cause> all;
   for (const CauseRecord* record : all_causes()) {
-    const Cause general{std::string(record->spelling), cause.joint};
+    const Cause general = cause_at(*record, cause.joint);
     if (is_doubtful_case(general, cause) && (too_many || at_joint(general.cause) > 0)) all.push_back(general);
   }
   return all;
@@ -41,7 +41,7 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
 /// Adds what is told by the time alone.
 void add_going_with_time(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
-    if (record->goes_with_time && record->needs.time) add(rivals, {std::string(record->spelling)});
+    if (record->goes_with_time && record->needs.time) add(rivals, cause_at(*record));
   }
 }
 

@@ -25,7 +25,7 @@ bool moves_base(const CauseRecord& record) {
 std::string as_a_whole(const CauseRecord& record, int joint) {
   const causes::Rival& whole = *whole_of(record);
   if (whole.parameter.empty()) return std::string(whole.cause);
-  return to_string({std::string(record.spelling), joint, "", "", {}}) + "@1";
+  return to_string(cause_at(record, joint)) + "@1";
 }
 
 Alternative started(const Cause& cause, const PhysicalModel& model) {
@@ -79,7 +79,7 @@ std::vector<Alternative> Alternatives::from(int first, const std::string& pose_i
     if (record->lasting != Lasting::kFromAPose || (record->needs.payload && !carries())) continue;
     const bool of_joint = record->scope == Scope::kJoint;
     for (int joint = of_joint ? 0 : -1; joint < (of_joint ? physics_.cell->robot.size() : 0); ++joint)
-      add({std::string(record->spelling), joint, "", "", {}}, as_a_whole(*record, joint), record->whole_batch->harmful);
+      add(cause_at(*record, joint), as_a_whole(*record, joint), record->whole_batch->harmful);
   }
   if (first == 0) add_drift(all);
   return all;
@@ -102,7 +102,7 @@ bool Alternatives::carries() const {
 }
 
 void Alternatives::add_drift(std::vector<Alternative>& all) const {
-  Alternative one = started({"drift", -1, "", "", {}}, physics_);
+  Alternative one = started(cause_at(cause_spelled("drift")), physics_);
   Eigen::Index first = 0;
   bool any = false;
   for (const ErrorSourcePtr& source : physics_.sources) {
