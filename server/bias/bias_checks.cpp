@@ -11,15 +11,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kOutputs = 3;
-constexpr Index kFewestObservations = 10;
+constexpr Index kFewestObservations = 10;  // an arm of six joints has eight hyperparameters: fewer decide nothing
 constexpr std::string_view kAxis[] = {"x", "y", "z"};
 
 Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
   const Index n = q.rows();
   if (n < kFewestObservations) return refused("bias data: {} observations, at least {}", n, kFewestObservations);
   if (q.cols() < 1) return refused("bias data: 0 joints, at least 1");
-  if (residual_B.rows() != n || residual_B.cols() != kOutputs)
+  if (residual_B.rows() != n || residual_B.cols() != kCoordinates)
     return refused("bias data: residual is {} x {}, should be {} x 3", residual_B.rows(), residual_B.cols(), n);
   if (sigma.size() != n) return refused("bias data: {} sigmas for {} observations", sigma.size(), n);
   return {};
@@ -31,7 +30,7 @@ Status check_numbers(const MatrixXd& q, const MatrixXd& residual_B, const Vector
       if (!std::isfinite(q(i, j)))
         return refused("bias data row {}: joint {} is {}, not finite", i + 1, j + 1, q(i, j));
     }
-    for (Index d = 0; d < kOutputs; ++d) {
+    for (Index d = 0; d < kCoordinates; ++d) {
       if (!std::isfinite(residual_B(i, d)))
         return refused("bias data row {}: residual {} is {}, not finite", i + 1, kAxis[d], residual_B(i, d));
     }
@@ -70,10 +69,10 @@ Status check_features(const std::string& kernel, const std::vector<BiasFeatures>
 
 Status check_hyperparameters(const BiasState& state, const SpelledBias& bias) {
   const Index rows = bias.kernel->parameter_count(state.q.cols()) + 2;
-  if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kOutputs)
+  if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kCoordinates)
     return refused("bias state: hyperparameters are {} x {}, should be {} x 3 for kernel `{}`",
                    state.hyperparameters.rows(), state.hyperparameters.cols(), rows, state.kernel);
-  if (state.offset.size() != kOutputs) return refused("bias state: {} offsets, should be 3", state.offset.size());
+  if (state.offset.size() != kCoordinates) return refused("bias state: {} offsets, should be 3", state.offset.size());
   Index of_blocks = 0;
   for (const LinearBlockPtr& block : bias.blocks) of_blocks += block->parameter_count(state.features.front());
   if (state.block_hyperparameters.size() != of_blocks)
