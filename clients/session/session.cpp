@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kJobPoll{2000};
 /// Room for everything but the text in the largest sample.
 constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
-/// Nobody else's, on any host.
+/// A name that no other client has, on whatever host: 128 random bits.
 std::string make_partition() {
   std::random_device random;
   return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
@@ -27,10 +27,12 @@ std::string make_partition() {
 Status check_text(const std::string& what, const std::string& text) {
   if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
-    return refused("{} row {}: a NUL byte, not text", what, line);
+    return refused("a NUL byte, not text").in(what).at_row(line);
   }
   if (text.size() <= kMaxText) return {};
-  return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, text.size(), kMaxText);
+  return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), kMaxText)
+      .in(what)
+      .beyond(text.size(), kMaxText);
 }
 
 bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed"; }
@@ -75,7 +77,9 @@ struct Session::Participant {
                                                              const Route& route) {
     auto reply = caller.call(std::move(request), route, deadline());
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
-      return failure(ErrorCode::kUnreachable, "{} ({})", sentence(reply.error()), where_it_looked());
+      Error error = reply.error();
+      error.message += fmt::format(" ({})", where_it_looked());
+      return Failure(std::move(error));
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
@@ -129,7 +133,7 @@ struct Session::Participant {
         auto reply = call(caller, std::move(request), {context.cell, {}, false});
         if (!reply) {
           if (first == 0 || reply.error().code == ErrorCode::kUnreachable) return tl::make_unexpected(reply.error());
-          return failure(reply.error().code, "after the first {}: {}", first, sentence(reply.error()));
+          return Failure(reply.error()).in(fmt::format("after the first {}", first));
         }
         if (get(*reply).size() != count) {
           return failure(ErrorCode::kInternal, "server {} answered {} items for {}",

@@ -122,7 +122,8 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   if (options.kernel == kNone) return restore(state);
   const auto bias = spelled_bias(options.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
-  if (options.starts < 1) return refused("bias fit: {} starts, at least 1", options.starts);
+  if (options.starts < 1)
+    return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
   const bool coupled = !bias->blocks.empty();
   if (coupled) {
     const Status fine = check_features(options.kernel, problem.features, problem.q.rows());
@@ -157,14 +158,19 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
 Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
   const BiasState& old = fitted_->state;
   if (more.q.cols() != old.q.cols())
-    return refused("bias data: {} joints, the model has {}", more.q.cols(), old.q.cols());
+    return refused("{} joints, the model has {}", more.q.cols(), old.q.cols())
+        .in("bias data")
+        .beyond(more.q.cols(), old.q.cols());
   const Index n = old.q.rows() + more.q.rows();
   BiasState state = old;
   state.q.conservativeResize(n, Eigen::NoChange);
   state.q.bottomRows(more.q.rows()) = more.q;
   if (more.residual_B.rows() != more.q.rows() || more.residual_B.cols() != kCoordinates ||
       more.sigma.size() != more.q.rows())
-    return refused("bias data: residual or sigma does not have {} rows", more.q.rows());
+    return refused("residual or sigma does not have {} rows", more.q.rows())
+        .in("bias data")
+        .of("residual")
+        .beyond(more.residual_B.rows(), more.q.rows());
   state.residual_B.conservativeResize(n, Eigen::NoChange);
   state.residual_B.bottomRows(more.q.rows()) = more.residual_B;
   state.sigma.conservativeResize(n);
@@ -191,7 +197,10 @@ Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) con
     }
   }
   if (gone != observations.end())
-    return refused("bias data: observation {} is not one of {} in rising order", *gone, old.q.rows());
+    return refused("observation {} is not one of {} in rising order", *gone, old.q.rows())
+        .in("bias data")
+        .of("observation")
+        .beyond(*gone, old.q.rows());
   BiasState state = old;
   state.q = old.q(kept, Eigen::all);
   state.residual_B = old.residual_B(kept, Eigen::all);

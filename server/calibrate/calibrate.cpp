@@ -39,7 +39,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
-    return refused("batch {}: no measurements to calibrate with", problem.batch.id);
+    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
   CalibrationProblem complete = problem;
   if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {

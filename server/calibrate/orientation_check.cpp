@@ -258,7 +258,7 @@ class Question {
   }
   double fit() const { return given_.fit; }
 
-  std::optional<std::string> doubt() const {
+  std::optional<Error> doubt() const {
     if (follow()) return std::nullopt;
     const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
     if (two_orders_ > 0 && !better) return of_two_orders();
@@ -267,11 +267,17 @@ class Question {
     if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();
     if (!better && !far.empty() && 2 * far.size() < group_.rows.size() && given_.offset <= kMostOff && !reads_better())
       return of_rows(far);
-    return fmt::format("orientations do not follow the joints: {} rms; {}: xyzw order? another tool frame?",
-                       deg(given_.fit), otherwise());
+    return doubted(fmt::format("orientations do not follow the joints: {} rms; {}", deg(given_.fit), otherwise()),
+                   given_.fit)
+        .with_text(reads_better() ? all_[best_].name : "")
+        .next("xyzw order? another tool frame?")
+        .value();
   }
 
  private:
+  static Failure doubted(const std::string& what, double off) {
+    return refused("{}", what).of("qw,qx,qy,qz").beyond(to_deg(off), to_deg(kMostOff));
+  }
   /// So well that nothing else needs to be asked.
   bool follow() const { return given_.fit <= kWorthAsking && far_rows().empty(); }
   bool by_order() const { return all_[best_].by_order; }
@@ -298,7 +304,7 @@ class Question {
     if (reads_better()) return fmt::format("read {} they would fit to {}", all_[best_].name, deg(of_best_.fit));
     return fmt::format("no other reading fits either (best: {}, {})", all_[best_].name, deg(of_best_.fit));
   }
-  std::string of_two_orders() const {
+  Error of_two_orders() const {
     const Quaternion about = X_FT_ ? Quaternion(X_FT_->linear()) : of_both_.q_FT;
     std::vector<double> off;
     int first = 0;
@@ -308,28 +314,41 @@ class Question {
       if (off.empty()) first = group_.rows[i]->row;
       off.push_back(as_given);
     }
-    return fmt::format(
-        "{} of {} orientations (the first in row {}) do not follow the joints: {} rms; read {} they would fit to {}, "
-        "as the others do: two files of different order in one? xyzw order? another tool frame?",
-        off.size(), group_.rows.size(), first, deg(off.empty() ? given_.fit : rms(off)), all_[two_orders_].name,
-        deg(of_both_.fit));
+    const double far = off.empty() ? given_.fit : rms(off);
+    return doubted(fmt::format("the first of {} of {} orientations that do not follow the joints: {} rms; read {} they "
+                               "would fit to {}, as the others do",
+                               off.size(), group_.rows.size(), deg(far), all_[two_orders_].name, deg(of_both_.fit)),
+                   far)
+        .at_row(first)
+        .with_text(all_[two_orders_].name)
+        .next("two files of different order in one? xyzw order? another tool frame?")
+        .value();
   }
-  std::string of_tool() const {
+  Error of_tool() const {
     const Quaternion q = given_.q_FT.w() < 0 ? Quaternion(-given_.q_FT.coeffs()) : given_.q_FT;
-    return fmt::format(
-        "orientations follow the joints to {}, but turned by {} against tool '{}' of the cell file: another tool "
-        "frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]; {}",
-        deg(given_.scatter), deg(given_.offset), group_.tool, q.w(), q.x(), q.y(), q.z(), otherwise());
+    return doubted(fmt::format("orientations follow the joints to {}, but turned by {} against tool '{}' of the cell "
+                               "file; {}",
+                               deg(given_.scatter), deg(given_.offset), group_.tool, otherwise()),
+                   given_.offset)
+        .with_text(fmt::format("against tool '{}'", group_.tool))
+        .next(fmt::format("another tool frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]", q.w(),
+                          q.x(), q.y(), q.z()))
+        .value();
   }
-  std::string of_rows(const std::vector<std::size_t>& far) const {
+  Error of_rows(const std::vector<std::size_t>& far) const {
     std::vector<double> off;
     for (const std::size_t i : far) off.push_back(angle(all_.front().q_FT[i], given_.q_FT));
     const Measurement& first = *group_.rows[far.front()];
-    return fmt::format(
-        "{} of {} orientations (the first in row {}, pose {}) do not follow the joints: {} rms, the others {}: xyzw "
-        "order? another tool frame? the joints of another pose?",
-        far.size(), group_.rows.size(), first.row, first.pose_id, deg(rms(off)),
-        deg(median(angles(all_.front().q_FT, given_.q_FT))));
+    return doubted(
+               fmt::format("pose {} is the first of {} of {} orientations that do not follow the joints: {} rms, the "
+                           "others {}",
+                           first.pose_id, far.size(), group_.rows.size(), deg(rms(off)),
+                           deg(median(angles(all_.front().q_FT, given_.q_FT)))),
+               rms(off))
+        .at_row(first.row)
+        .with_text("pose " + first.pose_id)
+        .next("xyzw order? another tool frame? the joints of another pose?")
+        .value();
   }
 
   const Oriented& group_;
@@ -388,7 +407,7 @@ bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented
   return median(off) <= kNoModelError;
 }
 
-std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
+std::optional<Error> doubt_of(Oriented group, const Cell& cell) {
   const std::optional<Pose>& X_FT = cell.tools.at(group.tool);
   const Located located = by_positions(group, X_FT);
   if (!located.belong) return std::nullopt;  // the joints themselves are in question
@@ -414,7 +433,7 @@ std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
 
 }  // namespace
 
-std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
+std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
   for (const Oriented& group : by_tool(batch, cell.robot)) {
     if (auto doubt = doubt_of(group, cell)) return doubt;
   }
@@ -422,9 +441,9 @@ std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, cons
 }
 
 Status check_orientations(const MeasurementBatch& batch, const Cell& cell) {
-  const std::optional<std::string> doubt = orientation_doubt(batch, cell);
+  std::optional<Error> doubt = orientation_doubt(batch, cell);
   if (!doubt) return {};
-  return refused("batch {}: {}", batch.id, *doubt);
+  return Failure(std::move(*doubt)).in("batch " + batch.id);
 }
 
 }  // namespace trammel

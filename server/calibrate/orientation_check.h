@@ -19,10 +19,11 @@
 /// the orientations: from four poses that turn about different axes on, another order does not fit.
 namespace trammel {
 
-/// What speaks against the orientations of `batch` (checked against `cell`), with both figures and the question that
-/// whoever measured them can answer; nothing where they follow the joints, where fewer than 3 poses of a tool have one,
-/// and where the positions do not belong to the joints either.
-[[nodiscard]] std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, const Cell& cell);
+/// What speaks against the orientations of `batch` (checked against `cell`): how far they are off (`value`, deg), the
+/// reading that would fit (`text`, `as xyzw`), the first row where not all of them are, and the question that whoever
+/// measured them can answer (`next`); nothing where they follow the joints, where fewer than 3 poses of a tool have
+/// one, and where the positions do not belong to the joints either.
+[[nodiscard]] std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 /// Refuses a batch with an orientation_doubt().
 [[nodiscard]] Status check_orientations(const MeasurementBatch& batch, const Cell& cell);

@@ -33,11 +33,12 @@ std::vector<std::string> owners(const ErrorSource& source, const Cell& cell) {
 
 Status check_has_all(const PhysicalModel& model, const Cell& cell) {
   for (const auto& [id, X_FT] : model.tools) {
-    if (!cell.tools.contains(id)) return refused("cell {}: the model to start from knows tool '{}'", cell.name, id);
+    if (!cell.tools.contains(id))
+      return refused("cell {}: the model to start from knows tool '{}'", cell.name, id).of("tools").with_text(id);
   }
   for (const auto& [id, payload] : model.cell->payloads) {
     if (!cell.payloads.contains(id))
-      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id);
+      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id).of("payloads").with_text(id);
   }
   return {};
 }
@@ -190,7 +191,8 @@ Result<PhysicalModel> in_cell(const PhysicalModel& model, const std::shared_ptr<
 
 Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const Cell>& cell,
                     const MeasurementBatch& batch, const std::vector<std::string>& only, CalibrateOptions options) {
-  if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
+  if (batch.measurements.empty())
+    return refused("no measurements to calibrate with").in("batch " + batch.id).beyond(0, 1);
   if (only.empty()) return failure(ErrorCode::kUsage, "no error source is named to be identified anew");
   Refit refit;
   Result<PhysicalModel> model = in_cell(known.model, cell, &refit.place);

@@ -88,7 +88,7 @@ Status check_fit(const ModelParts& parts) {
     return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(), n);
   }
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
-    return refused("model: a parameter is not finite");
+    return refused("model: a parameter is not finite").of("parameters");
   }
   if (Status origin = check_origin(parts); !origin) return origin;
   if (parts.bias && parts.bias->q.cols() != n)
@@ -154,7 +154,9 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
     known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);
   }
   return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
-                 cell().name, tool, payload, known);
+                 cell().name, tool, payload, known)
+      .of("tool_id")
+      .with_text(tool);
 }
 
 bool CompensatedModel::is_own(const MeasurementBatch& batch) const {

@@ -95,13 +95,13 @@ double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.s
 Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
   const Chain& robot = cell().robot;
   if (target.joint_target) {
-    if (!target.seed) return refused("a joint target without joints");
+    if (!target.seed) return refused("a joint target without joints").of("joints");
     const bool outside = robot.joint_outside_limits(*target.seed).has_value();
     return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed, 0};
   }
   if (target.conf) return inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
   if (target.seed) return inverse_kinematics(robot, target.X_BT * X_TF, *target.seed);
-  return refused("a target needs a branch (conf) or joints as a seed");
+  return refused("a target needs a branch (conf) or joints as a seed").of("conf");
 }
 
 CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, PoseContext context,

@@ -35,23 +35,26 @@ Status check_keys(const Members& members, const std::string& where) {
   static constexpr std::array<std::string_view, 5> kKeys = {"content", "hash", "stamp", "trammel_model", "stamp_hash"};
   for (const auto& [key, value] : members) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
-      return refused("{}: not a Trammel model: unknown key {}", where, shown(key));
+      return refused("not a Trammel model: unknown key {}", shown(key)).in(where).of(shown(key));
   }
   // Models of before the stamp was hashed have no stamp_hash.
   for (const std::string_view key : kKeys) {
     if (key != "stamp_hash" && !members.contains(std::string(key)))
-      return refused("{}: not a Trammel model: no {}", where, key);
+      return refused("not a Trammel model: no {}", key).in(where).of(std::string(key));
   }
   const std::string_view format = members.at("trammel_model");
   if (format == std::to_string(kFormat)) return {};
-  return refused("{}: model format {}, this program reads {}", where, shown(format), kFormat);
+  return refused("model format {}, this program reads {}", shown(format), kFormat)
+      .in(where)
+      .of("trammel_model")
+      .with_text(shown(format));
 }
 
 /// Of the bytes as they stand in the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
   if (members.at(by) == '"' + hash + '"') return {};
-  return refused("{}: damaged: its {} is {}, its {} has {}", where, by, shown(members.at(by)), of, hash);
+  return refused("damaged: its {} is {}, its {} has {}", by, shown(members.at(by)), of, hash).in(where).of(by);
 }
 
 Result<CompensatedModel> checked_model(const Members& members, const std::string& where) {
@@ -89,9 +92,11 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
   try {
     return json_members(text, where).and_then([&](const Members& members) { return checked_model(members, where); });
   } catch (const Json::exception& error) {
-    return refused("{}: not a Trammel model: {}", where, shown(error.what()));
+    return refused("not a Trammel model: {}", shown(error.what())).in(where);
   } catch (const std::bad_alloc&) {
-    return failure(ErrorCode::kTooLarge, "{}: its {} bytes ask for more memory than there is", where, text.size());
+    return failure(ErrorCode::kTooLarge, "its {} bytes ask for more memory than there is", text.size())
+        .in(where)
+        .with_value(text.size());
   }
 }
 

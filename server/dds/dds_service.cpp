@@ -31,14 +31,20 @@ using Clock = std::chrono::steady_clock;
 Status check_names(const DdsOptions& options, const Trainer& trainer) {
   if (!wire::valid_partition(options.server_id)) {
     return failure(ErrorCode::kUsage, "server id `{}`: must be 1 to {} letters, digits, `.`, `_`, `-`",
-                   options.server_id, wire::MAX_NAME);
+                   options.server_id, wire::MAX_NAME)
+        .of("server")
+        .with_text(options.server_id);
   }
   if (trainer.cells().size() > wire::MAX_CELLS) {
-    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS);
+    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS)
+        .of("cells")
+        .beyond(trainer.cells().size(), wire::MAX_CELLS);
   }
   for (const auto& [name, cell] : trainer.cells()) {
     if (name.empty() || name.size() > wire::MAX_NAME) {
-      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME);
+      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME)
+          .of("cell")
+          .with_text(name);
     }
   }
   return {};

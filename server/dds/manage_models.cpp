@@ -168,7 +168,9 @@ Result<wire::ManageModelsReply> Handlers::release_and_train(const std::string& c
   if (!wanted) return tl::make_unexpected(wanted.error());
   if (wanted->batches.size() > wire::MAX_BATCHES) {
     return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", wanted->batches.size(),
-                   wire::MAX_BATCHES);
+                   wire::MAX_BATCHES)
+        .of("batches")
+        .beyond(wanted->batches.size(), wire::MAX_BATCHES);
   }
   const auto job = trainer_.retrain(cell, wanted->batches, wanted->level, wanted->bias, Trainer::Quarantine::kReleased);
   if (!job) return tl::make_unexpected(job.error());

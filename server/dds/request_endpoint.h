@@ -76,7 +76,7 @@ template <typename Request, typename Reply>
       if (answer) {
         reply = std::move(*answer);
       } else {
-        refuse(to_wire(answer.error().code), answer.error().message);
+        refuse(to_wire(answer.error().code), sentence(answer.error()));
       }
     } catch (const std::exception& failed) {
       refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());

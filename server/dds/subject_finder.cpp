@@ -24,18 +24,23 @@ std::optional<int> version_number(const std::string& model) {
 Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& context) const {
   const auto found = trainer_.cells().find(context.cell());
   if (found == trainer_.cells().end()) {
-    return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell());
+    return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell())
+        .of("cell")
+        .with_text(context.cell());
   }
   if (context.controller_compensates()) {
     return refused("cell {}: models are trained with a controller that does not compensate, this one does",
-                   context.cell());
+                   context.cell())
+        .of("controller_compensates");
   }
   const Cell& cell = *found->second;
   if (!context.tool().empty() && !cell.tools.contains(context.tool())) {
-    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool());
+    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool()).of("tool").with_text(context.tool());
   }
   if (!context.payload().empty() && !cell.payloads.contains(context.payload())) {
-    return refused("cell {}: unknown payload `{}`", context.cell(), context.payload());
+    return refused("cell {}: unknown payload `{}`", context.cell(), context.payload())
+        .of("payload")
+        .with_text(context.payload());
   }
   return found->second;
 }
@@ -50,11 +55,15 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
     subject.served = std::move(*stored);
     subject.in_force = false;
   } else if (!in_force) {
-    return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell());
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell())
+        .of("cell")
+        .with_text(context.cell());
   } else if (!wanted && !context.model().empty() && context.model() != in_force->model.provenance().id &&
              context.model() != in_force->model.provenance().hash) {
     return failure(ErrorCode::kConflict, "cell {}: model `{}` is not in force, {} (version {}) is", context.cell(),
-                   context.model(), in_force->model.provenance().id, in_force->version);
+                   context.model(), in_force->model.provenance().id, in_force->version)
+        .of("model")
+        .with_text(context.model());
   }
 
   const Cell& trained_for = subject.served->model.cell();

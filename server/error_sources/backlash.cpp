@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -18,10 +18,10 @@ class Backlash final : public ErrorSource {
         parameters_({angle_parameter(fmt::format("b{}", spec.joint + 1), 2e-4),
                      {fmt::format("bt{}", spec.joint + 1), "rad/Nmm", to_rad_per_nmm(1), 0, from_rad_per_nmm(1e-10)}}) {
   }
+  const CauseRecord& cause() const override { return causes::backlash(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
-  ContextNeeds needs() const override { return {.direction = true}; }
   std::string explanation() const override {
     return fmt::format("the gear of joint {} has play: the joint depends on the side it is approached from",
                        joint_ + 1);
@@ -49,8 +49,29 @@ class Backlash final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<Backlash>(spec); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_backlash(const SourceSpec& spec, const Cell&) { return std::make_shared<Backlash>(spec); }
+const CauseRecord& causes::backlash() {
+  static const CauseRecord record = {
+      .spelling = "backlash",
+      .plain_name = "backlash",
+      .plain_name_of_joint = "backlash in joint {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kAlways,
+      .needs = {.direction = true},
+      .search = SearchFamily::kPlay,
+      .acts = {ActsOn::kLoadedArm, 0},
+      .forms = {{"backlash", make}},
+      .rivals = {{.cause = "geometry", .likeness = Likeness::kWhereConstant, .parameter = "q{}"},
+                 {.cause = "compliance"}},
+      .told_apart_by = remedies::kBothSides,
+      .shown_by = "approaching the poses from both sides of this joint",
+      .action = "approach every target from one side of this joint, or have its gear adjusted",
+      .figures = {{"b", "rad", "half the play"}, {"bt", "rad/Nmm", "how much more of it for each unit of torque"}},
+  };
+  return record;
+}
 
 }  // namespace trammel

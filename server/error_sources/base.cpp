@@ -1,5 +1,5 @@
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -9,6 +9,7 @@ namespace {
 /// Calibration centres the prior on the localised base: where a robot stands is measured, not believed.
 class Base final : public ErrorSource {
  public:
+  const CauseRecord& cause() const override { return causes::base(); }
   std::string name() const override { return "base"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "the robot base stands elsewhere than the cell file says"; }
@@ -35,8 +36,34 @@ class Base final : public ErrorSource {
                                               angle_parameter("beta0", 5e-3), angle_parameter("alpha0", 5e-3)};
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_shared<Base>(); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_base(const SourceSpec&, const Cell&) { return std::make_shared<Base>(); }
+const CauseRecord& causes::base() {
+  static const CauseRecord record = {
+      .spelling = "base",
+      .plain_name = "a base that stands elsewhere",
+      .plain_name_of_joint = "",
+      .scope = Scope::kCell,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kBase, 0},
+      .forms = {{"base", make}},
+      .rivals = {{.cause = "tracker_moved"}, {.cause = "geometry", .parameter = "q1"}},
+      .told_apart_by = remedies::kFixedBase,
+      .shown_by = remedies::kFixedBase.text,
+      .action = "localise the base",
+      .figures = {{"x0", "mm", "base along x"},
+                  {"y0", "mm", "base along y"},
+                  {"z0", "mm", "base along z"},
+                  {"gamma0", "rad", "base about z"},
+                  {"beta0", "rad", "base about y"},
+                  {"alpha0", "rad", "base about x"}},
+      .part = Part::kBase,
+  };
+  return record;
+}
 
 }  // namespace trammel

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -22,6 +22,7 @@ class Compliance : public ErrorSource {
     }
   }
 
+  const CauseRecord& cause() const override { return causes::compliance(); }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "the gearboxes give way under the weight of the payload"; }
 
@@ -128,16 +129,38 @@ class ComplianceLinear final : public Compliance {
   }
 };
 
+template <typename ComplianceForm>
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) {
+  return std::make_shared<ComplianceForm>(cell.robot);
+}
+
+bool carries_anything(const Cell& cell) { return !cell.payloads.empty() || cell.robot.has_link_masses(); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_compliance_first_order(const SourceSpec&, const Cell& cell) {
-  return std::make_shared<ComplianceFirstOrder>(cell.robot);
-}
-Result<ErrorSourcePtr> make_compliance_equilibrium(const SourceSpec&, const Cell& cell) {
-  return std::make_shared<ComplianceEquilibrium>(cell.robot);
-}
-Result<ErrorSourcePtr> make_compliance_linear(const SourceSpec&, const Cell& cell) {
-  return std::make_shared<ComplianceLinear>(cell.robot);
+const CauseRecord& causes::compliance() {
+  static const CauseRecord record = {
+      .spelling = "compliance",
+      .plain_name = "gearboxes that give way",
+      .plain_name_of_joint = "a gearbox that gives way in joint {}",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kLoadedArm, 2},
+      .forms = {{"compliance_first_order", make<ComplianceFirstOrder>},
+                {"compliance_equilibrium", make<ComplianceEquilibrium>},
+                {"compliance_linear", make<ComplianceLinear>}},
+      .rivals = {{.cause = "payload"}, {.cause = "link_bending"}, {.cause = "encoder_eccentricity"}},
+      .told_apart_by = remedies::kOtherLoad,
+      .shown_by = remedies::kOtherLoad.text,
+      .action = "compensate it for this payload",
+      .figures = {{"C", "rad/Nmm", "how far a gearbox gives way"}},
+      .numbers = Numbers::kOneAJoint,
+      .gives_way = true,
+      .forms_differ = carries_anything,
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -2,7 +2,7 @@
 
 #include "server/error_sources/joint_error.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -16,6 +16,7 @@ class EncoderEccentricity final : public JointError {
       : JointError(spec.text, spec.joint,
                    {angle_parameter(fmt::format("ecc_sin{}", spec.joint + 1), 5e-4),
                     angle_parameter(fmt::format("ecc_cos{}", spec.joint + 1), 5e-4)}) {}
+  const CauseRecord& cause() const override { return causes::encoder_eccentricity(); }
   std::string explanation() const override {
     return fmt::format("the encoder disc of joint {} turns off centre", joint() + 1);
   }
@@ -27,10 +28,34 @@ class EncoderEccentricity final : public JointError {
   }
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<EncoderEccentricity>(spec); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_encoder_eccentricity(const SourceSpec& spec, const Cell&) {
-  return std::make_shared<EncoderEccentricity>(spec);
+const CauseRecord& causes::encoder_eccentricity() {
+  static const CauseRecord record = {
+      .spelling = "encoder_eccentricity",
+      .plain_name = "an encoder off centre",
+      .plain_name_of_joint = "an encoder off centre in joint {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kJoints, 1},
+      .forms = {{"encoder_eccentricity", make}},
+      .rivals = {{.cause = "joint_map"}, {.cause = "compliance"}, {.cause = "tool"}},
+      .told_apart_by = remedies::kWiderRange,
+      .shown_by = "the full range of this joint, a second payload",
+      .action = "compensate it; it is fixed in the joint until its encoder is replaced",
+      .figures = {{"amplitude", "urad", "half of what the joint is off from one end to the other"},
+                  {"ecc_sin", "rad", "its sine"},
+                  {"ecc_cos", "rad", "its cosine"}},
+      .summary = Summary::kAmplitude,
+      .of_turning_joint = true,
+      .order = 1,
+      .example = Example{2, 1},
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -28,6 +28,7 @@ class GearTransmission final : public ErrorSource {
     }
   }
 
+  const CauseRecord& cause() const override { return causes::gear_transmission(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
@@ -61,9 +62,7 @@ class GearTransmission final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-}  // namespace
-
-Result<ErrorSourcePtr> make_gear_transmission(const SourceSpec& spec, const Cell& cell) {
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   const Joint& joint = cell.robot.joint(spec.joint);
   if (joint.type != JointType::kRevolute)
     return refused("error source '{}': joint {} does not turn", spec.text, spec.joint + 1);
@@ -74,6 +73,35 @@ Result<ErrorSourcePtr> make_gear_transmission(const SourceSpec& spec, const Cell
   }
   if (!(range > 0)) return refused("error source '{}': joint {} does not move in this cell", spec.text, spec.joint + 1);
   return std::make_shared<GearTransmission>(spec, std::min(range, 4 * kPi));
+}
+
+}  // namespace
+
+const CauseRecord& causes::gear_transmission() {
+  static const CauseRecord record = {
+      .spelling = "gear_transmission",
+      .plain_name = "gear ripple",
+      .plain_name_of_joint = "gear ripple in joint {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kOrder,
+      .acts = {ActsOn::kJoints, 0},
+      .forms = {{"gear_transmission", make}},
+      .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}},
+      .told_apart_by = remedies::kWiderRange,
+      .shown_by = "a wider range of this joint",
+      .action = "compensate it, and have the gear of this joint looked at if it grows",
+      .figures = {{"order", "", "cycles a turn of the joint"},
+                  {"amplitude", "urad", "half of what the joint is off from one end to the other"},
+                  {"gear_sin", "rad", "its sine"},
+                  {"gear_cos", "rad", "its cosine"}},
+      .summary = Summary::kOrderAndAmplitude,
+      .takes_numbers = true,
+      .of_turning_joint = true,
+      .example = Example{1, -1},
+  };
+  return record;
 }
 
 }  // namespace trammel

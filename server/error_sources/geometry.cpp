@@ -1,5 +1,5 @@
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -26,6 +26,7 @@ class Geometry final : public ErrorSource {
     }
   }
 
+  const CauseRecord& cause() const override { return causes::geometry(); }
   std::string name() const override { return "geometry"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "link lengths, twists and joint zeros differ from the drawing"; }
@@ -49,10 +50,35 @@ class Geometry final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) { return std::make_shared<Geometry>(cell.robot); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_geometry(const SourceSpec&, const Cell& cell) {
-  return std::make_shared<Geometry>(cell.robot);
+const CauseRecord& causes::geometry() {
+  static const CauseRecord record = {
+      .spelling = "geometry",
+      .plain_name = "link geometry",
+      .plain_name_of_joint = "",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kLinks, 0},
+      .forms = {{"geometry", make}},
+      .rivals = {{.cause = "base"}, {.cause = "tool"}, {.cause = "joint_map"}},
+      .told_apart_by = remedies::kWiderRange,
+      .shown_by = "a wider range of joints",
+      .action = "identify the geometry",
+      .figures = {{"q", "rad", "zero of a joint"},
+                  {"theta", "rad", "angle of a link on a rail"},
+                  {"d", "mm", "offset of a link along its axis"},
+                  {"a", "mm", "length of a link"},
+                  {"alpha", "rad", "twist of a link"},
+                  {"beta", "rad", "tilt of a link beside a parallel one"}},
+      .part = Part::kLinks,
+      .numbers = Numbers::kApart,
+  };
+  return record;
 }
 
 }  // namespace trammel

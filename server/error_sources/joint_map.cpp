@@ -2,7 +2,7 @@
 
 #include "server/error_sources/joint_error.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -19,6 +19,7 @@ constexpr double kKnee = 6;          // harmonic at which the prior begins to fa
 class JointMap final : public JointError {
  public:
   JointMap(const SourceSpec& spec, int harmonics) : JointError(spec.text, spec.joint, series(spec.joint, harmonics)) {}
+  const CauseRecord& cause() const override { return causes::joint_map(); }
   std::string explanation() const override {
     return fmt::format("joint {} is off by a function of its own angle", joint() + 1);
   }
@@ -47,9 +48,7 @@ class JointMap final : public JointError {
   }
 };
 
-}  // namespace
-
-Result<ErrorSourcePtr> make_joint_map(const SourceSpec& spec, const Cell& cell) {
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   if (cell.robot.joint(spec.joint).type != JointType::kRevolute) {
     return refused("error source '{}': joint {} does not turn", spec.text, spec.joint + 1);
   }
@@ -59,6 +58,33 @@ Result<ErrorSourcePtr> make_joint_map(const SourceSpec& spec, const Cell& cell) 
                    kMaxHarmonics);
   }
   return std::make_shared<JointMap>(spec, static_cast<int>(harmonics));
+}
+
+}  // namespace
+
+const CauseRecord& causes::joint_map() {
+  static const CauseRecord record = {
+      .spelling = "joint_map",
+      .plain_name = "an angle that is off by a function of itself",
+      .plain_name_of_joint = "an angle that is off by a function of itself in joint {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kMap,
+      .acts = {ActsOn::kJoints, 2},
+      .forms = {{"joint_map", make}},
+      .rivals = {{.cause = "gear_transmission", .likeness = Likeness::kDoubtfulCase},
+                 {.cause = "encoder_eccentricity", .likeness = Likeness::kSimplerCase},
+                 {.cause = "geometry", .likeness = Likeness::kSpecialCase, .parameter = "q{}"}},
+      .told_apart_by = remedies::kWiderRange,
+      .shown_by = "more poses over this joint's range",
+      .action = "compensate it; measure again after service of this joint",
+      .figures = {{"peak_to_peak", "urad", "how far apart the joint is off at the two poses that differ most"}},
+      .summary = Summary::kPeakToPeak,
+      .takes_numbers = true,
+      .of_turning_joint = true,
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -1,6 +1,6 @@
 #include "server/error_sources/joint_error.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -13,6 +13,7 @@ class JointSlip final : public JointError {
       : JointError(spec.text, spec.joint,
                    {angle_parameter(fmt::format("slip{}@{:.0f}", spec.joint + 1, spec.at[0]), 2e-3)}),
         first_(static_cast<int>(spec.at[0]) - 1) {}
+  const CauseRecord& cause() const override { return causes::joint_slip(); }
   std::string explanation() const override {
     return fmt::format("joint {} lost its zero at pose {}", joint() + 1, first_ + 1);
   }
@@ -25,10 +26,31 @@ class JointSlip final : public JointError {
   const int first_;
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<JointSlip>(spec); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_joint_slip(const SourceSpec& spec, const Cell&) {
-  return std::make_shared<JointSlip>(spec);
+const CauseRecord& causes::joint_slip() {
+  static const CauseRecord record = {
+      .spelling = "joint_slip",
+      .plain_name = "a lost joint zero",
+      .plain_name_of_joint = "a lost zero of joint {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kFromAPose,
+      .needs = {},
+      .search = SearchFamily::kZeroStep,
+      .acts = {ActsOn::kJoints, 4},
+      .forms = {{"joint_slip", make}},
+      .rivals = {{.cause = "geometry", .likeness = Likeness::kFromTheFirstPose, .parameter = "q{}"},
+                 {.cause = "tracker_moved"},
+                 {.cause = "tool_changed"}},
+      .told_apart_by = {45, remedies::kReflectors.text},
+      .shown_by = remedies::kReflectors.text,
+      .action = "check this joint's brake, coupling and calibration marks, and update its revolution counter",
+      .figures = {{"slip", "rad", "how far the zero is off"}},
+      .whole_batch = WholeBatch{"joint {} lost its zero", false},
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -2,7 +2,8 @@
 #include <cmath>
 #include <unsupported/Eigen/AutoDiff>
 
-#include "server/error_sources/sources.h"
+#include "server/error_sources/error_source.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -19,10 +20,10 @@ class LinkBending final : public ErrorSource {
       : name_(spec.text),
         joint_(spec.joint),
         parameters_({{fmt::format("flex{}", spec.joint + 1), "1/(N m2)", 1, 0, 1e-6, 0.0}}) {}
+  const CauseRecord& cause() const override { return causes::link_bending(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   int joint() const override { return joint_; }
-  ContextNeeds needs() const override { return {.payload = true}; }
   std::string explanation() const override { return fmt::format("link {} bends under the payload", joint_ + 1); }
 
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
@@ -80,9 +81,7 @@ class LinkBending final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-}  // namespace
-
-Result<ErrorSourcePtr> make_link_bending(const SourceSpec& spec, const Cell& cell) {
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   const LinkGeometry& link = cell.robot.joint(spec.joint).link;
   const double length = std::hypot(link.a, link.d);
   if (length < kShortestLink || cell.payloads.empty()) {
@@ -90,6 +89,30 @@ Result<ErrorSourcePtr> make_link_bending(const SourceSpec& spec, const Cell& cel
                    length, kShortestLink, cell.payloads.size());
   }
   return std::make_shared<LinkBending>(spec);
+}
+
+}  // namespace
+
+const CauseRecord& causes::link_bending() {
+  static const CauseRecord record = {
+      .spelling = "link_bending",
+      .plain_name = "a link that bends",
+      .plain_name_of_joint = "bending of link {}",
+      .scope = Scope::kJoint,
+      .lasting = Lasting::kAlways,
+      .needs = {.payload = true},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kLoadedArm, 1},
+      .forms = {{"link_bending", make}},
+      // Joints give way before links do; only beside the joints' compliance is bending a cause of its own.
+      .rivals = {{.cause = "compliance", .likeness = Likeness::kSpecialCase, .surprise = 4}, {.cause = "payload"}},
+      .told_apart_by = remedies::kOtherLoad,
+      .shown_by = remedies::kOtherLoad.text,
+      .action = "compensate it for this payload; identify again when the payload changes",
+      .figures = {{"flex", "1/(N m2)", "how soft the link is, 1/EI"}},
+      .gives_way = true,
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -1,7 +1,7 @@
 #include <utility>
 
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -32,9 +32,9 @@ class PayloadError final : public ErrorSource {
       add_four(parameters_, cell.payloads.size() > 1 ? "[" + id + "]" : "");
     }
   }
+  const CauseRecord& cause() const override { return causes::payload(); }
   std::string name() const override { return "payload"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  ContextNeeds needs() const override { return {.payload = true}; }
   std::string explanation() const override {
     return "the payload's mass or centre of gravity is not as the cell file says";
   }
@@ -58,9 +58,9 @@ class PayloadChanged final : public ErrorSource {
   explicit PayloadChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
     add_four(parameters_, fmt::format("@{}", first_ + 1));
   }
+  const CauseRecord& cause() const override { return causes::payload_changed(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  ContextNeeds needs() const override { return {.payload = true}; }
   std::string explanation() const override { return fmt::format("the payload changed before pose {}", first_ + 1); }
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
@@ -74,7 +74,12 @@ class PayloadChanged final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-}  // namespace
+std::vector<causes::Figure> load_figures() {
+  return {{"mass", "kg", "how much heavier"},
+          {"cx", "mm", "centre of gravity along x of the flange"},
+          {"cy", "mm", "along y"},
+          {"cz", "mm", "along z"}};
+}
 
 Result<ErrorSourcePtr> make_payload(const SourceSpec& spec, const Cell& cell) {
   if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
@@ -83,6 +88,51 @@ Result<ErrorSourcePtr> make_payload(const SourceSpec& spec, const Cell& cell) {
 Result<ErrorSourcePtr> make_payload_changed(const SourceSpec& spec, const Cell& cell) {
   if (cell.payloads.empty()) return refused("error source '{}': cell {} has no payload", spec.text, cell.name);
   return std::make_shared<PayloadChanged>(spec);
+}
+
+}  // namespace
+
+const CauseRecord& causes::payload() {
+  static const CauseRecord record = {
+      .spelling = "payload",
+      .plain_name = "payload mass or centre of gravity",
+      .plain_name_of_joint = "",
+      .scope = Scope::kCell,
+      .lasting = Lasting::kAlways,
+      .needs = {.payload = true},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kLoad, 0},
+      .forms = {{"payload", make_payload}},
+      .rivals = {{.cause = "compliance"}, {.cause = "link_bending"}},
+      .told_apart_by = remedies::kOtherLoad,
+      .shown_by = remedies::kOtherLoad.text,
+      .action = "weigh the payload and correct the cell file",
+      .figures = load_figures(),
+      .part = Part::kPayload,
+      .numbers = Numbers::kSingly,
+  };
+  return record;
+}
+
+const CauseRecord& causes::payload_changed() {
+  static const CauseRecord record = {
+      .spelling = "payload_changed",
+      .plain_name = "the payload changed",
+      .plain_name_of_joint = "",
+      .scope = Scope::kCell,
+      .lasting = Lasting::kFromAPose,
+      .needs = {.payload = true},
+      .search = SearchFamily::kStep,
+      .acts = {ActsOn::kLoad, 1},
+      .forms = {{"payload_changed", make_payload_changed}},
+      .rivals = {{.cause = "payload", .likeness = Likeness::kFromTheFirstPose}, {.cause = "tool_changed"}},
+      .told_apart_by = remedies::kOtherLoad,
+      .shown_by = "a payload_id for every pose, wide poses before and after",
+      .action = "find out what was mounted or lost at that pose, and give the poses their payload_id",
+      .figures = load_figures(),
+      .whole_batch = WholeBatch{"the payload is another one", true},
+  };
+  return record;
 }
 
 }  // namespace trammel

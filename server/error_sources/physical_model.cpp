@@ -82,7 +82,7 @@ Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& pa
 Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source) {
   std::size_t place = 0;
   Eigen::Index first = 0;
-  while (place < model.sources.size() && acting_order(model.sources[place]->name()) <= acting_order(source->name())) {
+  while (place < model.sources.size() && !acts_before(*source, *model.sources[place])) {
     first += static_cast<Eigen::Index>(model.sources[place++]->parameters().size());
   }
   const std::vector<Parameter>& parameters = source->parameters();
@@ -104,11 +104,15 @@ constexpr std::size_t kMostParameters = 4000;  // their covariance has the squar
 /// Before anything is made of them.
 Status check_counts(const std::vector<std::string>& specs) {
   if (specs.size() > kMostSources)
-    return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources);
+    return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources)
+        .of("error_sources")
+        .beyond(specs.size(), kMostSources);
   for (const std::string& spec : specs) {
     if (spec.size() <= kMostSpecBytes) continue;
     return failure(ErrorCode::kTooLarge, "error source '{}...': {} bytes, limit {}", spec.substr(0, 40), spec.size(),
-                   kMostSpecBytes);
+                   kMostSpecBytes)
+        .of("error_sources")
+        .beyond(spec.size(), kMostSpecBytes);
   }
   return {};
 }
@@ -123,22 +127,26 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
     if (!source) return tl::make_unexpected(source.error());
     for (const ErrorSourcePtr& other : model.sources) {
-      if (other->name().starts_with("compliance") && (*source)->name().starts_with("compliance")) {
+      const CauseRecord& cause = other->cause();
+      if (&cause == &(*source)->cause() && cause.forms.size() > 1) {
         return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(),
                        spec);
       }
-      if (other->name() == (*source)->name()) return failure(ErrorCode::kUsage, "error source '{}' given twice", spec);
+      if (other->name() == (*source)->name())
+        return failure(ErrorCode::kUsage, "error source '{}' given twice", spec).of("error_sources").with_text(spec);
     }
     parameters += (*source)->parameters().size();
     if (parameters > kMostParameters) {
       return failure(ErrorCode::kTooLarge, "error source '{}': {} parameters with those before it, limit {}", spec,
-                     parameters, kMostParameters);
+                     parameters, kMostParameters)
+          .of("error_sources")
+          .with_text(spec)
+          .beyond(parameters, kMostParameters);
     }
     model.sources.push_back(std::move(*source));
   }
-  std::stable_sort(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) {
-    return acting_order(a->name()) < acting_order(b->name());
-  });
+  std::stable_sort(model.sources.begin(), model.sources.end(),
+                   [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) { return acts_before(*a, *b); });
   model.X_WB = cell->X_WB.value_or(Pose::Identity());
   for (const auto& [name, X_FT] : cell->tools) model.tools[name] = X_FT.value_or(Pose::Identity());
   model.cell = std::move(cell);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/error_sources/error_source.h"
+#include "server/error_sources/spelling.h"
 
 namespace trammel {
 

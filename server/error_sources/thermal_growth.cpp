@@ -1,4 +1,5 @@
-#include "server/error_sources/sources.h"
+#include "server/error_sources/error_source.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -10,9 +11,9 @@ constexpr double kReferenceTemperature = 20;  // degrees Celsius, of drawings
 /// and a.
 class ThermalGrowth final : public ErrorSource {
  public:
+  const CauseRecord& cause() const override { return causes::thermal_growth(); }
   std::string name() const override { return "thermal_growth"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  ContextNeeds needs() const override { return {.temperature = true}; }
   std::string explanation() const override { return "the links grow as they warm up"; }
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
@@ -40,8 +41,29 @@ class ThermalGrowth final : public ErrorSource {
   const std::vector<Parameter> parameters_ = {{"growth", "um/m/K", 1e6, 0, 20e-6}};
 };
 
+Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_shared<ThermalGrowth>(); }
+
 }  // namespace
 
-Result<ErrorSourcePtr> make_thermal_growth(const SourceSpec&, const Cell&) { return std::make_shared<ThermalGrowth>(); }
+const CauseRecord& causes::thermal_growth() {
+  static const CauseRecord record = {
+      .spelling = "thermal_growth",
+      .plain_name = "links that grow as they warm up",
+      .plain_name_of_joint = "",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {.temperature = true},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kLinks, 1},
+      .forms = {{"thermal_growth", make}},
+      .rivals = {{.cause = "geometry", .likeness = Likeness::kWhereConstant}, {.cause = "tracker_drift"}},
+      .told_apart_by = remedies::kOtherTemperature,
+      .shown_by = "temperatures that differ between poses and do not only rise with time",
+      .action = "warm the robot up before work, or record its temperature with every job",
+      .figures = {{"growth", "um/m/K", "growth of every link"}},
+      .goes_with_time = true,
+  };
+  return record;
+}
 
 }  // namespace trammel

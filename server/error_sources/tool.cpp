@@ -3,7 +3,7 @@
 
 #include "server/error_sources/frame_motion.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -25,6 +25,7 @@ class Tool final : public ErrorSource {
       add_six(parameters_, cell.tools.size() > 1 ? "[" + id + "]" : "");
     }
   }
+  const CauseRecord& cause() const override { return causes::tool(); }
   std::string name() const override { return "tool"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "the tool sits on the flange elsewhere than the cell file says"; }
@@ -48,6 +49,7 @@ class ToolChanged final : public ErrorSource {
   explicit ToolChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
     add_six(parameters_, fmt::format("@{}", first_ + 1));
   }
+  const CauseRecord& cause() const override { return causes::tool_changed(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
@@ -65,11 +67,58 @@ class ToolChanged final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-}  // namespace
+std::vector<causes::Figure> tool_figures() {
+  return {{"tx", "mm", "tool along x of the flange"},   {"ty", "mm", "tool along y"},   {"tz", "mm", "tool along z"},
+          {"trz", "rad", "tool about z of the flange"}, {"try", "rad", "tool about y"}, {"trx", "rad", "tool about x"}};
+}
 
 Result<ErrorSourcePtr> make_tool(const SourceSpec&, const Cell& cell) { return std::make_shared<Tool>(cell); }
 Result<ErrorSourcePtr> make_tool_changed(const SourceSpec& spec, const Cell&) {
   return std::make_shared<ToolChanged>(spec);
+}
+
+}  // namespace
+
+const CauseRecord& causes::tool() {
+  static const CauseRecord record = {
+      .spelling = "tool",
+      .plain_name = "tool position",
+      .plain_name_of_joint = "",
+      .scope = Scope::kCell,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kTool, 0},
+      .forms = {{"tool", make_tool}},
+      .rivals = {{.cause = "geometry", .parameter = "d6"}, {.cause = "geometry", .parameter = "a6"}},
+      .told_apart_by = remedies::kOtherTool,
+      .shown_by = remedies::kOtherTool.text,
+      .action = "measure the tool again and correct the cell file",
+      .figures = tool_figures(),
+      .part = Part::kTool,
+  };
+  return record;
+}
+
+const CauseRecord& causes::tool_changed() {
+  static const CauseRecord record = {
+      .spelling = "tool_changed",
+      .plain_name = "the tool was changed or knocked",
+      .plain_name_of_joint = "",
+      .scope = Scope::kCell,
+      .lasting = Lasting::kFromAPose,
+      .needs = {},
+      .search = SearchFamily::kStep,
+      .acts = {ActsOn::kTool, 1},
+      .forms = {{"tool_changed", make_tool_changed}},
+      .rivals = {{.cause = "tool", .likeness = Likeness::kFromTheFirstPose}, {.cause = "joint_slip"}},
+      .told_apart_by = remedies::kOtherTool,
+      .shown_by = "a second tool, or reference reflectors on the flange",
+      .action = "find out what knocked or changed the tool at that pose; measure again after it",
+      .figures = tool_figures(),
+      .whole_batch = WholeBatch{"the tool is another one, or sits elsewhere on the flange", true},
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -1,6 +1,6 @@
 #include "server/error_sources/frame_motion.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -20,6 +20,7 @@ class TrackerMoved final : public ErrorSource {
       parameters_.push_back(angle_parameter(fmt::format("{}@{}", name, first_ + 1), 5e-4));
     }
   }
+  const CauseRecord& cause() const override { return causes::tracker_moved(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
@@ -40,9 +41,9 @@ class TrackerMoved final : public ErrorSource {
 /// The tracker creeps: the same motion in proportion to the time since the first pose.
 class TrackerDrift final : public ErrorSource {
  public:
+  const CauseRecord& cause() const override { return causes::tracker_drift(); }
   std::string name() const override { return "tracker_drift"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
-  ContextNeeds needs() const override { return {.time = true}; }
   std::string explanation() const override { return "the tracker creeps as time goes on"; }
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
@@ -58,11 +59,67 @@ class TrackerDrift final : public ErrorSource {
                                               angle_rate("drz"), angle_rate("dry"), angle_rate("drx")};
 };
 
-}  // namespace
-
 Result<ErrorSourcePtr> make_tracker_moved(const SourceSpec& spec, const Cell&) {
   return std::make_shared<TrackerMoved>(spec);
 }
 Result<ErrorSourcePtr> make_tracker_drift(const SourceSpec&, const Cell&) { return std::make_shared<TrackerDrift>(); }
+
+}  // namespace
+
+const CauseRecord& causes::tracker_moved() {
+  static const CauseRecord record = {
+      .spelling = "tracker_moved",
+      .plain_name = "the tracker moved",
+      .plain_name_of_joint = "",
+      .scope = Scope::kSession,
+      .lasting = Lasting::kFromAPose,
+      .needs = {},
+      .search = SearchFamily::kStep,
+      .acts = {ActsOn::kBase, 2},
+      .forms = {{"tracker_moved", make_tracker_moved}},
+      .rivals = {{.cause = "base", .likeness = Likeness::kFromTheFirstPose},
+                 {.cause = "tracker_drift"},
+                 {.cause = "joint_slip"}},
+      .told_apart_by = remedies::kReflectors,
+      .shown_by = "reference reflectors, measured before and after",
+      .action = "fix the tracker (or the robot's base) to the floor and measure the reference reflectors",
+      .figures = {{"mx", "mm", "what was measured moved along x"},
+                  {"my", "mm", "along y"},
+                  {"mz", "mm", "along z"},
+                  {"mrz", "rad", "what was measured turned about z"},
+                  {"mry", "rad", "about y"},
+                  {"mrx", "rad", "about x"}},
+      .goes_with_time = true,
+      .whole_batch = WholeBatch{"the tracker, or the robot's base, stands elsewhere", false},
+      .example = Example{3, -1},
+  };
+  return record;
+}
+
+const CauseRecord& causes::tracker_drift() {
+  static const CauseRecord record = {
+      .spelling = "tracker_drift",
+      .plain_name = "the tracker drifts",
+      .plain_name_of_joint = "",
+      .scope = Scope::kSession,
+      .lasting = Lasting::kOfTheSession,
+      .needs = {.time = true},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kBase, 1},
+      .forms = {{"tracker_drift", make_tracker_drift}},
+      .rivals = {{.cause = "tracker_moved"}, {.cause = "thermal_growth"}},
+      .told_apart_by = remedies::kReflectors,
+      .shown_by = remedies::kReflectors.text,
+      .action = "let the tracker warm up, and measure reference reflectors in between",
+      .figures = {{"dx", "mm/h", "what is measured creeps along x"},
+                  {"dy", "mm/h", "along y"},
+                  {"dz", "mm/h", "along z"},
+                  {"drz", "rad/h", "what is measured turns about z"},
+                  {"dry", "rad/h", "about y"},
+                  {"drx", "rad/h", "about x"}},
+      .goes_with_time = true,
+  };
+  return record;
+}
 
 }  // namespace trammel

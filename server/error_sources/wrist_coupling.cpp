@@ -1,6 +1,6 @@
 #include "server/error_sources/joint_error.h"
 #include "server/error_sources/parameter.h"
-#include "server/error_sources/sources.h"
+#include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
 
@@ -14,6 +14,7 @@ class WristCoupling final : public JointError {
  public:
   explicit WristCoupling(const SourceSpec& spec)
       : JointError(spec.text, -1, {ratio_parameter("k54"), ratio_parameter("k64"), ratio_parameter("k65")}) {}
+  const CauseRecord& cause() const override { return causes::wrist_coupling(); }
   std::string explanation() const override { return "the wrist axes drag one another along through their gears"; }
 
  private:
@@ -22,14 +23,37 @@ class WristCoupling final : public JointError {
   }
 };
 
-}  // namespace
-
-Result<ErrorSourcePtr> make_wrist_coupling(const SourceSpec& spec, const Cell& cell) {
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   if (cell.robot.size() != 6) {
     return refused("error source '{}' is of six-axis robots, {} has {} joints", spec.text, cell.robot.name(),
                    cell.robot.size());
   }
   return std::make_shared<WristCoupling>(spec);
+}
+
+}  // namespace
+
+const CauseRecord& causes::wrist_coupling() {
+  static const CauseRecord record = {
+      .spelling = "wrist_coupling",
+      .plain_name = "wrist axes that drag one another along",
+      .plain_name_of_joint = "",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kColumns,
+      .acts = {ActsOn::kJoints, 3},
+      .forms = {{"wrist_coupling", make}},
+      .rivals = {{.cause = "joint_map"}, {.cause = "gear_transmission"}},
+      .told_apart_by = remedies::kWiderRange,
+      .shown_by = "the full range of joints 4 and 5",
+      .action = "set the coupling ratios of the wrist in the controller",
+      .figures = {{"k54", "rad/rad", "how much joint 5 follows joint 4"},
+                  {"k64", "rad/rad", "how much joint 6 follows joint 4"},
+                  {"k65", "rad/rad", "how much joint 6 follows joint 5"}},
+      .numbers = Numbers::kSingly,
+  };
+  return record;
 }
 
 }  // namespace trammel

@@ -25,7 +25,11 @@ Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given,
     pose.context.direction.assign(static_cast<std::size_t>(robot.size()), side);
     return pose;
   }
-  return refused("{} row {}: pose {} is too near to a joint limit to be approached", where, given.row, given.pose_id);
+  return refused("pose {} is too near to a joint limit to be approached", given.pose_id)
+      .in(where)
+      .at_row(given.row)
+      .of("pose_id")
+      .with_text(given.pose_id);
 }
 
 }  // namespace

@@ -54,15 +54,21 @@ Result<Axes> axes_of(const Chain& robot, const ProgramOptions& options) {
     } else if (!axes.rail && (j == 0 || j + 1 == robot.size())) {
       axes.rail = j;
     } else {
-      return refused("robot {}: joint {} is prismatic; a program holds six turning axes and one rail before or after",
-                     robot.name(), j + 1);
+      return refused("robot {}: joint {} is prismatic", robot.name(), j + 1)
+          .of(fmt::format("joint {}", j + 1))
+          .next("a program holds six turning axes and one rail before or after");
     }
   }
   if (axes.turning.size() != 6) {
-    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size());
+    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size())
+        .of("joints")
+        .beyond(axes.turning.size(), 6);
   }
   if (!(options.wait_s >= 0 && std::isfinite(options.wait_s))) {
-    return refused("a wait of {} s at each pose; expected 0 or more", options.wait_s);
+    return refused("a wait of {} s at each pose", options.wait_s)
+        .of("wait_s")
+        .beyond(options.wait_s, 0)
+        .next("expected 0 or more");
   }
   return axes;
 }
@@ -109,7 +115,9 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
   if (!axes) return tl::make_unexpected(axes.error());
   if (!is_name(options.rapid_tool, kRapidName)) {
     return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most", options.rapid_tool,
-                   kRapidName);
+                   kRapidName)
+        .of("rapid_tool")
+        .with_text(options.rapid_tool);
   }
   std::string text = fmt::format("MODULE {}\n", module_name(options.name));
   text += "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
@@ -137,11 +145,15 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
   const Result<Axes> axes = axes_of(robot, options);
   if (!axes) return tl::make_unexpected(axes.error());
   if (options.krl_tool < 0 || options.krl_tool > kKrlTools) {
-    return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools);
+    return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools)
+        .of("krl_tool")
+        .beyond(options.krl_tool, options.krl_tool < 0 ? 0 : kKrlTools);
   }
   if (!is_name(options.name, kKrlName)) {
     return refused("KRL program '{}': expected a letter, then letters, digits or '_', {} at most, as its file is named",
-                   options.name, kKrlName);
+                   options.name, kKrlName)
+        .of("program")
+        .with_text(options.name);
   }
   std::string text = fmt::format("&ACCESS RVP\n&REL 1\nDEF {} ( )\n", options.name);
   text += "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";

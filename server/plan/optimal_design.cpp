@@ -194,10 +194,12 @@ Result<Design> optimal_design(const DesignCandidates& candidates, const Eigen::M
                               const std::vector<Eigen::Index>& nuisance) {
   TRAMMEL_CHECK(information.rows() == candidates.rows.cols() && information.cols() == information.rows());
   if (count < 1 || static_cast<std::size_t>(count) > candidates.size()) {
-    return refused("{} poses of {} candidates; expected 1 to {}", count, candidates.size(), candidates.size());
+    return refused("{} poses of {} candidates; expected 1 to {}", count, candidates.size(), candidates.size())
+        .of("count")
+        .beyond(count, count < 1 ? 1 : candidates.size());
   }
   if (!information.allFinite() || Eigen::LLT<Eigen::MatrixXd>(information).info() != Eigen::Success) {
-    return refused("the information to start from is not positive definite; it needs the prior");
+    return refused("the information to start from is not positive definite").next("it needs the prior");
   }
   Criterion criterion(candidates, information, nuisance);
   Design design;

@@ -18,7 +18,9 @@ Result<JointRanges> planning_ranges(const Cell& cell) {
   for (int i = 0; i < cell.robot.size(); ++i) {
     const Joint& joint = cell.robot.joint(i);
     if (!std::isfinite(joint.lower) || !std::isfinite(joint.upper)) {
-      return refused("cell {}: joint {} has no limits; give joint_ranges_deg", cell.name, i + 1);
+      return refused("cell {}: joint {} has no limits", cell.name, i + 1)
+          .of("joint_ranges_deg")
+          .next("give joint_ranges_deg");
     }
     ranges.emplace_back(joint.lower, joint.upper);
   }
@@ -127,9 +129,12 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
   const DrawCount& count = drawn.count;
   if (count.kept < needed) {
     return refused(
-        "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the workspace, "
-        "{} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be approached",
-        cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way);
+               "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the "
+               "workspace, "
+               "{} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be approached",
+               cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way)
+        .of("count")
+        .beyond(count.kept, needed);
   }
   drawn.q.resize(static_cast<std::size_t>(std::min(wanted, count.kept)));
   return drawn;
@@ -137,7 +142,9 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
 
 Status check_count(const PlanOptions& options) {
   if (options.count >= 1) return {};
-  return failure(ErrorCode::kUsage, "a plan of {} poses; at least 1 is needed", options.count);
+  return failure(ErrorCode::kUsage, "a plan of {} poses, at least 1 is needed", options.count)
+      .of("--count")
+      .beyond(options.count, 1);
 }
 
 /// All that a plan is made with.
@@ -205,7 +212,8 @@ Result<CausePair> pair_of(const Planning& planning, const PlanOptions& options) 
   }
   Result<PhysicalModel> model = make_physical_model(planning.cell, planning.cell->model.error_sources);
   if (!model) return tl::make_unexpected(model.error());
-  if (model->parameter_count() == 0) return refused("cell {}: its model has no error sources", planning.cell->name);
+  if (model->parameter_count() == 0)
+    return refused("cell {}: its model has no error sources", planning.cell->name).of("error_sources");
   model->values = planning_values(*model);
   return CausePair{std::move(*model), "", "", {}, {}};
 }

@@ -13,12 +13,16 @@ namespace {
 Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot, const SimulateOptions& options) {
   const Cell& cell = *robot.truth.cell;
   if (pose.q.size() != cell.robot.size()) {
-    return refused("simulate: {} joints, robot {} has {}", pose.q.size(), cell.robot.name(), cell.robot.size());
+    return refused("simulate: {} joints, robot {} has {}", pose.q.size(), cell.robot.name(), cell.robot.size())
+        .beyond(pose.q.size(), cell.robot.size());
   }
   if (const auto joint = cell.robot.joint_outside_limits(pose.q)) {
+    const Joint& known = cell.robot.joint(*joint);
+    const double value = pose.q(*joint);
     return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1, *joint + 1,
-                   to_deg(pose.q(*joint)), to_deg(cell.robot.joint(*joint).lower),
-                   to_deg(cell.robot.joint(*joint).upper));
+                   to_deg(value), to_deg(known.lower), to_deg(known.upper))
+        .of(fmt::format("q{}_deg", *joint + 1))
+        .beyond(to_deg(value), to_deg(value < known.lower ? known.lower : known.upper));
   }
   const Result<std::string> tool = resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool);
   if (!tool) return tl::make_unexpected(tool.error());

@@ -28,7 +28,7 @@ void set_values(const YamlMap& map, const ErrorSource& source, Eigen::Ref<Eigen:
     if (found == parameters.end()) {
       std::string known;
       for (const Parameter& parameter : parameters) known += " " + key_of(parameter);
-      map.refuse(key, "unknown parameter; known here:" + known);
+      map.refuse(key, refused("unknown parameter").next("known here:" + known));
     }
     values(found - parameters.begin()) = map.number(key) / found->scale;
   }
@@ -36,10 +36,10 @@ void set_values(const YamlMap& map, const ErrorSource& source, Eigen::Ref<Eigen:
 
 VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& cell) {
   map.only({"version", "source", "error_sources", "noise", "base", "tools", "course"});
-  if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+  if (map.integer("version", 0) != 1) map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
   const YamlMap sources = map.map("error_sources");
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
-  if (!model) map.refuse("error_sources", sentence(model.error()));
+  if (!model) map.refuse("error_sources", Failure(model.error()).as(ErrorCode::kRefused));
   VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : robot.truth.sources) {
@@ -59,14 +59,16 @@ VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& c
     const YamlMap course = map.map("course");
     course.only({"seconds_per_pose", "temperature_c", "time_constant_s"});
     robot.course.seconds_per_pose = course.number("seconds_per_pose");
-    if (robot.course.seconds_per_pose <= 0) course.refuse("seconds_per_pose", "must be above 0");
+    if (robot.course.seconds_per_pose <= 0)
+      course.refuse("seconds_per_pose", refused("must be above 0").beyond(robot.course.seconds_per_pose, 0));
     if (course.has("temperature_c")) {
       const std::vector<double> ends = course.numbers("temperature_c", 2);
       robot.course.temperature_start = ends[0];
       robot.course.temperature_end = ends[1];
     }
     robot.course.temperature_time_constant = course.number("time_constant_s", robot.course.temperature_time_constant);
-    if (robot.course.temperature_time_constant <= 0) course.refuse("time_constant_s", "must be above 0");
+    if (robot.course.temperature_time_constant <= 0)
+      course.refuse("time_constant_s", refused("must be above 0").beyond(robot.course.temperature_time_constant, 0));
   }
   if (map.has("base")) robot.truth.X_WB = read_pose(map.map("base"));
   if (map.has("tools")) {

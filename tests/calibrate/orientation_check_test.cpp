@@ -5,6 +5,7 @@
 #include <random>
 
 #include "server/base/units.h"
+#include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -28,7 +29,8 @@ void change(MeasurementBatch& batch, Change change, std::size_t every = 1) {
 }
 
 MeasurementBatch measured(const std::shared_ptr<const Cell>& cell, int poses, std::uint64_t seed) {
-  return test::demand(check_against_cell(test::measured(test::chapter_5_robot(test::cell_7()), poses, seed), *cell));
+  return test::demand(check_against_cell(test::measured(test::chapter_5_robot(test::cell_7()), poses, seed), *cell))
+      .rows();
 }
 
 /// The same poses, each turned by up to `range` about a middle one.
@@ -44,7 +46,7 @@ MeasurementBatch within(double range, int poses, std::uint64_t seed) {
   options.seed = seed;
   const auto cell = test::cell_7();
   MeasurementBatch batch = test::demand(simulate(test::chapter_5_robot(cell), q, options));
-  return test::demand(check_against_cell(batch, *cell));
+  return test::demand(check_against_cell(batch, *cell)).rows();
 }
 
 /// The tool of the cell unknown, or its base, or both.
@@ -201,7 +203,7 @@ TEST(OrientationCheck, AJointThatPositionsHardlyShowIsSuspectedToo) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   cell->tools["spindle"]->translation() = Vector3(0, 0, 0.15);
   VirtualRobot robot = test::chapter_5_robot(cell);
-  MeasurementBatch batch = test::demand(check_against_cell(test::measured(robot, 80, 12), *cell));
+  MeasurementBatch batch = test::demand(check_against_cell(test::measured(robot, 80, 12), *cell)).rows();
   for (Measurement& m : batch.measurements) m.context.q(5) = -m.context.q(5);
   const auto doubt = orientation_doubt(batch, *cell);
   ASSERT_TRUE(doubt);

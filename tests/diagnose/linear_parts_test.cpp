@@ -7,6 +7,7 @@
 #include "server/diagnose/evidence/refine.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
+#include "server/measurement/checked_batch.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -27,7 +28,7 @@ MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
 /// The chapter 5 robot in cell 7, calibrated by the list of the cell, and a linear problem about it.
 struct Calibrated {
   explicit Calibrated(int poses) : batch(test::measured(test::chapter_5_robot(cell), poses, 3)) {
-    batch = *check_against_cell(batch, *cell);
+    batch = MeasurementBatch(check_against_cell(batch, *cell)->rows());
     const CalibrationResult calibration = *calibrate(cell, cell->model.error_sources, batch, {});
     model.model = calibration.model;
     for (const IdentifiedParameter& one : calibration.parameters) model.priors.push_back(one.parameter);

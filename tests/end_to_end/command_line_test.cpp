@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
 
 #include "server/measurement/files/csv_table.h"
 #include "tests/support/daemon.h"
@@ -93,6 +95,42 @@ TEST_F(CommandLine, HelpOfEveryCommandEndsWith0AndNamesItsOptions) {
   for (const auto& [command, option] : commands) {
     const Finished help = must({command, "--help"});
     EXPECT_NE(help.out.find(option), std::string::npos) << command;
+  }
+}
+
+/// The commands that the program itself lists.
+std::vector<std::string> commands_of(const std::string& help) {
+  std::vector<std::string> commands;
+  std::istringstream lines(help.substr(help.find("Subcommands:")));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && line.starts_with("  ")) {
+    if (line[2] != ' ') commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return commands;
+}
+
+TEST_F(CommandLine, HelpOfEveryCommandSaysTheUnitOfEveryQuantity) {
+  const std::regex blanks("\\s+"), unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation", std::regex::icase);
+  int quantities = 0;
+  for (const std::string& command : commands_of(must({"--help"}).out)) {
+    const std::string help = std::regex_replace(must({command, "--help"}).out, blanks, " ");
+    for (auto at = help.find(" FLOAT"); at != std::string::npos; at = help.find(" FLOAT", at + 1)) {
+      const std::string described = help.substr(at, help.find(" --", at) - at);
+      EXPECT_TRUE(std::regex_search(described, unit)) << command << ":" << described;
+      ++quantities;
+    }
+  }
+  EXPECT_GE(quantities, 10);
+}
+
+TEST_F(CommandLine, HelpOfWhatOnlyAServiceCanDoDoesNotOfferFilesInstead) {
+  for (const char* command :
+       {"submit", "retrain", "status", "watch", "models", "activate", "rollback", "export", "import"}) {
+    EXPECT_EQ(must({command, "--help"}).out.find("instead of working on files"), std::string::npos) << command;
+  }
+  for (const char* command : {"predict", "correct", "diagnose"}) {
+    EXPECT_NE(must({command, "--help"}).out.find("instead of working on files"), std::string::npos) << command;
   }
 }
 

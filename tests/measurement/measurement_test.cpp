@@ -6,6 +6,8 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/measurement/checked_batch.h"
+#include "server/measurement/split.h"
 
 namespace trammel {
 namespace {
@@ -72,8 +74,8 @@ TEST(CheckAgainstCell, ResolvesTheOnlyToolAndPayload) {
   const Cell cell = make_cell();
   const auto checked = check_against_cell(make_batch(cell, 20, 1, kTool), cell);
   ASSERT_TRUE(checked) << checked.error().message;
-  EXPECT_EQ(checked->measurements[0].context.tool, "spindle");
-  EXPECT_EQ(checked->measurements[0].context.payload, "spindle");
+  EXPECT_EQ(checked->rows().measurements[0].context.tool, "spindle");
+  EXPECT_EQ(checked->rows().measurements[0].context.payload, "spindle");
 }
 
 TEST(CheckAgainstCell, RefusesABatchWithoutMeasurements) {

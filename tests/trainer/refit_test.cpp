@@ -8,6 +8,7 @@
 #include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
+#include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "server/trainer/pipeline/train.h"
@@ -355,7 +356,7 @@ TEST_F(MeasuredRobot, Ur10KeepsItsToolWhereOnlyTheBaseIsNamed) {
   expect_kept(base, c, "base");
   EXPECT_GT(to_mm(base.parts().physics.tools.at("tmac").translation().z()), 50);
   const CompensatedModel both = test::demand(train(cell(), d, from(c, {"base", "tool"})));
-  const Evaluation fresh = both.evaluate(test::demand(check_against_cell(series("d", 200, 5), *cell())));
+  const Evaluation fresh = both.evaluate(test::demand(check_against_cell(series("d", 200, 5), *cell())).rows());
   RecordProperty("base_and_tool_mm", fmt::format("{:.4f}", to_mm(fresh.compensated.rms)));
   RecordProperty("calibrated_mm", fmt::format("{:.4f}", to_mm(fresh.calibrated.rms)));
   EXPECT_LT(to_mm(fresh.calibrated.rms), 0.6);

@@ -14,6 +14,7 @@
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "server/trainer/pipeline/extend.h"
+#include "tests/support/from_rows.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -541,7 +542,7 @@ TEST_F(TrainerTest, PutsTheExtendedModelInForceBecauseItIsBetterAndKeepsWhatWasA
 TEST_F(TrainerTest, APoseHeldOutThatFitsNeitherModelDoesNotJudgeAnExtensionAndIsNamed) {
   start();
   MeasurementBatch batch = batch_of_an_oscillating_joint(cells_.at("cell-7"));
-  const MeasurementBatch drawn = with_held_out(batch, options_.validation_share, options_.seed);
+  const MeasurementBatch drawn = test::with_held_out(batch, options_.validation_share, options_.seed);
   const auto held_out = std::find_if(drawn.measurements.begin(), drawn.measurements.end(),
                                      [](const Measurement& m) { return m.set == MeasurementSet::kValidation; });
   Measurement& bad = batch.measurements.at(static_cast<std::size_t>(held_out - drawn.measurements.begin()));

@@ -45,7 +45,8 @@ Result<std::string> ask_in_parts(const std::vector<Item>& items, client::CallCon
     Result<client::Answer<Answered>> answer = ask(context, std::vector<Item>(first, first + count));
     if (!answer) return tl::make_unexpected(answer.error());
     if (answer->items.size() != static_cast<std::size_t>(count)) {
-      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count);
+      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count)
+          .beyond(answer->items.size(), count);
     }
     if (from == 0) {
       model_id = answer->model.id;
@@ -76,7 +77,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
     if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
-      return refused("{} row {}: {}", list.where, pose.row, sentence(known.error()));
+      return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
     asked.q = pose.context.q;
@@ -96,7 +97,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
       if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
       if (!arguments.orientation) continue;
       const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
-      if (!turned) return refused("{}: {}", arguments.model, sentence(turned.error()));
+      if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
       predictions.turned.push_back(*turned);
     }
   }
@@ -105,9 +106,13 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
   if (arguments.covariance)
-    return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
+    return failure(ErrorCode::kUsage, "--covariance needs a model file")
+        .of("--covariance")
+        .next("a service does not send covariances");
   if (arguments.orientation)
-    return failure(ErrorCode::kUsage, "--orientation needs a model file: a service does not send these deviations");
+    return failure(ErrorCode::kUsage, "--orientation needs a model file")
+        .of("--orientation")
+        .next("a service does not send these deviations");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
@@ -115,8 +120,13 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   std::vector<std::vector<double>> joints;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
-      return refused("{} row {}: tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
-                     list.where, pose.row, pose.context.tool, pose.context.payload, context->tool, context->payload);
+      return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
+                     context->tool, context->payload)
+          .in(list.where)
+          .at_row(pose.row)
+          .of("tool_id")
+          .with_text(pose.context.tool)
+          .next("a service is asked for one of each");
     }
     joints.push_back(to_wire(pose.context.q, list.joint_types));
   }
@@ -188,7 +198,10 @@ struct CorrectArguments : ApplyArguments {
 
 Result<Extent> correct(const CorrectArguments& arguments) {
   if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
-    return failure(ErrorCode::kUsage, "{}: unknown kind of targets '{}'; known: .csv", arguments.input, ending);
+    return failure(ErrorCode::kUsage, "unknown kind of targets '{}'", ending)
+        .in(arguments.input)
+        .with_text(ending)
+        .next("known: .csv");
   }
   const Result<TargetFile> file = read_targets_csv(arguments.input);
   if (!file) return tl::make_unexpected(file.error());
@@ -211,7 +224,7 @@ Result<Extent> correct(const CorrectArguments& arguments) {
 void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   command
       .add_option("--model", arguments.model,
-                  "Model file; with --service a cell id (its model in force) or cell@version")
+                  "Model file; with --service a cell id (its model in force) or CELL@VERSION")
       ->required();
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
@@ -221,17 +234,19 @@ void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 void add_predict(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ApplyArguments>();
   CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
-  command->add_option("--joints", arguments->input, "Commanded joints (CSV: deg, rails in mm)")->required();
+  command->add_option("--joints", arguments->input, "Commanded joints (CSV: joints in deg, rails in mm)")->required();
   command
       ->add_option("-o,--output", arguments->output,
-                   "Predicted errors, standard deviations and poses in the robot's base (CSV: mm)")
+                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm)")
       ->required();
   command->add_flag(
       "--covariance", arguments->covariance,
-      "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
-      "of the true error, without the tracker's own (slx_mm ...)");
-  command->add_flag("--orientation", arguments->orientation,
-                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
+      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations of the "
+      "true error, the tracker's noise left out (slx_mm ...); with a model file only");
+  command->add_flag(
+      "--orientation", arguments->orientation,
+      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
+      "file only");
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
 }
@@ -239,11 +254,15 @@ void add_predict(CLI::App& app, Action& chosen) {
 void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
-  command->add_option("input", arguments->input, "Targets in the robot's base (CSV: mm, joints in deg)")->required();
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Corrected targets (CSV: mm, deg), each behind the columns of its input; a column named as one of "
-                   "ours comes as input_NAME")
+      ->add_option("input", arguments->input,
+                   "Targets in the robot's base (.csv: positions in mm, joints in deg, rails in mm)")
+      ->required();
+  command
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Corrected targets to write (CSV: mm, deg), behind the columns of the input; an input column that is named "
+          "as an output column comes as input_NAME")
       ->required();
   CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
                                                 "Exit with 0, not 1, where targets are left as they were");

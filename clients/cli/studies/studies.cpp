@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "server/trainer/pipeline/train.h"
 
 namespace trammel::cli {
@@ -57,14 +58,18 @@ class Laboratory {
     TrainOptions train_options = options("calibrating " + level);
     train_options.level = level;
     train_options.bias = "none";
-    return train(cell(), batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return train(cell(), checked, train_options);
+    });
   }
   Result<CompensatedModel> learn(const std::string& level, const CompensatedModel& calibrated,
                                  const MeasurementBatch& batch) {
     const std::string stage = fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
     TrainOptions train_options = options(stage);
     train_options.bias = options_.bias;
-    return learn_bias(calibrated, batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return learn_bias(calibrated, checked, train_options);
+    });
   }
 
  private:
@@ -88,8 +93,11 @@ class Laboratory {
 void add_calibrated(const std::string& level, const CompensatedModel& model, const std::string& set,
                     const MeasurementBatch& batch, Study& study) {
   const BiasProblem error = leftover(model.parts().physics, batch);
-  study.rows.push_back({set, level, model.provenance().training_poses, static_cast<int>(batch.measurements.size()),
-                        figures_of(error.residual_B.transpose()), std::nullopt});
+  study.rows.push_back({.set = set,
+                        .model = level,
+                        .training_poses = model.provenance().training_poses,
+                        .poses = static_cast<int>(batch.measurements.size()),
+                        .figures = figures_of(error.residual_B.transpose())});
 }
 
 /// What is left where the bias is applied at every pose, in domain or not. 3 x N, m.
@@ -104,13 +112,15 @@ Eigen::Matrix3Xd left_by_bias(const CompensatedModel& model, const MeasurementBa
   return (error.residual_B - bias.mean_all_B(error.q, features)).transpose();
 }
 
-Status add_learned(const std::string& level, const CompensatedModel& model, const std::string& set,
-                   const MeasurementBatch& batch, Study& study) {
-  const Eigen::Matrix3Xd left = left_by_bias(model, batch);
-  study.rows.push_back({set, level + "+GP", model.provenance().training_poses,
-                        static_cast<int>(batch.measurements.size()), figures_of(left), model.evaluate(batch),
-                        !model.bias()});
-  return {};
+void add_learned(const std::string& level, const CompensatedModel& model, const std::string& set,
+                 const MeasurementBatch& batch, Study& study) {
+  study.rows.push_back({.set = set,
+                        .model = level + "+GP",
+                        .training_poses = model.provenance().training_poses,
+                        .poses = static_cast<int>(batch.measurements.size()),
+                        .figures = figures_of(left_by_bias(model, batch)),
+                        .served = model.evaluate(batch),
+                        .bias_left_out = !model.bias()});
 }
 
 /// Truth beside what `model` says of the same parameters.
@@ -126,7 +136,8 @@ std::vector<StudyParameter> true_parameters(const PhysicalModel& truth) {
   std::vector<StudyParameter> parameters;
   Eigen::Index k = 0;
   for (const Parameter& parameter : truth.parameters()) {
-    parameters.push_back({parameter.name, parameter.unit, parameter.scale * truth.values(k++), {}});
+    parameters.push_back(
+        {.name = parameter.name, .unit = parameter.unit, .truth = parameter.scale * truth.values(k++)});
   }
   return parameters;
 }
@@ -162,7 +173,7 @@ Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& stud
     if (!learned) return tl::make_unexpected(learned.error());
     for (const auto& [set, batch] : {std::pair{kTraining, &*training}, std::pair{kValidation, &*validation}}) {
       add_calibrated(level, *calibrated, set, *batch, study);
-      if (const Status added = add_learned(level, *learned, set, *batch, study); !added) return added;
+      add_learned(level, *learned, set, *batch, study);
     }
   }
   return {};
@@ -184,7 +195,7 @@ Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>
       if (!training) return tl::make_unexpected(training.error());
       const Result<CompensatedModel> learned = laboratory.learn(level, *calibrated, *training);
       if (!learned) return tl::make_unexpected(learned.error());
-      if (const Status added = add_learned(level, *learned, kValidation, *validation, study); !added) return added;
+      add_learned(level, *learned, kValidation, *validation, study);
     }
   }
   return {};
@@ -211,20 +222,22 @@ Status run_quantity_study(Laboratory& laboratory, Study& study) {
   return trained ? run_calibration_sizes(laboratory, "M3", study) : trained;
 }
 
-/// The controller's joints for every hole, in the file's order.
+/// The joints to which the controller moves for a target.
+Result<InverseResult> nominal_joints(const Cell& cell, const Pose& X_FT, const Target& target) {
+  if (target.joint_target) return InverseResult{InverseStatus::kOk, *target.seed};
+  const Pose X_BF = target.X_BT * X_FT.inverse();
+  if (target.conf) return inverse_kinematics(cell.robot, X_BF, *target.conf, target.seed);
+  return inverse_kinematics(cell.robot, X_BF, *target.seed);
+}
+
+/// The same for every hole, in the file's order.
 Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT, const std::vector<TargetRow>& holes) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(holes.size()), cell.robot.size());
   for (std::size_t i = 0; i < holes.size(); ++i) {
-    const Target& target = holes[i].target;
-    const auto joints = [&]() -> Result<InverseResult> {
-      if (target.joint_target) return InverseResult{InverseStatus::kOk, *target.seed};
-      const Pose X_BF = target.X_BT * X_FT.inverse();
-      if (target.conf) return inverse_kinematics(cell.robot, X_BF, *target.conf, target.seed);
-      return inverse_kinematics(cell.robot, X_BF, *target.seed);
-    }();
+    const Result<InverseResult> joints = nominal_joints(cell, X_FT, holes[i].target);
     if (!joints) return tl::make_unexpected(joints.error());
     if (joints->status != InverseStatus::kOk) {
-      return refused("holes row {}: cell {} does not reach it", holes[i].row, cell.name);
+      return refused("cell {} does not reach it", cell.name).in("holes").at_row(holes[i].row);
     }
     q.row(static_cast<Eigen::Index>(i)) = joints->q.transpose();
   }
@@ -249,8 +262,15 @@ class PooledErrors {
   }
   void add_rows(const std::string& set, int training_poses, Study& study) const {
     const int poses = static_cast<int>(calibrated_.cols());
-    study.rows.push_back({set, "M0", training_poses, poses, figures_of(calibrated_), std::nullopt});
-    study.rows.push_back({set, "M0+GP", training_poses, poses, figures_of(learned_), std::nullopt});
+    const auto add = [&](const char* model, const Eigen::Matrix3Xd& errors) {
+      study.rows.push_back({.set = set,
+                            .model = model,
+                            .training_poses = training_poses,
+                            .poses = poses,
+                            .figures = figures_of(errors)});
+    };
+    add("M0", calibrated_);
+    add("M0+GP", learned_);
   }
 
  private:
@@ -305,8 +325,12 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
     const JointVector uncorrected = context.q;
     const bool corrected =
         correction.status == CorrectionStatus::kOk || correction.status == CorrectionStatus::kOutOfDomain;
-    study.holes.push_back({holes[i].row, name, correction.status, true_error(uncorrected),
-                           true_error(corrected ? correction.q : uncorrected), correction.error_after});
+    study.holes.push_back({.row = holes[i].row,
+                           .model = name,
+                           .status = correction.status,
+                           .error_before = true_error(uncorrected),
+                           .error_after = true_error(corrected ? correction.q : uncorrected),
+                           .expected_after = correction.error_after});
   }
 }
 
@@ -353,9 +377,14 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
   const Cell& cell = *robot.truth.cell;
   if (cell.robot.size() != static_cast<int>(kCalibrationRanges.size())) {
     return refused("cell {}: a robot of {} joints, the studies are of {}", cell.name, cell.robot.size(),
-                   kCalibrationRanges.size());
+                   kCalibrationRanges.size())
+        .of("joints")
+        .beyond(cell.robot.size(), kCalibrationRanges.size());
   }
-  Study study{name, options.seed, cell.name, {}, {}, {}};
+  Study study;
+  study.name = name;
+  study.seed = options.seed;
+  study.cell = cell.name;
   Laboratory laboratory(robot, options, steps_of(name));
   const auto bias_study =
       std::find_if(kBiasStudies.begin(), kBiasStudies.end(), [&](const BiasStudy& spec) { return spec.name == name; });
@@ -364,7 +393,10 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
     if (name == "cal") return run_calibration_study(laboratory, study);
     if (name == "drilling") return run_drilling_study(laboratory, options.holes, study);
     if (name == "quantity") return run_quantity_study(laboratory, study);
-    return failure(ErrorCode::kUsage, "study {}: known are {}", name, fmt::join(study_names(), ", "));
+    return failure(ErrorCode::kUsage, "study '{}' is unknown", name)
+        .of("study")
+        .with_text(name)
+        .next(fmt::format("known are {}", fmt::join(study_names(), ", ")));
   }();
   if (!done) return tl::make_unexpected(done.error());
   return study;

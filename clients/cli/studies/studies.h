@@ -25,20 +25,21 @@ struct StudyOptions {
 
 /// The errors of one model on one set of poses.
 struct StudyRow {
-  std::string set;                   ///< `training`, `validation`, ...
-  std::string model;                 ///< `M0` ... `M3`, `M0+GP` ...
-  int training_poses = 0;            ///< that the last part of the model was identified or learned from
-  int poses = 0;                     ///< in the set
-  ErrorFigures figures;              ///< with the learned bias applied at every pose, as the source does
-  std::optional<Evaluation> served;  ///< of a learned bias: as answers are given, with the calibrated model off domain
-  bool bias_left_out = false;        ///< `M3+GP` where none was worth it: the calibrated model as it is
+  std::string set;         ///< `training`, `validation`, ...
+  std::string model;       ///< `M0` ... `M3`, `M0+GP` ...
+  int training_poses = 0;  ///< that the last part of the model was identified or learned from
+  int poses = 0;           ///< in the set
+  ErrorFigures figures;    ///< with the learned bias applied at every pose, as the source does
+  std::optional<Evaluation> served =
+      {};                      ///< of a learned bias: as answers are given, with the calibrated model off domain
+  bool bias_left_out = false;  ///< `M3+GP` where none was worth it: the calibrated model as it is
 };
 
 /// A parameter of the virtual robot and what the levels take it for, in the parameter's unit.
 struct StudyParameter {
   std::string name, unit;
   double truth = 0;
-  std::map<std::string, IdentifiedParameter> identified;  ///< by level
+  std::map<std::string, IdentifiedParameter> identified = {};  ///< by level
 };
 
 /// A hole that was drilled where a model's correction said.

@@ -60,11 +60,9 @@ std::string beginning_line(const ordered_json& beginning) {
                      place(beginning.at("earliest")), place(beginning.at("latest")));
 }
 
-/// What is smaller says no more: no test here is that exact.
 std::string p_text(const ordered_json& value) {
-  constexpr double kLeast = 1e-6;
   const double p = value.get<double>();
-  return p <= kLeast ? "< 1e-6" : fmt::format("{:.2g}", p);
+  return p <= kLeastPValue ? "< 1e-6" : fmt::format("{:.2g}", p);
 }
 
 std::string finding_lines(const ordered_json& finding) {
@@ -88,9 +86,9 @@ std::string finding_lines(const ordered_json& finding) {
 
 std::string findings_table(const ordered_json& findings) {
   if (findings.empty()) return "";
-  std::string text =
-      fmt::format("\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "", "effect",
-                  "strength", "p", "held out", "", "cause", "um rms", "lambda", "", "before mm", "after mm");
+  constexpr auto kColumns = "  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n";
+  std::string text = "\n" + fmt::format(kColumns, "", "effect", "strength", "p", "held out", "") +
+                     fmt::format(kColumns, "cause", "um rms", "lambda", "", "before mm", "after mm");
   for (const ordered_json& finding : findings) text += finding_lines(finding);
   return text + "  (± is U(k=2): two standard uncertainties)\n";
 }
@@ -134,26 +132,35 @@ std::string suspects_text(const ordered_json& suspects) {
   return text;
 }
 
-/// Causes that needed something else to show, or to be named: a line for all joints of which the same is to be said.
+/// What is said of a cause, and of which others or joints.
+struct Saying {
+  std::string what, of;
+};
+
+/// Says the same once: `of` is added to what is said already, after `between`.
+void say(std::vector<Saying>& sayings, const std::string& what, const std::string& of, const char* between) {
+  const auto known = std::find_if(sayings.begin(), sayings.end(), [&](const Saying& one) { return one.what == what; });
+  if (known == sayings.end()) {
+    sayings.push_back({what, of});
+  } else {
+    known->of += between + of;
+  }
+}
+
+/// Causes that this batch could not have shown, or not for certain, and what they need; a line for all joints alike.
 std::string unseen_lines(const ordered_json& unseen) {
-  std::vector<std::pair<std::string, std::string>> lines;  // cause and what it needs, joints
+  std::vector<Saying> sayings;
   for (const ordered_json& one : unseen) {
-    if (!one.at("smallest_mm").is_null() || one.at("needs").get<std::string>().empty()) continue;
+    const auto needs = one.at("needs").get<std::string>();
+    if (!one.at("smallest_mm").is_null() || needs.empty()) continue;
     const bool by_order = one.value("looked_for_by_order", false);
-    const std::string what =
-        fmt::format("would not have {}: {}: needs {}",
-                    by_order ? "been named for certain (looked for by the order of the poses)" : "shown",
-                    one.at("cause").get<std::string>(), one.at("needs").get<std::string>());
+    const char* how = by_order ? "been named for certain (looked for by the order of the poses)" : "shown";
     const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
-    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == what; });
-    if (known == lines.end()) {
-      lines.emplace_back(what, joint);
-    } else {
-      known->second += joint;
-    }
+    say(sayings, fmt::format("would not have {}: {}: needs {}", how, one.at("cause").get<std::string>(), needs), joint,
+        "");
   }
   std::string text;
-  for (const auto& [what, joints] : lines) {
+  for (const auto& [what, joints] : sayings) {
     text += fmt::format("  {}{}\n", what, joints.empty() ? "" : " (joints" + joints + ")");
   }
   return text;
@@ -168,22 +175,16 @@ std::string need_of(const ordered_json& unseen, const std::string& name) {
   return "";
 }
 
-/// A line a cause: all that looks like it, and once what it needs.
+/// A line a cause: all that looks like it, and what it needs.
 std::string not_separable_lines(const ordered_json& diagnosis) {
-  std::vector<std::pair<std::string, std::string>> lines;
+  std::vector<Saying> sayings;
   for (const ordered_json& group : diagnosis.at("not_separable")) {
-    const auto name = group.front().get<std::string>();
-    std::string others;
-    for (std::size_t k = 1; k < group.size(); ++k) others += (k > 1 ? ", " : "") + group[k].get<std::string>();
-    const auto known = std::find_if(lines.begin(), lines.end(), [&](const auto& line) { return line.first == name; });
-    if (known == lines.end()) {
-      lines.emplace_back(name, others);
-    } else {
-      known->second += ", " + others;
-    }
+    std::vector<std::string> others;
+    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(group[k]);
+    say(sayings, group.front(), fmt::format("{}", fmt::join(others, ", ")), ", ");
   }
   std::string text;
-  for (const auto& [name, others] : lines) {
+  for (const auto& [name, others] : sayings) {
     const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
     text += fmt::format("  not told apart by these poses: {} from {}{}\n", name, others,
                         need.empty() ? "" : fmt::format(" (needs {})", need));

@@ -81,24 +81,21 @@ std::string rotation_text(const CompensatedModel::Parts& parts) {
                      parts.oriented_poses, parts.bias->q.rows());
 }
 
+std::string candidate_line(const BiasCandidate& c) {
+  if (c.skipped) return fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
+  return fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
+                     to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
+}
+
 std::string choice_text(const BiasChoice& choice) {
   std::string text = choice.sentence + "\n";
   if (choice.candidates.empty()) return text;
   text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}\n", "bias asked; missed, mm", "one by one", "in time",
                       "in space", "nlpd (mm)");
-  for (const BiasCandidate& c : choice.candidates) {
-    if (c.skipped) {
-      text += fmt::format("  {:<34}{:>12}{:>12}{:>12}{:>14}  {}\n", c.kernel, "-", "-", "-", "-", c.verdict);
-      continue;
-    }
-    text += fmt::format("  {:<34}{:>12.4f}{:>12.4f}{:>12.4f}{:>14.3f}  {}\n", c.kernel, to_mm(c.leave_one_out_rms),
-                        to_mm(c.time_block_rms), to_mm(c.joint_block_rms), nlpd_in_mm(c.leave_one_out_nlpd), c.verdict);
-  }
-  text +=
-      "  one by one, nlpd: left out of the bias, not of the physics, so that `none` is its residual; in time, in "
-      "space: "
-      "eighths left out of both\n";
-  return text;
+  for (const BiasCandidate& candidate : choice.candidates) text += candidate_line(candidate);
+  return text +
+         "  one by one, nlpd: each pose left out of the bias, not of the physics (so `none` is its residual); in time, "
+         "in space: eighths left out of both\n";
 }
 
 ordered_json choice_json(const BiasChoice& choice) {
@@ -120,7 +117,7 @@ ordered_json choice_json(const BiasChoice& choice) {
   return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", candidates}};
 }
 
-/// Play that came out with the sign it cannot have.
+/// Play that came out negative, beyond its uncertainty.
 std::string negative_play_text(const CompensatedModel::Parts& parts) {
   std::string text;
   std::size_t next = 0;
@@ -129,11 +126,46 @@ std::string negative_play_text(const CompensatedModel::Parts& parts) {
     next += source->parameters().size();
     if (!source->name().starts_with("backlash:") || next > parts.parameters.size()) continue;
     const IdentifiedParameter& play = parts.parameters[first];
-    if (play.value + 2 * play.stddev >= 0) continue;
+    const double expanded = kExpanded * play.stddev;
+    if (play.value + expanded >= 0) continue;
     text += fmt::format(
         "{} is {:.0f} urad (U {:.0f}), but play is positive by definition: joints read or measured before they stood "
         "still, a servo that overshoots or lags, or a dir{} column of the wrong sign?\n",
-        play.parameter.name, 1e6 * play.value, 2e6 * play.stddev, source->joint() + 1);
+        play.parameter.name, 1e6 * play.value, 1e6 * expanded, source->joint() + 1);
+  }
+  return text;
+}
+
+std::string provenance_text(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  const auto identified = std::count_if(parts.parameters.begin(), parts.parameters.end(),
+                                        [](const IdentifiedParameter& p) { return p.identified; });
+  std::string text = fmt::format(
+      "model {} of cell {}: {}, bias {}\ntrained on {} poses of batch {}; {} of {} parameters identified (rank {})\n",
+      provenance.id, model.cell().name, provenance.level.empty() ? "nominal" : provenance.level,
+      parts.bias ? parts.bias->kernel : "none", provenance.training_poses, provenance.batch_id, identified,
+      parts.parameters.size(), parts.rank);
+  for (const RefitRecord& refit : provenance.refits) {
+    text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
+                        fmt::join(refit.sources, ", "), refit.poses, refit.batch_id, refit.model);
+  }
+  return text;
+}
+
+std::string unidentifiable_text(const std::vector<UnidentifiableCombination>& combinations) {
+  if (combinations.empty()) return "";
+  std::string text = "not identifiable from these poses:\n";
+  for (const UnidentifiableCombination& one : combinations) text += fmt::format("  {}\n", one.sentence);
+  return text;
+}
+
+std::string suspects_text(const std::vector<SuspectPose>& suspects) {
+  if (suspects.empty()) return "";
+  std::string text = "poses that do not fit the others (bounded in their pull; measure them again):\n";
+  for (const SuspectPose& pose : suspects) {
+    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
+                        to_mm(pose.distance), pose.sigmas);
   }
   return text;
 }
@@ -142,40 +174,20 @@ std::string negative_play_text(const CompensatedModel::Parts& parts) {
 
 std::string model_text(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
-  const ModelProvenance& provenance = parts.provenance;
-  std::string text =
-      fmt::format("model {} of cell {}: {}, bias {}\n", provenance.id, model.cell().name,
-                  provenance.level.empty() ? "nominal" : provenance.level, parts.bias ? parts.bias->kernel : "none");
-  text += fmt::format("trained on {} poses of batch {}; {} of {} parameters identified (rank {})\n",
-                      provenance.training_poses, provenance.batch_id,
-                      std::count_if(parts.parameters.begin(), parts.parameters.end(),
-                                    [](const IdentifiedParameter& p) { return p.identified; }),
-                      parts.parameters.size(), parts.rank);
-  for (const RefitRecord& refit : provenance.refits) {
-    text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
-                        fmt::join(refit.sources, ", "), refit.poses, refit.batch_id, refit.model);
-  }
+  std::string text = provenance_text(model);
   for (const std::string& note : notes_of(model)) text += "note: " + note + "\n";
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
-  if (!parts.unidentifiable.empty()) text += "not identifiable from these poses:\n";
-  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
-    text += fmt::format("  {}\n", combination.sentence);
-  }
-  if (!parts.suspects.empty())
-    text += "poses that do not fit the others (bounded in their pull; measure them again):\n";
-  for (const SuspectPose& pose : parts.suspects) {
-    text += fmt::format("  pose {} (row {}): {:.3f} mm off, {:.0f} sigma\n", pose.pose_id, pose.row,
-                        to_mm(pose.distance), pose.sigmas);
-  }
-  return text;
+  return text + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);
 }
 
 namespace {
 
-/// Pairs of parameters whose estimates hang together.
+/// Two correlated parameters are told from here on.
+constexpr double kWorthTelling = 0.9;
+
+/// Pairs of parameters whose estimates are correlated.
 ordered_json correlations_json(const CompensatedModel::Parts& parts) {
-  constexpr double kWorthTelling = 0.9;
   ordered_json pairs = ordered_json::array();
   for (std::size_t i = 0; i < parts.parameters.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -190,32 +202,53 @@ ordered_json correlations_json(const CompensatedModel::Parts& parts) {
   return pairs;
 }
 
-}  // namespace
-
-ordered_json model_json(const CompensatedModel& model) {
-  const CompensatedModel::Parts& parts = model.parts();
-  const ModelProvenance& provenance = parts.provenance;
-  ordered_json parameters = ordered_json::array();
-  for (const IdentifiedParameter& identified : parts.parameters) {
+ordered_json parameters_json(const std::vector<IdentifiedParameter>& parameters) {
+  ordered_json list = ordered_json::array();
+  for (const IdentifiedParameter& identified : parameters) {
     const Parameter& parameter = identified.parameter;
-    parameters.push_back({{"name", parameter.name},
-                          {"unit", parameter.unit},
-                          {"value", parameter.scale * identified.value},
-                          {"u95", kExpanded * parameter.scale * identified.stddev},
-                          {"identified", identified.identified}});
+    list.push_back({{"name", parameter.name},
+                    {"unit", parameter.unit},
+                    {"value", parameter.scale * identified.value},
+                    {"u95", kExpanded * parameter.scale * identified.stddev},
+                    {"identified", identified.identified}});
   }
-  ordered_json combinations = ordered_json::array();
-  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
-    combinations.push_back({{"parameters", combination.parameters},
-                            {"singular_value", combination.singular_value},
-                            {"sentence", combination.sentence}});
+  return list;
+}
+
+ordered_json unidentifiable_json(const std::vector<UnidentifiableCombination>& combinations) {
+  ordered_json list = ordered_json::array();
+  for (const UnidentifiableCombination& one : combinations) {
+    list.push_back(
+        {{"parameters", one.parameters}, {"singular_value", one.singular_value}, {"sentence", one.sentence}});
   }
-  ordered_json suspects = ordered_json::array();
-  for (const SuspectPose& pose : parts.suspects) {
-    suspects.push_back(
+  return list;
+}
+
+ordered_json suspects_json(const std::vector<SuspectPose>& suspects) {
+  ordered_json list = ordered_json::array();
+  for (const SuspectPose& pose : suspects) {
+    list.push_back(
         {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_mm", to_mm(pose.distance)}, {"sigmas", pose.sigmas}});
   }
-  ordered_json json = {
+  return list;
+}
+
+ordered_json refits_json(const std::vector<RefitRecord>& refits) {
+  ordered_json list = ordered_json::array();
+  for (const RefitRecord& refit : refits) {
+    list.push_back({{"sources", refit.sources},
+                    {"batch", refit.batch_id},
+                    {"batch_hash", refit.batch_hash},
+                    {"poses", refit.poses},
+                    {"model", refit.model}});
+  }
+  return list;
+}
+
+ordered_json provenance_json(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const ModelProvenance& provenance = parts.provenance;
+  return {
       {"model", provenance.id},
       {"hash", provenance.hash},
       {"cell", model.cell().name},
@@ -226,24 +259,25 @@ ordered_json model_json(const CompensatedModel& model) {
       {"trained_at_unix_s", provenance.trained_at},
       {"measured_at_unix_s", provenance.measured_at ? ordered_json(*provenance.measured_at) : ordered_json(nullptr)},
       {"training_poses", provenance.training_poses},
-      {"seed", provenance.seed},
-      {"rank", parts.rank},
-      {"condition_number", parts.condition_number},
-      {"observability_index", parts.observability_index},
-      {"cost_record", parts.cost_record},
-      {"suspect_poses", suspects},
-      {"correlations", correlations_json(parts)},
-      {"parameters", parameters},
-      {"not_identifiable", combinations},
-      {"training", evaluation_json(parts.training)}};
+      {"seed", provenance.seed}};
+}
+
+}  // namespace
+
+ordered_json model_json(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  ordered_json json = provenance_json(model);
+  json["rank"] = parts.rank;
+  json["condition_number"] = parts.condition_number;
+  json["observability_index"] = parts.observability_index;
+  json["cost_record"] = parts.cost_record;
+  json["suspect_poses"] = suspects_json(parts.suspects);
+  json["correlations"] = correlations_json(parts);
+  json["parameters"] = parameters_json(parts.parameters);
+  json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
+  json["training"] = evaluation_json(parts.training);
   if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
-  for (const RefitRecord& refit : provenance.refits) {
-    json["refits"].push_back({{"sources", refit.sources},
-                              {"batch", refit.batch_id},
-                              {"batch_hash", refit.batch_hash},
-                              {"poses", refit.poses},
-                              {"model", refit.model}});
-  }
+  if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
   if (parts.bias_choice) json["bias_choice"] = choice_json(*parts.bias_choice);

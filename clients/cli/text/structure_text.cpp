@@ -55,43 +55,53 @@ std::string circle_point_text(const CirclePointResult& result) {
   return text;
 }
 
+namespace {
+
+ordered_json circle_json(const CircleFit& circle) {
+  return {{"joint", circle.joint + 1},
+          {"reflector", circle.reflector},
+          {"points", circle.points},
+          {"span_deg", to_deg(circle.span)},
+          {"centre_mm", vector_json(circle.centre_W * to_mm(1))},
+          {"centre_u95_mm", to_mm(circle.centre_u)},
+          {"radius_mm", to_mm(circle.radius)},
+          {"plane_rms_mm", to_mm(circle.plane_rms)},
+          {"circle_rms_mm", to_mm(circle.circle_rms)}};
+}
+
+/// `joint`: from 1.
+ordered_json axis_json(const JointAxis& axis, std::size_t joint) {
+  return {{"joint", joint},
+          {"direction", vector_json(axis.direction_W)},
+          {"point_mm", vector_json(axis.point_W * to_mm(1))},
+          {"direction_u95_deg", to_deg(axis.direction_u)},
+          {"sigma_mm", to_mm(axis.sigma)},
+          {"freedom", axis.freedom},
+          {"angle_rms_deg", to_deg(axis.angle_rms)}};
+}
+
+ordered_json parameter_json(const MeasuredParameter& parameter) {
+  const bool length = parameter.length;
+  ordered_json json = {{"name", parameter.name},
+                       {"unit", length ? "mm" : "deg"},
+                       {"nominal", shown(parameter.nominal, length)},
+                       {"measured", parameter.measured}};
+  if (parameter.measured) {
+    json["deviation"] = shown(parameter.deviation, length);
+    json["u95"] = shown(parameter.u, length);
+  } else {
+    json["note"] = parameter.note;
+  }
+  return json;
+}
+
+}  // namespace
+
 ordered_json circle_point_json(const CirclePointResult& result) {
   ordered_json json = {{"robot", result.robot.name()}};
-  for (const CircleFit& circle : result.circles) {
-    json["circles"].push_back({{"joint", circle.joint + 1},
-                               {"reflector", circle.reflector},
-                               {"points", circle.points},
-                               {"span_deg", to_deg(circle.span)},
-                               {"centre_mm", vector_json(circle.centre_W * to_mm(1))},
-                               {"centre_u95_mm", to_mm(circle.centre_u)},
-                               {"radius_mm", to_mm(circle.radius)},
-                               {"plane_rms_mm", to_mm(circle.plane_rms)},
-                               {"circle_rms_mm", to_mm(circle.circle_rms)}});
-  }
-  for (std::size_t i = 0; i < result.axes.size(); ++i) {
-    const JointAxis& axis = result.axes[i];
-    json["axes"].push_back({{"joint", i + 1},
-                            {"direction", vector_json(axis.direction_W)},
-                            {"point_mm", vector_json(axis.point_W * to_mm(1))},
-                            {"direction_u95_deg", to_deg(axis.direction_u)},
-                            {"sigma_mm", to_mm(axis.sigma)},
-                            {"freedom", axis.freedom},
-                            {"angle_rms_deg", to_deg(axis.angle_rms)}});
-  }
-  for (const MeasuredParameter& parameter : result.parameters) {
-    const bool length = parameter.length;
-    ordered_json entry = {{"name", parameter.name},
-                          {"unit", length ? "mm" : "deg"},
-                          {"nominal", shown(parameter.nominal, length)},
-                          {"measured", parameter.measured}};
-    if (parameter.measured) {
-      entry["deviation"] = shown(parameter.deviation, length);
-      entry["u95"] = shown(parameter.u, length);
-    } else {
-      entry["note"] = parameter.note;
-    }
-    json["parameters"].push_back(entry);
-  }
+  for (const CircleFit& circle : result.circles) json["circles"].push_back(circle_json(circle));
+  for (const JointAxis& axis : result.axes) json["axes"].push_back(axis_json(axis, json["axes"].size() + 1));
+  for (const MeasuredParameter& parameter : result.parameters) json["parameters"].push_back(parameter_json(parameter));
   const Eigen::Quaterniond q(result.X_WB.linear());
   json["base"] = {{"xyz_mm", vector_json(result.X_WB.translation() * to_mm(1))},
                   {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
@@ -157,47 +167,55 @@ ordered_json fit_json(const DeflectionFit& fit) {
   return json;
 }
 
+std::string element_text(const ElementResult& element) {
+  std::string text =
+      fmt::format("\n  element {}\n    {:<9}{:>12}{:>14}{:>12}{:>9}{:>9}{:>12}{:>12}\n", element.element, "",
+                  "EI, Nmm^2", "C, rad/Nmm", "U(k=2)", "Ax, mm", "Az, mm", "train, mm", "valid., mm");
+  if (element.beam) text += fit_line("model 1", *element.beam);
+  text += fit_line("model 2", element.rigid);
+  if (element.beam) {
+    text += fmt::format("    beam term: F {:.3g}, p {:.2g}, AIC better by {:.3g}\n", element.f, element.p_value,
+                        element.aic_gain);
+  }
+  return text + fmt::format("    {}\n", element.sentence);
+}
+
 }  // namespace
 
 std::string deflection_text(const DeflectionResult& result) {
   std::string text = fmt::format("trained on {:.3f} N, validated on {:.3f} N\n", fmt::join(result.training_loads, ", "),
                                  fmt::join(result.validation_loads, ", "));
-  for (const ElementResult& element : result.elements) {
-    text += fmt::format("\n  element {}\n    {:<9}{:>12}{:>14}{:>12}{:>9}{:>9}{:>12}{:>12}\n", element.element, "",
-                        "EI, Nmm^2", "C, rad/Nmm", "U(k=2)", "Ax, mm", "Az, mm", "train, mm", "valid., mm");
-    if (element.beam) text += fit_line("model 1", *element.beam);
-    text += fit_line("model 2", element.rigid);
-    if (element.beam) {
-      text += fmt::format("    beam term: F {:.3g}, p {:.2g}, AIC better by {:.3g}\n", element.f, element.p_value,
-                          element.aic_gain);
-    }
-    text += fmt::format("    {}\n", element.sentence);
-  }
-  text += fmt::format("\n  rms |dp|, mm: nothing predicted {:.4f}, model 1 {:.4f}, model 2 {:.4f}\n",
-                      to_mm(result.rms_still), to_mm(result.rms_beam), to_mm(result.rms_rigid));
-  return text;
+  for (const ElementResult& element : result.elements) text += element_text(element);
+  return text + fmt::format("\n  rms |dp|, mm: nothing predicted {:.4f}, model 1 {:.4f}, model 2 {:.4f}\n",
+                            to_mm(result.rms_still), to_mm(result.rms_beam), to_mm(result.rms_rigid));
 }
+
+namespace {
+
+ordered_json element_json(const ElementResult& element) {
+  ordered_json json = {{"element", element.element}, {"link", verdict_text(element.verdict)}};
+  if (element.beam) {
+    json["model_1"] = fit_json(*element.beam);
+    json["beam_term"] = {{"f", element.f},
+                         {"p_value", element.p_value},
+                         {"aic_gain", element.aic_gain},
+                         {"end_bending_mm", to_mm(element.end_bending)},
+                         {"end_bending_u95_mm", to_mm(element.end_bending_u)}};
+  }
+  json["model_2"] = fit_json(element.rigid);
+  json["load_bias_p_value"] = element.load_bias_p_value;
+  json["sentence"] = element.sentence;
+  return json;
+}
+
+}  // namespace
 
 ordered_json deflection_json(const DeflectionResult& result) {
   ordered_json json = {{"training_loads_n", result.training_loads},
                        {"validation_loads_n", result.validation_loads},
                        {"variance_factor", result.variance_factor},
                        {"freedom", result.freedom}};
-  for (const ElementResult& element : result.elements) {
-    ordered_json entry = {{"element", element.element}, {"link", verdict_text(element.verdict)}};
-    if (element.beam) {
-      entry["model_1"] = fit_json(*element.beam);
-      entry["beam_term"] = {{"f", element.f},
-                            {"p_value", element.p_value},
-                            {"aic_gain", element.aic_gain},
-                            {"end_bending_mm", to_mm(element.end_bending)},
-                            {"end_bending_u95_mm", to_mm(element.end_bending_u)}};
-    }
-    entry["model_2"] = fit_json(element.rigid);
-    entry["load_bias_p_value"] = element.load_bias_p_value;
-    entry["sentence"] = element.sentence;
-    json["elements"].push_back(entry);
-  }
+  for (const ElementResult& element : result.elements) json["elements"].push_back(element_json(element));
   json["rms_mm"] = {{"nothing_predicted", to_mm(result.rms_still)},
                     {"model_1", to_mm(result.rms_beam)},
                     {"model_2", to_mm(result.rms_rigid)}};

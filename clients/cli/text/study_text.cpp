@@ -61,30 +61,34 @@ std::string error_table(const Study& study) {
   return text;
 }
 
+std::string mean_and_stddev(double mean_mm, double stddev_mm) {
+  return fmt::format("{:>17}", fmt::format("{:.3f} ({:.3f})", mean_mm, stddev_mm));
+}
+
+std::string axis_line(const Study& study, const StudyRow& row) {
+  const std::optional<PrintedFigures> printed = row_printed(study, row);
+  std::string text = fmt::format("{:<28}{:<8}|", row.set, shown_model(row));
+  for (std::size_t k = 0; k < 3; ++k) {
+    text += printed ? mean_and_stddev(printed->mean_mm[k], printed->stddev_mm[k]) : fmt::format("{:>17}", "-");
+  }
+  text += "|";
+  for (int k = 0; k < 3; ++k) {
+    text += mean_and_stddev(to_mm(row.figures.axis_mean(k)), to_mm(row.figures.axis_stddev(k)));
+  }
+  return text + "\n";
+}
+
 /// Mean and standard deviation of each axis, the source's and ours.
 std::string axis_table(const Study& study) {
   std::string text =
       fmt::format("\n{:<28}{:<8}|{:^51}|{:^51}\n{:<36}|", "mean (std) in mm", "model", "thesis", "ours", "");
   for (int side = 0; side < 2; ++side)
     text += fmt::format("{:>17}{:>17}{:>17}{}", "x", "y", "z", side == 0 ? "|" : "\n");
-  for (const StudyRow& row : study.rows) {
-    const std::optional<PrintedFigures> printed = row_printed(study, row);
-    text += fmt::format("{:<28}{:<8}|", row.set, shown_model(row));
-    for (std::size_t k = 0; k < 3; ++k) {
-      text += fmt::format("{:>17}",
-                          printed ? fmt::format("{:.3f} ({:.3f})", printed->mean_mm[k], printed->stddev_mm[k]) : "-");
-    }
-    text += "|";
-    for (int k = 0; k < 3; ++k) {
-      text += fmt::format(
-          "{:>17}", fmt::format("{:.3f} ({:.3f})", to_mm(row.figures.axis_mean(k)), to_mm(row.figures.axis_stddev(k))));
-    }
-    text += "\n";
-  }
+  for (const StudyRow& row : study.rows) text += axis_line(study, row);
   return text;
 }
 
-/// As answers are given: off domain by the calibrated model.
+/// As a service answers: outside the domain of the bias, by the calibrated model alone.
 std::string served_table(const Study& study) {
   std::string text;
   for (const StudyRow& row : study.rows) {
@@ -109,36 +113,42 @@ std::pair<double, std::string> factor_and_unit(const std::string& unit) {
   return {1, unit};
 }
 
-/// Table 5.5. In brackets what stands for a combination only: the poses cannot tell the parameter from another.
-std::string parameter_table(const Study& study) {
-  if (study.parameters.empty()) return "";
-  constexpr const char* kLevels[] = {"M1", "M2", "M3"};
+constexpr const char* kLevels[] = {"M1", "M2", "M3"};
+
+std::string parameter_head() {
   std::string text = fmt::format("\n{:<10}{:<9}{:>8} |{:^27}|{:^36}\n{:<27} |", "parameter", "", "truth", "thesis",
                                  "ours ([ ]: a combination only)", "");
   for (const char* level : kLevels) text += fmt::format("{:>9}", level);
   text += "|";
   for (const char* level : kLevels) text += fmt::format("{:>12}", level);
-  text += "\n";
-  for (const StudyParameter& parameter : study.parameters) {
-    const auto [factor, unit] = factor_and_unit(parameter.unit);
-    text += fmt::format("{:<10}{:<9}{:>8.3f} |", parameter.name, unit, factor * parameter.truth);
-    for (const char* level : kLevels) {
-      const std::optional<double> printed = printed_parameter(parameter.name, level);
-      text += fmt::format("{:>9}", number_or_dash(printed ? std::optional(factor * *printed) : std::nullopt, 3));
-    }
-    text += "|";
-    for (const char* level : kLevels) {
-      const auto found = parameter.identified.find(level);
-      if (found == parameter.identified.end()) {
-        text += fmt::format("{:>12}", "-");
-        continue;
-      }
-      const IdentifiedParameter& identified = found->second;
-      const double value = factor * identified.parameter.scale * identified.value;
-      text += fmt::format("{:>12}", fmt::format(fmt::runtime(identified.identified ? "{:.3f}" : "[{:.3f}]"), value));
-    }
-    text += "\n";
+  return text + "\n";
+}
+
+/// What a level identified, in brackets where only a combination of it and others is known.
+std::string identified_text(const StudyParameter& parameter, const char* level, double factor) {
+  const auto found = parameter.identified.find(level);
+  if (found == parameter.identified.end()) return "-";
+  const double value = factor * found->second.parameter.scale * found->second.value;
+  return found->second.identified ? fmt::format("{:.3f}", value) : fmt::format("[{:.3f}]", value);
+}
+
+std::string parameter_line(const StudyParameter& parameter) {
+  const auto [factor, unit] = factor_and_unit(parameter.unit);
+  std::string text = fmt::format("{:<10}{:<9}{:>8.3f} |", parameter.name, unit, factor * parameter.truth);
+  for (const char* level : kLevels) {
+    const std::optional<double> printed = printed_parameter(parameter.name, level);
+    text += fmt::format("{:>9}", number_or_dash(printed ? std::optional(factor * *printed) : std::nullopt, 3));
   }
+  text += "|";
+  for (const char* level : kLevels) text += fmt::format("{:>12}", identified_text(parameter, level, factor));
+  return text + "\n";
+}
+
+/// Table 5.5 beside ours.
+std::string parameter_table(const Study& study) {
+  if (study.parameters.empty()) return "";
+  std::string text = parameter_head();
+  for (const StudyParameter& parameter : study.parameters) text += parameter_line(parameter);
   return text;
 }
 

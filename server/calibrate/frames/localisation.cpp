@@ -24,7 +24,8 @@ Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
 
 Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
   TRAMMEL_CHECK(X_WT.size() == X_BF.size());
-  if (X_WT.size() < 3) return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size());
+  if (X_WT.size() < 3)
+    return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size()).beyond(X_WT.size(), 3);
   // R_WT R_FTᵀ = R_WB R_BF, so vec(R_WB) and vec(R_FTᵀ) are the singular pair of K = sum kron(R_BF, R_WT), value N.
   Eigen::Matrix<double, 9, 9> K = Eigen::Matrix<double, 9, 9>::Zero();
   for (std::size_t i = 0; i < X_WT.size(); ++i) {
@@ -71,7 +72,8 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
 
 Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF) {
   TRAMMEL_CHECK(p_W.cols() == static_cast<int>(X_BF.size()));
-  if (X_BF.size() < 6) return refused("base and tool: {} positions, at least 6 are needed", X_BF.size());
+  if (X_BF.size() < 6)
+    return refused("base and tool: {} positions, at least 6 are needed", X_BF.size()).beyond(X_BF.size(), 6);
   Matrix3 mean_R = Matrix3::Zero();
   for (const Pose& X : X_BF) mean_R += X.linear();
   mean_R /= static_cast<double>(X_BF.size());

@@ -38,10 +38,13 @@ Status check_belongs(const MeasurementBatch& batch, double rms) {
   const double spread = std::sqrt(square / static_cast<double>(batch.measurements.size()));
   if (rms < std::max(kNoModelError, kNoModelShare * spread)) return {};
   return refused(
-      "batch {}: {:.0f} mm rms are left after identification, of positions that spread over {:.0f} mm: these joints do "
-      "not lead to these positions (look at the order of the joints, their signs and zeros, and which row belongs to "
-      "which position)",
-      batch.id, to_mm(rms), to_mm(spread));
+             "{:.0f} mm rms are left after identification, of positions that spread over {:.0f} mm: these joints do "
+             "not lead to these positions",
+             to_mm(rms), to_mm(spread))
+      .in("batch " + batch.id)
+      .of("x_mm")
+      .beyond(to_mm(rms), to_mm(std::max(kNoModelError, kNoModelShare * spread)))
+      .next("look at the order of the joints, their signs and zeros, and which row belongs to which position");
 }
 
 /// Covariance, rank and what remains hidden, from what `poses` poses say of the parameters that are not held.

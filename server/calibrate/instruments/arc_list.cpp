@@ -20,17 +20,22 @@ constexpr double kPointLimit = 1e5;  // m
 Status check_robot(const Chain& robot, const ArcList& arcs) {
   for (int j = 0; j < robot.size(); ++j) {
     if (robot.joint(j).type == JointType::kPrismatic) {
-      return refused("robot {} joint {} slides and draws no arc; measure the arm without it", robot.name(), j + 1);
+      return refused("robot {} joint {} slides and draws no arc", robot.name(), j + 1)
+          .of(fmt::format("joint {}", j + 1))
+          .next("measure the arm without it");
     }
     for (int before = 0; before < j; ++before) {
       if (robot.transmission()(before, j) == 0) continue;
-      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1);
+      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1)
+          .of(fmt::format("joint {}", before + 1));
     }
   }
   for (const ArcPoint& point : arcs.points) {
     if (point.q.size() == robot.size() && point.joint >= 0 && point.joint < robot.size()) continue;
-    return refused("{} row {}: {} joints, robot {} has {}", arcs.where, point.row, point.q.size(), robot.name(),
-                   robot.size());
+    return refused("{} joints, robot {} has {}", point.q.size(), robot.name(), robot.size())
+        .in(arcs.where)
+        .at_row(point.row)
+        .beyond(point.q.size(), robot.size());
   }
   return {};
 }
@@ -44,7 +49,9 @@ Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where
   if (!posture) return tl::make_unexpected(posture.error());
   const std::size_t held = posture->joint_types().size();
   if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
-    return refused("{}: {} posture columns, robot {} has {} joints", where, held, robot.name(), robot.size());
+    return refused("{} posture columns, robot {} has {} joints", held, robot.name(), robot.size())
+        .in(where)
+        .beyond(held, robot.size());
   }
   std::array<std::size_t, 5> columns{};
   for (std::size_t k = 0; const char* name : {"joint", "q_deg", "x_mm", "y_mm", "z_mm"}) {
@@ -93,9 +100,12 @@ Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList
   for (const auto& [key, points] : by_arc) {
     JointArcs& group = joints[static_cast<std::size_t>(key.first)];
     if (points.size() < least) {
-      return refused("{} row {}: the arc of joint {} has {} points, at least {} are needed{}", arcs.where,
-                     points.front()->row, key.first + 1, points.size(), least,
-                     sigma_stated ? "" : " where sigma is not stated");
+      return refused("the arc of joint {} has {} points, at least {} are needed{}", key.first + 1, points.size(), least,
+                     sigma_stated ? "" : " where sigma is not stated")
+          .in(arcs.where)
+          .at_row(points.front()->row)
+          .of("joint")
+          .beyond(points.size(), least);
     }
     if (group.arcs.empty()) group.posture = points.front()->q;
     for (const ArcPoint* point : points) {
@@ -103,8 +113,12 @@ Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList
         // Another reflector may be read with the joints beyond it elsewhere; within an arc nothing may move.
         const double from = j < key.first ? group.posture(j) : points.front()->q(j);
         if (j == key.first || std::abs(point->q(j) - from) < kSameAngle) continue;
-        return refused("{} row {}: joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", arcs.where,
-                       point->row, j + 1, to_deg(point->q(j)), to_deg(from), key.first + 1);
+        return refused("joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", j + 1, to_deg(point->q(j)),
+                       to_deg(from), key.first + 1)
+            .in(arcs.where)
+            .at_row(point->row)
+            .of(fmt::format("q{}_deg", j + 1))
+            .beyond(to_deg(point->q(j)), to_deg(from));
       }
     }
     group.arcs.push_back(points);
@@ -112,7 +126,7 @@ Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList
   for (int j = 0; j < robot.size(); ++j) {
     JointArcs& group = joints[static_cast<std::size_t>(j)];
     group.joint = j;
-    if (group.arcs.empty()) return refused("{}: no arc of joint {}", arcs.where, j + 1);
+    if (group.arcs.empty()) return refused("no arc of joint {}", j + 1).in(arcs.where).of("joint").with_value(j + 1);
   }
   return joints;
 }

@@ -21,8 +21,11 @@ Result<AxisFit> rough_fit(const JointArcs& group, const std::string& where) {
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3> spread(scatter);
   const auto on_a_line = [&] {
-    return refused("{} row {}: the points of joint {} lie on a line", where, group.arcs.front().front()->row,
-                   group.joint + 1);
+    return refused("the points of joint {} lie on a line", group.joint + 1)
+        .in(where)
+        .at_row(group.arcs.front().front()->row)
+        .of("joint")
+        .with_value(group.joint + 1);
   };
   if (!(spread.eigenvalues()(1) > 1e-8 * spread.eigenvalues()(2))) return on_a_line();
   AxisFit fit;
@@ -108,8 +111,11 @@ Result<AxisFit> axis_fit(const JointArcs& group, const std::string& where) {
     const Linearised now = linearised(fit, group);
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(now.jacobian);
     if (qr.rank() < now.jacobian.cols()) {
-      return refused("{} row {}: the arcs of joint {} do not determine its axis", where,
-                     group.arcs.front().front()->row, group.joint + 1);
+      return refused("the arcs of joint {} do not determine its axis", group.joint + 1)
+          .in(where)
+          .at_row(group.arcs.front().front()->row)
+          .of("joint")
+          .with_value(group.joint + 1);
     }
     const Eigen::VectorXd step = qr.solve(-now.residual);
     const auto uv = across(fit.n);
@@ -183,8 +189,12 @@ Result<double> orient(AxisFit& fit, const JointArcs& group, const std::string& w
   }
   const double worst = std::min(worst_with, worst_against);
   if (worst > kAngleLimit) {
-    return refused("{} row {}: joint {} turned {:.3f} deg away from its commanded angle, limit {:.0f} deg", where,
-                   worst_row, group.joint + 1, to_deg(worst), to_deg(kAngleLimit));
+    return refused("joint {} turned {:.3f} deg away from its commanded angle, limit {:.0f} deg", group.joint + 1,
+                   to_deg(worst), to_deg(kAngleLimit))
+        .in(where)
+        .at_row(worst_row)
+        .of("q_deg")
+        .beyond(to_deg(worst), to_deg(kAngleLimit));
   }
   return std::sqrt(std::min(sum_with, sum_against) / count);
 }

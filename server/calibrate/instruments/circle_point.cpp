@@ -203,9 +203,14 @@ Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcLis
       parameter.u = kExpanded * std::sqrt(std::max(0.0, (*covariance)(at, at)));
       const double limit = member.length ? kLengthDeviation : kAngleDeviation;
       if (!(std::abs(deviation(at)) < limit)) {
-        return refused("{}: {} is {:.3f} {} from that of robot {}, limit {:.0f}; another robot, joint or posture?",
-                       arcs.where, parameter.name, member.length ? to_mm(deviation(at)) : to_deg(deviation(at)),
-                       member.length ? "mm" : "deg", robot.name(), member.length ? to_mm(limit) : to_deg(limit));
+        return refused("{} is {:.3f} {} from that of robot {}, limit {:.0f}", parameter.name,
+                       member.length ? to_mm(deviation(at)) : to_deg(deviation(at)), member.length ? "mm" : "deg",
+                       robot.name(), member.length ? to_mm(limit) : to_deg(limit))
+            .in(arcs.where)
+            .of(parameter.name)
+            .beyond(member.length ? to_mm(deviation(at)) : to_deg(deviation(at)),
+                    member.length ? to_mm(limit) : to_deg(limit))
+            .next("another robot, joint or posture?");
       }
     }
     result.parameters.push_back(std::move(parameter));

@@ -43,10 +43,15 @@ Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::
     if (!element) return tl::make_unexpected(element.error());
     const DeflectionElement stands{*element, from_deg(value["theta_deg"]), from_mm(value["length_mm"]),
                                    from_mm(value["lever_mm"])};
-    if (!(stands.length > 0)) return table->refuse(row, "length_mm is {}, must be above 0", value["length_mm"]);
+    if (!(stands.length > 0))
+      return table->refuse(row, "length_mm is {}, must be above 0", value["length_mm"])
+          .of("length_mm")
+          .beyond(value["length_mm"], 0);
     const DeflectionElement& first = elements.emplace(*element, stands).first->second;
     if (first.theta != stands.theta || first.length != stands.length || first.lever != stands.lever) {
-      return table->refuse(row, "element {} stands or hangs otherwise than in its first row", *element);
+      return table->refuse(row, "element {} stands or hangs otherwise than in its first row", *element)
+          .of("element")
+          .with_value(*element);
     }
     DeflectionReading reading;
     reading.element = *element;
@@ -57,13 +62,14 @@ Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::
     if (sigma && !table->field(row, *sigma).empty()) {
       const Result<double> number = table->number(row, *sigma);
       if (!number) return tl::make_unexpected(number.error());
-      if (!(*number > 0)) return table->refuse(row, "sigma_mm is {}, must be above 0", *number);
+      if (!(*number > 0))
+        return table->refuse(row, "sigma_mm is {}, must be above 0", *number).of("sigma_mm").beyond(*number, 0);
       reading.sigma = from_mm(*number);
     }
     if (set && !table->field(row, *set).empty()) {
       const std::string& name = table->field(row, *set);
       if (name != "train" && name != "validation") {
-        return table->refuse(row, "set is '{}', expected train or validation", name);
+        return table->refuse(row, "set is '{}', expected train or validation", name).of("set").with_text(name);
       }
       reading.validation = name == "validation";
     }
@@ -183,8 +189,10 @@ Result<Solved> solve(const DeflectionData& data, const std::vector<const Deflect
   solved.layout = layout_of(data, beams, load_biases);
   solved.equations = 2 * static_cast<int>(readings.size());
   if (solved.freedom() < 1) {
-    return refused("{}: {} training readings, {} parameters need at least {}", data.where, readings.size(),
-                   solved.layout.size, solved.layout.size / 2 + 1);
+    return refused("{} training readings, {} parameters need at least {}", readings.size(), solved.layout.size,
+                   solved.layout.size / 2 + 1)
+        .in(data.where)
+        .beyond(readings.size(), solved.layout.size / 2 + 1);
   }
   Eigen::MatrixXd A(solved.equations, solved.layout.size);
   Eigen::VectorXd b(solved.equations);
@@ -199,8 +207,10 @@ Result<Solved> solve(const DeflectionData& data, const std::vector<const Deflect
   qr.setThreshold(1e-9);
   qr.compute(A * scale.cwiseInverse().asDiagonal());
   if (qr.rank() < solved.layout.size) {
-    return refused("{}: the readings separate {} of {} parameters; more loads or reflectors at other distances would",
-                   data.where, qr.rank(), solved.layout.size);
+    return refused("the readings separate {} of {} parameters", qr.rank(), solved.layout.size)
+        .in(data.where)
+        .beyond(qr.rank(), solved.layout.size)
+        .next("more loads or reflectors at other distances would");
   }
   solved.values = qr.solve(b).cwiseQuotient(scale);
   solved.cost = (A * solved.values - b).squaredNorm();
@@ -246,7 +256,8 @@ Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& opti
   for (const double wanted : options.validation_loads) {
     const auto found = std::find_if(loads.begin(), loads.end(),
                                     [&](double load) { return std::abs(load - wanted) < 0.5e-3 + kSameLoad; });
-    if (found == loads.end()) return refused("{}: no readings under the validation load {} N", data.where, wanted);
+    if (found == loads.end())
+      return refused("no readings under the validation load {} N", wanted).in(data.where).of("load").with_value(wanted);
     held_out.insert(*found);
   }
   const bool by_load = !options.validation_loads.empty() || !stated;
@@ -262,8 +273,10 @@ Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& opti
     (out ? validation : training).insert(reading.load);
   }
   if (training.size() < 2) {
-    return refused("{}: {} training loads, at least 2 are needed to tell a joint from an offset", data.where,
-                   training.size());
+    return refused("{} training loads, at least 2 are needed to tell a joint from an offset", training.size())
+        .in(data.where)
+        .of("load")
+        .beyond(training.size(), 2);
   }
   split.training_loads.assign(training.begin(), training.end());
   split.validation_loads.assign(validation.begin(), validation.end());
@@ -357,7 +370,8 @@ Result<DeflectionResult> fit_deflection(const DeflectionData& data, const Deflec
   }
   const std::set<int> load_biases(options.load_bias.begin(), options.load_bias.end());
   for (const int element : load_biases) {
-    if (!distances.contains(element)) return refused("{}: no training readings of element {}", data.where, element);
+    if (!distances.contains(element))
+      return refused("no training readings of element {}", element).in(data.where).of("element").with_value(element);
   }
   const Result<Solved> with = solve(data, split->train, options, beams, load_biases);
   if (!with) return tl::make_unexpected(with.error());

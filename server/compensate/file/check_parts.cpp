@@ -15,11 +15,13 @@ constexpr double kMostLog = 200;             // of a hyperparameter, whose squar
 
 Status check_frame(const Pose& X, const std::string& name) {
   if (!X.matrix().allFinite() || X.translation().norm() > kMostMetres)
-    return refused("model: {}: its place is no length, limit {:g} m", name, kMostMetres);
+    return refused("model: {}: its place is no length, limit {:g} m", name, kMostMetres).of(name);
   const Matrix3 R = X.linear();
   const double off = (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
   if (off > kRigid || R.determinant() < 0)
-    return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid);
+    return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid)
+        .of(name)
+        .beyond(off, kRigid);
   return {};
 }
 
@@ -43,46 +45,61 @@ double asymmetry(const Eigen::MatrixXd& m) {
 Status check_covariance(const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd variance = covariance.diagonal();
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
-    if (variance(i) < 0) return refused("model: parameter {} has the variance {:.3g}, below 0", i + 1, variance(i));
+    if (variance(i) < 0)
+      return refused("model: parameter {} has the variance {:.3g}, below 0", i + 1, variance(i))
+          .of("covariance")
+          .beyond(variance(i), 0);
   }
   const Eigen::VectorXd scale = variance.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
     // A parameter that is known exactly goes with no other.
     if (variance(i) == 0 && (!covariance.row(i).isZero(0) || !covariance.col(i).isZero(0)))
-      return refused("model: parameter {} has no variance but a covariance", i + 1);
+      return refused("model: parameter {} has no variance but a covariance", i + 1).of("covariance");
   }
   const double skew = asymmetry(correlation);
-  if (!(skew <= kRounding)) return refused("model: its covariance is not symmetric, off by {:.3g}", skew);
+  if (!(skew <= kRounding))
+    return refused("model: its covariance is not symmetric, off by {:.3g}", skew)
+        .of("covariance")
+        .beyond(skew, kRounding);
   correlation.diagonal().array() += kRounding * static_cast<double>(std::max<Eigen::Index>(variance.size(), 1));
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
     if (variance(i) == 0) correlation(i, i) = 1;
   }
   if (variance.size() > 0 && correlation.llt().info() != Eigen::Success)
-    return refused("model: its covariance is not positive semidefinite");
+    return refused("model: its covariance is not positive semidefinite").of("covariance");
   return {};
 }
 
 Status check_size(const Eigen::MatrixXd& covariance, Eigen::Index P) {
   if (covariance.rows() == P && covariance.cols() == P) return {};
-  return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(), covariance.cols(), P, P);
+  return refused("model: a covariance of {} x {}, should be {} x {}", covariance.rows(), covariance.cols(), P, P)
+      .of("covariance")
+      .beyond(covariance.rows(), P);
 }
 
 Status check_parameters(const ModelParts& parts) {
   for (const IdentifiedParameter& p : parts.parameters) {
-    if (p.stddev < 0) return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name, p.stddev);
+    if (p.stddev < 0)
+      return refused("model: parameter {} has the stddev {:.3g}, below 0", p.parameter.name, p.stddev)
+          .of(p.parameter.name)
+          .beyond(p.stddev, 0);
   }
   if (parts.rank < 0 || parts.rank > parts.physics.parameter_count())
-    return refused("model: rank {}, limit 0 to {}", parts.rank, parts.physics.parameter_count());
+    return refused("model: rank {}, limit 0 to {}", parts.rank, parts.physics.parameter_count())
+        .of("rank")
+        .beyond(parts.rank, parts.rank < 0 ? 0 : parts.physics.parameter_count());
   return {};
 }
 
 Status check_bias(const BiasState& bias) {
   if (bias.q.rows() > kMostPoses)
-    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(), kMostPoses);
+    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(), kMostPoses)
+        .of("bias")
+        .beyond(bias.q.rows(), kMostPoses);
   const auto beyond = [](const Eigen::MatrixXd& m) { return m.size() > 0 && m.cwiseAbs().maxCoeff() > kMostLog; };
   if (beyond(bias.hyperparameters) || beyond(bias.block_hyperparameters))
-    return refused("model: a hyperparameter of its bias is beyond {}, as a logarithm", kMostLog);
+    return refused("model: a hyperparameter of its bias is beyond {}, as a logarithm", kMostLog).of("bias");
   return {};
 }
 
@@ -91,7 +108,7 @@ Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
   for (const std::string_view name : {"base", "geometry", "compliance"}) {
     const auto& sources = origin.physics.sources;
     if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
-      return refused("model: the physics that its bias was learned beside has no {}", name);
+      return refused("model: the physics that its bias was learned beside has no {}", name).of("bias").with_text(name);
   }
   Status fine = check_frames(origin.physics, "where its bias was learned, ");
   if (fine) fine = check_size(origin.covariance, P);
@@ -101,9 +118,9 @@ Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
 
 Status check_ranges(const ModelParts& parts) {
   if (!parts.q_min.allFinite() || !parts.q_max.allFinite() || !parts.extrapolation_slope.allFinite())
-    return refused("model: a joint range is not finite");
+    return refused("model: a joint range is not finite").of("joint_ranges");
   if (parts.q_min.size() == parts.q_max.size() && (parts.q_min.array() > parts.q_max.array()).any())
-    return refused("model: a joint range ends before it begins");
+    return refused("model: a joint range ends before it begins").of("joint_ranges");
   for (const auto& [tool, payload] : parts.trained_with) {
     const Cell& cell = *parts.physics.cell;
     if (!cell.tools.contains(tool) || (!payload.empty() && !cell.payloads.contains(payload)))

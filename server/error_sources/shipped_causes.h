@@ -1,0 +1,37 @@
+#pragma once
+
+#include "server/error_sources/cause.h"
+
+/// One line a cause, in the order in which diagnosis looks for them; causes of a joint that follow one another are
+/// looked for joint by joint.
+#define TRAMMEL_SHIPPED_CAUSES(CAUSE) \
+  CAUSE(base)                         \
+  CAUSE(geometry)                     \
+  CAUSE(tool)                         \
+  CAUSE(compliance)                   \
+  CAUSE(wrist_coupling)               \
+  CAUSE(tracker_moved)                \
+  CAUSE(tool_changed)                 \
+  CAUSE(encoder_eccentricity)         \
+  CAUSE(backlash)                     \
+  CAUSE(payload)                      \
+  CAUSE(payload_changed)              \
+  CAUSE(link_bending)                 \
+  CAUSE(tracker_drift)                \
+  CAUSE(time_lag)                     \
+  CAUSE(thermal_growth)               \
+  CAUSE(joint_slip)                   \
+  CAUSE(gear_transmission)            \
+  CAUSE(joint_map)                    \
+  CAUSE(outlier)                      \
+  CAUSE(drift)                        \
+  CAUSE(unknown)
+
+/// The records that ship, each defined beside its physics in the file of its cause.
+namespace trammel::causes {
+
+#define TRAMMEL_DECLARE_CAUSE(name) [[nodiscard]] const CauseRecord& name();
+TRAMMEL_SHIPPED_CAUSES(TRAMMEL_DECLARE_CAUSE)
+#undef TRAMMEL_DECLARE_CAUSE
+
+}  // namespace trammel::causes

@@ -1,0 +1,46 @@
+#include "server/error_sources/shipped_causes.h"
+
+/// What is found without being known: it stands where a cause stands, and no error source describes it.
+namespace trammel {
+
+const CauseRecord& causes::drift() {
+  static const CauseRecord record = {
+      .spelling = "drift",
+      .plain_name = "the arm itself has changed",
+      .plain_name_of_joint = "",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kNone,
+      .acts = {},
+      .forms = {},
+      .rivals = {{.cause = "tracker_moved"}, {.cause = "tool_changed"}, {.cause = "joint_slip"}},
+      .told_apart_by = {95, "poses over the whole range of the joints, and a diagnosis of them"},
+      .shown_by = "poses over the whole range of the joints",
+      .action = "train again from poses over the whole range of the joints",
+      .figures = {{"effect_rms", "mm", "how far the arm is from where the model in force has it"}},
+  };
+  return record;
+}
+
+const CauseRecord& causes::unknown() {
+  static const CauseRecord record = {
+      .spelling = "unknown",
+      .plain_name = "something unknown",
+      .plain_name_of_joint = "something unknown in joint {}",
+      .scope = Scope::kArm,
+      .lasting = Lasting::kAlways,
+      .needs = {},
+      .search = SearchFamily::kNone,
+      .acts = {},
+      .forms = {},
+      .rivals = {{.cause = "joint_map"}},
+      .told_apart_by = {99, "more poses, with times, temperatures and approach directions"},
+      .shown_by = "more poses, with times, temperatures and approach directions",
+      .action = "find out what depends on the joints that are named",
+      .figures = {{"rms", "mm", "how much of the error it is"}},
+  };
+  return record;
+}
+
+}  // namespace trammel

@@ -1,0 +1,144 @@
+#include "server/error_sources/cause.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <thread>
+
+#include "server/error_sources/catalogue.h"
+#include "server/error_sources/spelling.h"
+
+namespace trammel {
+namespace {
+
+using causes::Scope;
+
+Cell cell_7() { return *read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml"); }
+
+/// As a list of error sources spells this form, of a joint and from a pose on where it takes them.
+std::string some_spec(const CauseRecord& record, std::string_view form) {
+  return fmt::format("{}{}{}", form, record.scope == Scope::kJoint ? ":2" : "",
+                     record.lasting == causes::Lasting::kFromAPose ? "@3" : "");
+}
+
+TEST(Causes, EveryRecordSaysEverything) {
+  for (const CauseRecord* record : all_causes())
+    EXPECT_EQ(fmt::format("{}", fmt::join(missing_in(*record), "; ")), "") << record->spelling;
+}
+
+TEST(Causes, ARecordThatLeavesSomethingOutIsTold) {
+  const CauseRecord& complete = cause_spelled("joint_slip");
+  const auto misses = [&](auto forget) {
+    CauseRecord record = complete;
+    forget(record);
+    return !missing_in(record).empty();
+  };
+  EXPECT_FALSE(misses([](CauseRecord&) {}));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.spelling = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.plain_name = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.plain_name_of_joint = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.action = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.shown_by = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.told_apart_by = {}; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.figures.clear(); }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.figures.front().meaning = ""; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.rivals.clear(); }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.rivals.front().cause = "gremlins"; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.forms.clear(); }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.acts = {}; }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.whole_batch.reset(); }));
+}
+
+TEST(Causes, SpellingsAndNamesForPeopleAreTheirOwn) {
+  std::set<std::string_view> spellings, names;
+  for (const CauseRecord* record : all_causes()) {
+    EXPECT_TRUE(spellings.insert(record->spelling).second) << record->spelling;
+    EXPECT_TRUE(names.insert(record->plain_name).second) << record->plain_name;
+    EXPECT_EQ(record->plain_name.find('_'), std::string_view::npos) << record->plain_name;
+  }
+}
+
+TEST(Causes, AnErrorSourceIsOfTheCauseItIsSpelledBy) {
+  const Cell cell = cell_7();
+  for (const CauseRecord* record : all_causes()) {
+    for (const causes::Form& form : record->forms) {
+      const auto source = make_error_source(some_spec(*record, form.spelling), cell);
+      ASSERT_TRUE(source) << form.spelling;
+      EXPECT_EQ(&(*source)->cause(), record) << form.spelling;
+      EXPECT_EQ((*source)->joint() >= 0, record->scope == Scope::kJoint) << form.spelling;
+    }
+  }
+}
+
+TEST(Causes, EveryParameterIsAmongTheFiguresOfItsCauseInOrderAndUnit) {
+  const Cell cell = cell_7();
+  for (const CauseRecord* record : all_causes()) {
+    if (record->forms.empty() || record->summary == causes::Summary::kPeakToPeak) continue;
+    const auto source = make_error_source(some_spec(*record, record->forms.front().spelling), cell);
+    ASSERT_TRUE(source) << record->spelling;
+    for (const Parameter& parameter : (*source)->parameters()) {
+      const auto fits = [&](const causes::Figure& figure) {
+        const std::string_view rest =
+            std::string_view(parameter.name).substr(std::min(figure.name.size(), parameter.name.size()));
+        return parameter.name.starts_with(figure.name) && parameter.unit == figure.unit &&
+               rest.find_first_of("abcdefghijklmnopqrstuvwxyz") == std::string_view::npos;
+      };
+      EXPECT_TRUE(std::any_of(record->figures.begin(), record->figures.end(), fits))
+          << record->spelling << ": " << parameter.name << " in " << parameter.unit;
+    }
+  }
+}
+
+TEST(Causes, PeopleReadPlainNamesAndFilesKeepTheSpelling) {
+  EXPECT_EQ(in_words("gear_transmission:3@48.5"), "gear ripple in joint 3");
+  EXPECT_EQ(in_words("backlash:2"), "backlash in joint 2");
+  EXPECT_EQ(in_words("tracker_moved@40"), "the tracker moved from row 40 on");
+  EXPECT_EQ(in_words("geometry:d6"), "link geometry (d6)");
+  EXPECT_EQ(in_words("compliance_linear"), "gearboxes that give way");
+  EXPECT_EQ(in_words("nominal"), "nominal");
+}
+
+TEST(Causes, FormsOfOneCauseAreToldFromOtherCauses) {
+  EXPECT_TRUE(are_forms_of_one("compliance_linear", "compliance"));
+  EXPECT_TRUE(are_forms_of_one("compliance", "compliance_first_order"));
+  EXPECT_TRUE(are_forms_of_one("backlash:2", "backlash:2"));
+  EXPECT_FALSE(are_forms_of_one("backlash:2", "backlash:3"));
+  EXPECT_FALSE(are_forms_of_one("tool", "tool_changed@3"));
+  EXPECT_FALSE(are_forms_of_one("gremlins", "goblins"));
+}
+
+TEST(Causes, AddedOnesAreKnownForAsLongAsTheyLive) {
+  CauseRecord own = cause_spelled("time_lag");
+  own.spelling = "own_lag";
+  own.forms.front().spelling = "own_lag";
+  const std::size_t before = all_causes().size();
+  {
+    const AddedCause added(own);
+    EXPECT_EQ(find_cause("own_lag@3"), &own);
+    EXPECT_EQ(all_causes().back(), &own);
+  }
+  EXPECT_EQ(find_cause("own_lag"), nullptr);
+  EXPECT_EQ(all_causes().size(), before);
+}
+
+TEST(Causes, MayBeAddedWhileOthersRead) {
+  std::vector<CauseRecord> own(4, cause_spelled("time_lag"));
+  const std::string_view spellings[] = {"lag_a", "lag_b", "lag_c", "lag_d"};
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      own[k].spelling = own[k].forms.front().spelling = spellings[k];
+      threads.emplace_back([&record = own[k]] {
+        for (int times = 0; times < 200; ++times) {
+          const AddedCause added(record);
+          EXPECT_EQ(&cause_spelled(record.spelling), &record);
+        }
+      });
+    }
+  }
+  for (const std::string_view spelling : spellings) EXPECT_EQ(find_cause(spelling), nullptr);
+}
+
+}  // namespace
+}  // namespace trammel
