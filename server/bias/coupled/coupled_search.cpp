@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/bias/search/starts.h"
 #include "server/numerics/seeded_random.h"
 
 namespace trammel {

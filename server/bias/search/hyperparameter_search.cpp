@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/bias/search/optima.h"
+#include "server/bias/search/starts.h"
 #include "server/numerics/seeded_random.h"
 
 namespace trammel {

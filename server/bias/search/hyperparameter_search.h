@@ -7,11 +7,6 @@
 
 namespace trammel {
 
-/// Starts that end within so many nat of each other found the same optimum: a tenth of what would make it likelier.
-inline constexpr double kSameOptimum = 0.1;
-/// Points of the first searches: few enough for many starts, and enough to tell the optima apart.
-inline constexpr Eigen::Index kStartPoints = 150;
-
 struct SearchOptions {
   int starts = 20;
   std::uint64_t seed = 1;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/bias/search/starts.h"
+
 namespace trammel {
 namespace {
 

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "server/bias/process/gaussian_process.h"
-#include "server/bias/search/hyperparameter_search.h"
 
 namespace trammel {
 

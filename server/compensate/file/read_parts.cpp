@@ -118,11 +118,17 @@ Status read_parameters(const Json& content, const std::string& where, ModelParts
   const std::vector<Parameter> known = parts.physics.parameters();
   const Json& parameters = list_from(content.at("parameters"));
   if (parameters.size() != known.size())
-    return refused("{}: {} parameters, expected {}", where, parameters.size(), known.size());
+    return refused("{} parameters, expected {}", parameters.size(), known.size())
+        .in(where)
+        .of("parameters")
+        .beyond(parameters.size(), known.size());
   for (std::size_t i = 0; i < known.size(); ++i) {
     const Json& one = parameters.at(i);
     if (one.at("name").get<std::string>() != known[i].name)
-      return refused("{}: its parameter {} is not {}, as its error sources say", where, i + 1, known[i].name);
+      return refused("its parameter {} is not {}, as its error sources say", i + 1, known[i].name)
+          .in(where)
+          .of("parameters")
+          .with_text(known[i].name);
     parts.parameters.push_back({.parameter = known[i],
                                 .value = number_from(one, "value"),
                                 .stddev = number_from(one, "stddev"),
@@ -172,9 +178,12 @@ Status read_bias_contexts(const Json& bias, const std::string& where, ModelParts
   if (!bias.contains("poses")) return {};
   if (bias.value("fades", "") != kFades) {
     return refused(
-        "{}: its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would answer "
-        "otherwise now: train it again",
-        where, parts.bias->kernel);
+               "its bias `{}` was learned when a bias with blocks faded as a whole beyond the domain, and would answer "
+               "otherwise now",
+               parts.bias->kernel)
+        .in(where)
+        .of("bias")
+        .next("train it again");
   }
   for (const Json& context : list_from(bias.at("poses"))) parts.bias_contexts.push_back(context_from(context));
   return {};
@@ -188,7 +197,7 @@ Status read_bias(const Json& content, const std::string& where, ModelParts& part
   if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
   if (content.contains("bias_origin")) {
     Result<ModelParts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);
-    if (!origin) return refused("{}: {}", where, sentence(origin.error()));
+    if (!origin) return Failure(origin.error()).as(ErrorCode::kRefused).in(where);
     parts.bias_origin = std::move(*origin);
   }
   if (content.contains("oriented_poses")) parts.oriented_poses = count_from(content, "oriented_poses");
@@ -215,9 +224,13 @@ ModelProvenance provenance_from(const Json& json, const Json& stamp) {
 
 Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std::string& where) {
   Result<Cell> cell = parse_cell(content.at("cell_yaml"), content.at("robot_yaml"), where);
-  if (!cell) return tl::make_unexpected(cell.error());
+  if (!cell) {
+    Error damaged = cell.error();
+    damaged.row.reset();  // of a text inside the file
+    return Failure(std::move(damaged));
+  }
   Result<PhysicalModel> physics = physics_from(content, std::make_shared<const Cell>(std::move(*cell)));
-  if (!physics) return refused("{}: {}", where, sentence(physics.error()));
+  if (!physics) return Failure(physics.error()).as(ErrorCode::kRefused).in(where);
   ModelParts parts;
   parts.physics = std::move(*physics);
   if (const Status read = read_calibration(content, where, parts); !read) return tl::make_unexpected(read.error());
