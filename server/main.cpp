@@ -65,7 +65,7 @@ int refuse_start(std::vector<Error> problems) {
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
-  if (!found.problems.empty()) return refuse(refused("{}", fmt::join(found.problems, "\n")).value());
+  if (!found.problems.empty()) return refuse_start(found.problems);
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
@@ -204,7 +204,7 @@ int run(const Arguments& arguments) {
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
   if (arguments.check) return check(server, arguments.config);
-  if (!server.problems.empty()) return refuse(refused("{}", fmt::join(server.problems, "\n")).value());
+  if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;

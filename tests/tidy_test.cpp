@@ -63,7 +63,8 @@ const std::vector<Reserved> kReserved = {
     {"SQLite", std::regex("^(sqlite3\\.h|SQLiteCpp/.*)$"), std::regex("^server/store/.*")},
 };
 
-const std::set<std::string> kTestFoldersWithoutMirror = {"support", "end_to_end", "benchmarks", "fuzz", "clients"};
+const std::set<std::string> kTestFoldersWithoutMirror = {"support", "end_to_end", "benchmarks",
+                                                         "fuzz",    "package",    "clients"};
 
 std::string folder_of(const std::string& path) {
   const auto slash = path.rfind('/');

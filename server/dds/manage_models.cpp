@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "idl/limits.h"
+#include "idl/manage_text.h"
 #include "server/base/check.h"
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
@@ -107,13 +108,13 @@ Result<wire::ManageModelsReply> Handlers::answer_of_cell(const std::string& cell
     case wire::MANAGE_EXPORT:
       return exported(cell, request.version());
     case wire::MANAGE_IMPORT:
-      return with_version(trainer_.import_model(cell, request.text()));
+      return with_version(trainer_.import_model(cell, wire::imported_model(request)));
     case wire::MANAGE_QUARANTINE:
       return quarantine_of(cell);
     case wire::MANAGE_RELEASE:
-      return trainer_.release(cell, request.text()).map([] { return wire::ManageModelsReply(); });
+      return trainer_.release(cell, wire::released_batch(request)).map([] { return wire::ManageModelsReply(); });
     case wire::MANAGE_RELEASE_AND_TRAIN:
-      return release_and_train(cell, request.text());
+      return release_and_train(cell, wire::released_training(request));
     case wire::MANAGE_JOBS:
       return jobs_of(cell);
     case wire::MANAGE_JOB:
@@ -152,7 +153,8 @@ Result<wire::ManageModelsReply> Handlers::exported(const std::string& cell, int 
   reply.text(serialize(*model));
   if (reply.text().size() <= kMaxText) return reply;
   return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version, reply.text().size(),
-                 kMaxText);
+                 kMaxText)
+      .beyond(reply.text().size(), kMaxText);
 }
 
 Result<wire::ManageModelsReply> Handlers::jobs_of(const std::string& cell) const {

@@ -13,6 +13,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -131,8 +132,12 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   static constexpr std::size_t kRepliesRemembered = 1024;
+  static constexpr std::size_t kLately = 32;  // replies of targets may be large
+  /// Whether an answer takes long: a repeat is answered from memory.
+  static constexpr bool kComputes =
+      std::is_same_v<Operation, wire::PredictError> || std::is_same_v<Operation, wire::CorrectTarget>;
 
-  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered) {}
+  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered), lately_(kLately) {}
 
   void on_data_available(wire::dds::DataReader*) override {
     {
@@ -151,7 +156,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
       const std::uint64_t seen = arrivals_;
       lock.unlock();
       while (!stop.stop_requested() && take(request, info)) {
-        if (info.valid_data) serve(request, stop);
+        if (info.valid_data) serve(request, info.sample_identity.writer_guid(), stop);
       }
       ++idle_;
       lock.lock();
@@ -166,10 +171,19 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     return reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
-  void serve(const Request& request, const std::stop_token& stop) {
+  void serve(const Request& request, const eprosima::fastrtps::rtps::GUID_t& writer, const std::stop_token& stop) {
     const std::string wanted = request.header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
-    Reply reply = reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    // By who wrote it, not by who the request says it is of: a client may be careless with its ids.
+    const std::string sent = wire::participant_of(writer) +
+                             std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
+                             request_id_text(request.header().request_id());
+    const UnderWay::Piece piece_of_work(under_way_, sent);
+    if (!piece_of_work.is_first()) return;  // a repeat: its reply is on the way
+    std::optional<Reply> known = lately_.find(sent);
+    Reply reply =
+        known ? std::move(*known) : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    if (kComputes && !known && reply.header().result() == wire::RESULT_OK) lately_.remember(sent, reply);
     ++core_.requests;
     if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
     const WorkUnderWay::Piece piece = core_.replying.begin();
@@ -181,7 +195,9 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   ServiceCore& core_;
   wire::dds::Topic* reply_topic_ = nullptr;
   wire::dds::DataReader* reader_ = nullptr;
-  ReplyMemory<Reply> memory_;
+  ReplyMemory<Reply> memory_;  // of what must not be carried out again
+  ReplyMemory<Reply> lately_;  // of what was computed
+  UnderWay under_way_;
   Mutex mutex_;  // so that no arrival falls between the look at arrivals_ and the waiting
   Condition arrived_;
   std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_

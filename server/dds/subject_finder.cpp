@@ -80,15 +80,20 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
 }
 
 Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell, int version) {
-  const MutexLock lock(mutex_);
-  const auto found = std::find_if(loaded_.begin(), loaded_.end(),
-                                  [&](const auto& m) { return m->cell == cell && m->version == version; });
-  if (found != loaded_.end()) return *found;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = std::find_if(loaded_.begin(), loaded_.end(),
+                                    [&](const auto& m) { return m->cell == cell && m->version == version; });
+    if (found != loaded_.end()) return *found;
+  }
+  // Without the lock: other requests do not wait while a model is read.
   auto model = trainer_.load_for_service(cell, version);
   if (!model) return tl::make_unexpected(model.error());
-  loaded_.push_front(std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)}));
+  auto served = std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)});
+  const MutexLock lock(mutex_);
+  loaded_.push_front(served);
   if (loaded_.size() > kVersionsInMemory) loaded_.pop_back();
-  return loaded_.front();
+  return served;
 }
 
 }  // namespace trammel

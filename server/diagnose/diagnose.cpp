@@ -11,7 +11,7 @@
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/wording.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -34,8 +34,10 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
   const std::size_t poses = merged.batch.measurements.size();
   if (poses < kFewestPoses) {
     const std::size_t held_out = prepared.validation.measurements.size();
-    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id(), poses,
-                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses);
+    return refused("{} poses to diagnose{}, at least {}", poses,
+                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses)
+        .in("batch " + batch.id())
+        .beyond(poses, kFewestPoses);
   }
   prepared.train = std::move(merged.batch);
   prepared.repeats = merged.statistics;
@@ -82,10 +84,8 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
   diagnosis.seed = seed;
 }
 
-}  // namespace
-
-Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                           const DiagnoseOptions& options) {
+Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                            const DiagnoseOptions& options) {
   const Result<PreparedBatch> prepared = prepare(*cell, batch);
   if (!prepared) return tl::make_unexpected(prepared.error());
   Result<SearchResult> result = searched(cell, *prepared, options);
@@ -120,6 +120,17 @@ Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const Checke
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
   diagnosis.sentence = sentence_for(diagnosis);
   return diagnosis;
+}
+
+}  // namespace
+
+}  // namespace trammel::cause_search
+
+namespace trammel {
+
+Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                           const DiagnoseOptions& options) {
+  return cause_search::diagnosed(cell, batch, options);
 }
 
 }  // namespace trammel

@@ -15,16 +15,22 @@ inline constexpr double kLeastPValue = 1e-6;
 
 /// One physical cause, named as the contract spells it.
 struct Cause {
-  std::string cause;            ///< `gear_transmission`, `tool`, `outlier`, ...
-  int joint = -1;               ///< 0-based; -1 where it concerns the whole arm
-  std::string parameter;        ///< `C3`, `d6`: where one number of the cause is meant; else empty
-  std::string pose_id;          ///< the pose at which it begins, or that is out; else empty
-  std::optional<double> order;  ///< cycles a joint turn, of gear_transmission
+  std::string cause;                 ///< `gear_transmission`, `tool`, `outlier`, ...
+  int joint = -1;                    ///< 0-based; -1 where it concerns the whole arm
+  std::string parameter = {};        ///< `C3`, `d6`: where one number of the cause is meant; else empty
+  std::string pose_id = {};          ///< the pose at which it begins, or that is out; else empty
+  std::optional<double> order = {};  ///< cycles a joint turn, of gear_transmission
 
   friend bool operator==(const Cause&, const Cause&) = default;
 };
-/// For people and for lists: `gear_transmission:3`, `geometry:d6`, `tracker_moved`.
+/// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
+/// The cause that is spelled so; one that is not known has the spelling for its cause.
+[[nodiscard]] Cause cause_from(std::string_view spelling);
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved at pose p40`. No order.
+[[nodiscard]] std::string in_words(const Cause& cause);
+/// The same without its joint and pose, where a table has columns for them.
+[[nodiscard]] std::string kind_in_words(const Cause& cause);
 
 /// A number found, in the unit people read it in.
 struct Estimate {
@@ -44,20 +50,20 @@ struct PossibleBeginning {
 /// A cause that the simulation lacks.
 struct Finding {
   Cause cause;
-  std::string source;  ///< as a cell file's list of error sources would spell it; empty for an outlier
-  std::vector<Estimate> parameters;
+  std::string source = {};  ///< as a cell file's list of error sources would spell it; empty for an outlier
+  std::vector<Estimate> parameters = {};
   /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in the order of
   /// measuring.
-  std::vector<PossibleBeginning> may_begin_at;
-  double effect_rms = 0;             ///< m, Euclidean, over the poses: what it does that nothing else in the model can
-  ErrorFigures held_out_before;      ///< without this cause, the others found in place
-  ErrorFigures held_out_after;       ///< with it
-  double held_out_gain = 0;          ///< m: rms before - after
-  double strength = 0;               ///< lambda: whitened effect that nothing else in the model explains, squared
-  double p_value = 1;                ///< chance that the best of all candidates scores as much with nothing to find
-  double naming_frequency = 1;       ///< share of bootstrap repetitions that name this cause
-  std::vector<Cause> could_also_be;  ///< explain it as well; empty: named
-  std::string action;                ///< for the shop floor
+  std::vector<PossibleBeginning> may_begin_at = {};
+  double effect_rms = 0;              ///< m, Euclidean, over the poses: what it does that nothing else in the model can
+  ErrorFigures held_out_before = {};  ///< without this cause, the others found in place
+  ErrorFigures held_out_after = {};   ///< with it
+  double held_out_gain = 0;           ///< m: rms before - after
+  double strength = 0;                ///< lambda: whitened effect that nothing else in the model explains, squared
+  double p_value = 1;                 ///< chance that the best of all candidates scores as much with nothing to find
+  double naming_frequency = 1;        ///< share of bootstrap repetitions that name this cause
+  std::vector<Cause> could_also_be = {};  ///< explain it as well; empty: named
+  std::string action = {};                ///< for the shop floor
 };
 
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };

@@ -6,7 +6,7 @@
 /// Every number that decides what a diagnosis finds, names and doubts: one name, one value, one place. Evidence and
 /// scores are in nat: 2.3 nat are odds of 10 to 1. A strength is a squared size in standard deviations of the noise;
 /// half of it is the evidence that it brings at most. What only steers a computation stands beside that computation.
-namespace trammel::thresholds {
+namespace trammel::cause_search::thresholds {
 
 // Finding: what passes.
 
@@ -118,4 +118,4 @@ inline constexpr double kLikeOneParameter = 0.9;
 /// measuring.
 inline constexpr double kWorthMeasuring = 0.9;
 
-}  // namespace trammel::thresholds
+}  // namespace trammel::cause_search::thresholds

@@ -129,8 +129,9 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     for (const ErrorSourcePtr& other : model.sources) {
       const CauseRecord& cause = other->cause();
       if (&cause == &(*source)->cause() && cause.forms.size() > 1) {
-        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(),
-                       spec);
+        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(), spec)
+            .of("error_sources")
+            .with_text(spec);
       }
       if (other->name() == (*source)->name())
         return failure(ErrorCode::kUsage, "error source '{}' given twice", spec).of("error_sources").with_text(spec);

@@ -95,15 +95,21 @@ Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& ce
     for (const CauseRecord* record : all_causes()) {
       if (record->forms.size() > 1) names.emplace(names.begin(), record->spelling);
     }
-    return failure(ErrorCode::kUsage, "unknown error source '{}'{}; known: {}", spec,
-                   did_you_mean(cause_in(spec), names), fmt::join(names, ", "));
+    return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec, did_you_mean(cause_in(spec), names))
+        .of("error_sources")
+        .with_text(spec)
+        .next(fmt::format("known: {}", fmt::join(names, ", ")));
   }
   if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
   const auto form = std::find_if(known->forms.begin(), known->forms.end(),
                                  [&](const Form& one) { return one.spelling == cause_in(spec); });
   if (form == known->forms.end())
-    return failure(ErrorCode::kUsage, "error source '{}' takes nothing behind its name", spec);
-  return parse_spec(spec, *known, cell).and_then([&](const SourceSpec& parsed) { return form->make(parsed, cell); });
+    return failure(ErrorCode::kUsage, "error source '{}' takes nothing behind its name", spec)
+        .of("error_sources")
+        .with_text(spec);
+  return parse_spec(spec, *known, cell)
+      .and_then([&](const SourceSpec& parsed) { return form->make(parsed, cell); })
+      .map_error([&](Error error) { return Failure(std::move(error)).of("error_sources").with_text(spec).value(); });
 }
 
 bool are_forms_of_one(const std::string& source, const std::string& other) {

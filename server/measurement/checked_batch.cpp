@@ -30,11 +30,13 @@ void rebase_times(std::vector<Measurement>& measurements) {
 Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string& where) {
   for (Measurement& measurement : batch.measurements) {
     if (measurement.context.q.size() != cell.robot.size()) {
-      return refused("{} row {}: {} joints, robot {} has {}", where, measurement.row, measurement.context.q.size(),
-                     cell.robot.name(), cell.robot.size());
+      return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
+          .in(where)
+          .at_row(measurement.row)
+          .beyond(measurement.context.q.size(), cell.robot.size());
     }
-    const Status pose = check_pose(measurement.context, cell, fmt::format("{} row {}", where, measurement.row));
-    if (!pose) return pose;
+    const Status pose = check_pose(measurement.context, cell);
+    if (!pose) return Failure(pose.error()).in(where).at_row(measurement.row);
   }
   return {};
 }
@@ -108,7 +110,7 @@ CheckedBatch CheckedBatch::in_order_of_time() const {
 
 Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) {
   const std::string where = name_of(batch);
-  if (batch.measurements.empty()) return refused("{}: no measurements, at least 1 is needed", where);
+  if (batch.measurements.empty()) return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
   std::string hash = batch_hash(batch);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {

@@ -74,7 +74,7 @@ class Arm {
 ordered_json waterfall(const Diagnosis& diagnosis) {
   ordered_json names = ordered_json::array(), rms = ordered_json::array();
   for (const WaterfallStep& step : diagnosis.waterfall) {
-    names.push_back(step.name);
+    names.push_back(in_words(cause_from(step.name)));
     rms.push_back(tenth_of_um(step.rms));
   }
   return {{"names", names}, {"rms_um", rms}};
@@ -238,7 +238,7 @@ ordered_json recovery(const Recovery& curve) {
     effect.push_back(tenth_of_um(curve.effect_rms(k)));
     named.push_back(rounded(100 * curve.named(k), 0.1));
   }
-  return {{"cause", to_string(curve.cause)}, {"effect_um", effect}, {"named_percent", named}};
+  return {{"cause", in_words(curve.cause)}, {"effect_um", effect}, {"named_percent", named}};
 }
 
 template <typename Items, typename Draw>

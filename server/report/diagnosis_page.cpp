@@ -26,14 +26,6 @@ std::string table(const HtmlTable& table) { return "<div class=\"wide\">" + html
 
 std::string paragraph(const std::string& text) { return "<p>" + html_text(text) + "</p>\n"; }
 
-/// The cause in words; the spelling of files only where words say less.
-std::string cause_in_words(const Cause& cause) {
-  std::string words = cause.cause;
-  std::replace(words.begin(), words.end(), '_', ' ');
-  if (!cause.parameter.empty()) words += " " + cause.parameter;
-  return words;
-}
-
 std::string where_of(const Cause& cause) {
   if (!cause.pose_id.empty()) {
     return fmt::format("{}pose {}", cause.joint >= 0 ? fmt::format("{}, from ", cause.joint + 1) : "", cause.pose_id);
@@ -43,10 +35,7 @@ std::string where_of(const Cause& cause) {
 
 std::string causes_in_words(const std::vector<Cause>& causes) {
   std::string list;
-  for (const Cause& cause : causes) {
-    list += (list.empty() ? "" : ", ") + cause_in_words(cause) +
-            (cause.joint >= 0 ? fmt::format(" (joint {})", cause.joint + 1) : "");
-  }
+  for (const Cause& cause : causes) list += (list.empty() ? "" : ", ") + in_words(cause);
   return list;
 }
 
@@ -87,7 +76,7 @@ std::string beginning_of(const Finding& finding) {
 HtmlRow finding_row(const Finding& finding) {
   const std::string others = causes_in_words(finding.could_also_be);
   return {
-      .cells = {"<b>" + html_text(cause_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
+      .cells = {"<b>" + html_text(kind_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
                 estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
                 millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
                 fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
@@ -243,7 +232,7 @@ std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) 
   if (unseen.empty()) return "";
   std::vector<HtmlRow> rows;
   for (const Need& need : needs_of(unseen)) {
-    rows.push_back({{html_text(cause_in_words(need.one->cause)), html_text(need.joints), html_text(need.one->needs)}});
+    rows.push_back({{html_text(kind_in_words(need.one->cause)), html_text(need.joints), html_text(need.one->needs)}});
   }
   return fmt::format("<h3>{}</h3>\n", heading) + table({"never", {"cause", "joint", "it needs"}, rows});
 }
@@ -259,7 +248,7 @@ std::string never_tables(const Diagnosis& diagnosis) {
 }
 
 HtmlRow smallest_row(const Unseen& one) {
-  return {{html_text(cause_in_words(one.cause)), html_text(where_of(one.cause)),
+  return {{html_text(kind_in_words(one.cause)), html_text(where_of(one.cause)),
            fmt::format("{:.3g}", *one.detectable * 1e6),
            one.identifiable ? fmt::format("{:.3g}", *one.identifiable * 1e6) : "never",
            fmt::format("{:.0f}\u00a0%", 100 * one.outside), html_text(one.needs)}};

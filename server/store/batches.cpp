@@ -28,7 +28,8 @@ StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
 
 Result<StoredBatch> read_record(SQLite::Database& database, const std::string& cell, const std::string& id) {
   auto row = prepare(database, (std::string(kRecordColumns) + "AND id = ?").c_str(), cell, id);
-  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+  if (!row.executeStep())
+    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
   return record_of(cell, row);
 }
 
@@ -43,7 +44,9 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
       const std::int64_t made = present.getColumn(2).getInt64();
       if (same_content && present.getColumn(0).getString() == batch.request_id) return read_job(database, made);
       return failure(ErrorCode::kConflict, "cell {} already has a batch {} with {} content (job {})", batch.cell,
-                     batch.id, same_content ? "the same" : "other", made);
+                     batch.id, same_content ? "the same" : "other", made)
+          .of("batch")
+          .with_text(batch.id);
     }
     const std::int64_t id = insert_job(database, job);
     change(database,
@@ -75,8 +78,9 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
   });
   // Without the lock: hashing a large text takes a while.
   if (batch && sha256_hex(batch->csv) != batch->hash) {
-    return failure(ErrorCode::kInternal, "{}: batch {} of cell {} is not what was accepted: its hash should be {}",
-                   connection_->path, id, cell, batch->hash);
+    return failure(ErrorCode::kInternal, "batch {} of cell {} is not what was accepted: its hash should be {}", id,
+                   cell, batch->hash)
+        .in(connection_->path);
   }
   return batch;
 }

@@ -29,10 +29,9 @@ struct StoreConnection {
     try {
       return work(database);
     } catch (const SQLite::Exception& error) {
-      return failure(ErrorCode::kInternal, "{}: {} (SQLite error {})", path, error.what(),
-                     error.getExtendedErrorCode());
+      return failure(ErrorCode::kInternal, "{} (SQLite error {})", error.what(), error.getExtendedErrorCode()).in(path);
     } catch (const std::exception& error) {
-      return failure(ErrorCode::kInternal, "{}: {}", path, error.what());
+      return failure(ErrorCode::kInternal, "{}", error.what()).in(path);
     }
   }
 

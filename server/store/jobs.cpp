@@ -36,7 +36,7 @@ JobState job_state_of(std::string_view text) {
 /// Of the change of one unfinished job.
 Status changed_one(int changes, std::int64_t id) {
   if (changes == 1) return {};
-  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id);
+  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);
 }
 
 std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job) {
@@ -109,7 +109,7 @@ void insert_job_batches(SQLite::Database& database, std::int64_t job, const std:
 
 Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = ?").c_str(), id);
-  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id);
+  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
   return job_of(database, row);
 }
 
@@ -128,7 +128,7 @@ namespace {
 Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
     if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
-      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id);
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
     }
   }
   const std::int64_t id = insert_job(database, job);
@@ -171,7 +171,8 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
 Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredDiagnosis> {
     auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
     return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
                            row.getColumn(3).getString()};
   });

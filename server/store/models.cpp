@@ -33,9 +33,11 @@ std::optional<Activation> present_activation(SQLite::Database& database, const s
 /// Where rolling back again and again leads, the next one first.
 Result<std::vector<Activation>> activations_before(SQLite::Database& database, const std::string& cell) {
   const auto present = present_activation(database, cell);
-  if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+  if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
   if (!present->back) {
-    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version);
+    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version)
+        .of("version")
+        .with_value(present->version);
   }
   std::vector<Activation> before;
   for (auto back = present->back; back; back = before.back().back) {
@@ -116,7 +118,9 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
 Status Store::activate(const std::string& cell, int version) {
   return connection_->in_transaction([&](SQLite::Database& database) -> Status {
     if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
-      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
+      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
+          .of("version")
+          .with_value(version);
     }
     release_batches_of(database, cell, version);
     activate_on_top(database, cell, version);
@@ -139,7 +143,9 @@ Result<int> Store::rollback(const std::string& cell, int steps) {
     const auto before = activations_before(database, cell);
     if (!before) return tl::make_unexpected(before.error());
     if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
-      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps);
+      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps)
+          .of("steps")
+          .beyond(steps, steps < 1 ? 1 : before->size());
     }
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     insert_activation(database, cell, wanted.version, wanted.back);
@@ -179,7 +185,10 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
 Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
   const auto content = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
+          .of("version")
+          .with_value(version);
     return row.getColumn(0).getString();
   });
   if (!content) return tl::make_unexpected(content.error());

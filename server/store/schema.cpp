@@ -118,14 +118,18 @@ Status check_owner(SQLite::Database& database, const std::string& path) {
   const bool empty = database.execAndGet("SELECT COUNT(*) FROM sqlite_master").getInt() == 0;
   if (empty && application == 0 && schema == 0) return {};
   if (application != kApplicationId) {
-    return refused("{}: a database of another program (application id {:#x}, not {:#x})", path, application,
-                   kApplicationId);
+    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+        .in(path);
   }
   if (schema > kSchemaVersion) {
-    return refused("{}: schema {} is newer than this program's, limit {}", path, schema, kSchemaVersion);
+    return refused("schema {} is newer than this program's, limit {}", schema, kSchemaVersion)
+        .in(path)
+        .of("schema")
+        .beyond(schema, kSchemaVersion)
+        .next("start a newer one");
   }
   const std::string damage = database.execAndGet("PRAGMA quick_check(1)").getString();
-  if (damage != "ok") return failure(ErrorCode::kInternal, "{}: damaged: {}", path, damage);
+  if (damage != "ok") return failure(ErrorCode::kInternal, "damaged: {}", damage).in(path);
   return {};
 }
 
@@ -134,7 +138,7 @@ Status check_owner(SQLite::Database& database, const std::string& path) {
 Status prepare_file(SQLite::Database& database, const std::string& path) {
   if (auto owner = check_owner(database, path); !owner) return owner;
   const std::string mode = database.execAndGet("PRAGMA journal_mode = WAL").getString();
-  if (mode != "wal") return failure(ErrorCode::kInternal, "{}: this file system cannot hold a WAL ({})", path, mode);
+  if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
   const int schema = database.execAndGet("PRAGMA user_version").getInt();

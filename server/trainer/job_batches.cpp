@@ -17,8 +17,10 @@ constexpr std::size_t kIdOfSentBatch = 12;  // characters of its hash
 
 Status check_released(const StoredBatch& batch) {
   if (batch.quarantine.empty()) return {};
-  return refused("batch {} of cell {} is in quarantine: {}; release it if it is good", batch.id, batch.cell,
-                 batch.quarantine);
+  return refused("batch {} of cell {} is in quarantine: {}", batch.id, batch.cell, batch.quarantine)
+      .of("batch")
+      .with_text(batch.id)
+      .next("release it if it is good");
 }
 
 HoldOut held_out_to_judge(const TrainerOptions& options) {

@@ -172,8 +172,10 @@ Result<std::string> JobRunner::hold_against_model_in_force(const StoredJob& job,
   if (const Status kept = store_.set_quarantine(job.cell, id, seen.sentence); !kept) {
     return tl::make_unexpected(kept.error());
   }
-  return refused("batch {} is in quarantine: {}; nothing was learned from it (retrain --release if it is good)", id,
-                 seen.sentence);
+  return refused("batch {} is in quarantine: {}; nothing was learned from it", id, seen.sentence)
+      .of("batch")
+      .with_text(id)
+      .next("retrain --release if it is good");
 }
 
 std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const std::stop_token& stop) {

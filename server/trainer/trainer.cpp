@@ -132,7 +132,9 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   if (!batch) return tl::make_unexpected(batch.error());
   const int poses = static_cast<int>(batch->size());
   if (poses > options_.max_poses) {
-    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses);
+    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses)
+        .of("poses")
+        .beyond(poses, options_.max_poses);
   }
   const StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
 
@@ -167,7 +169,9 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
     if (!batch) return tl::make_unexpected(batch.error());
     if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
-      return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses);
+      return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
+          .of("poses")
+          .beyond(poses, options_.max_poses);
     }
     sent = std::move(*batch);
   }
@@ -183,7 +187,7 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
                                                bool apply) const {
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name);
+  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name).of("batch");
   const std::string& id = batch_id.empty() ? stored->back().id : batch_id;
   if (!apply) return id;
   const auto asked = store_.batch_record(cell_name, id);
@@ -198,10 +202,12 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
   const bool release = quarantine == Quarantine::kReleased;
-  if (release && batch_ids.empty()) return refused("to release a batch takes its id: which one is good");
+  if (release && batch_ids.empty())
+    return refused("to release a batch takes its id").of("batch").next("say which one is good");
   const auto stored = store_.batches(cell_name);
   if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name);
+  if (stored->empty())
+    return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name).of("batch");
 
   StoredJob job;
   job.cell = cell_name;
@@ -222,7 +228,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
 Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
                                bool release) const {
   const std::set<std::string> wanted(batch_ids.begin(), batch_ids.end());
-  if (wanted.size() != batch_ids.size()) return refused("a batch is named twice; each counts once in a training");
+  if (wanted.size() != batch_ids.size())
+    return refused("a batch is named twice").of("batch").next("each counts once in a training");
   std::int64_t poses = 0;
   for (const StoredBatch& batch : stored) {
     if (!wanted.contains(batch.id)) continue;
@@ -230,7 +237,9 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
     poses += batch.poses;
   }
   if (poses <= options_.max_poses) return {};
-  return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses);
+  return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses)
+      .of("poses")
+      .beyond(poses, options_.max_poses);
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id) {
@@ -256,7 +265,7 @@ Result<StoredDiagnosis> Trainer::diagnosis(std::int64_t job) const {
   const auto state = store_.job(job);
   if (!state) return tl::make_unexpected(state.error());
   if (state->state == JobState::kFailed) return refused("job {} failed: {}", job, state->message);
-  return failure(ErrorCode::kBusy, "job {} is not done yet", job);
+  return failure(ErrorCode::kBusy, "job {} is not done yet", job).of("job").with_value(job).next("try again later");
 }
 
 Result<JobProgress> Trainer::progress(std::int64_t job) const {

@@ -11,8 +11,8 @@ namespace {
 
 TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
   const std::string text = diagnosis_text(diagnosis_json(test::made_up_diagnosis(test::cell_7())));
-  for (const char* part : {"ambiguous: The gear of joint 3", "gear_transmission of joint 3", "order = 48.503 ± 0.040",
-                           "± is U(k=2): two standard uncertainties", "could also be: geometry d6",
+  for (const char* part : {"ambiguous: The gear of joint 3", "gear ripple in joint 3", "order = 48.503 ± 0.040",
+                           "± is U(k=2): two standard uncertainties", "could also be: link geometry (d6)",
                            "Have the gear of joint 3 looked at", "9 um rms that depend on q4", "pose p28 (row 29)",
                            "would not have shown: backlash: needs both approach directions (joints 2)",
                            "uncertain by more than the effect itself now, by 30 % of the effect with them"}) {
@@ -28,8 +28,10 @@ TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
                              {{payload, {"compliance", -1, "C3", "", {}}}, 1}};
   diagnosis.could_not_have_seen.push_back({payload, 0.9, 1e-5, {}, "a second known payload"});
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
-  for (const char* part : {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
-                           "payload from compliance:C2, compliance:C3 (needs a second known payload)"}) {
+  for (const char* part :
+       {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
+        "payload mass or centre of gravity from gearboxes that give way (C2), gearboxes that give way (C3) (needs a "
+        "second known payload)"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }

@@ -175,6 +175,62 @@ TEST_F(ServiceTest, TheLargestRequestAndItsReplyFit) {
   EXPECT_EQ(replies[1].header().result(), wire::RESULT_TOO_LARGE);
 }
 
+TEST_F(ServiceTest, ARequestThatIsSentOnceMoreIsNotComputedAgain) {
+  server_.backend().serve(1);
+  server_.start();
+  test::RawClient<wire::PredictError> client(server_.options().domain, server_.options().port, "raw-1");
+  ASSERT_TRUE(client.wait_for_server());
+  wire::PredictErrorRequest request;
+  request.about().cell("cell-7");
+  request.joints_rad({kJoints});
+  client.send(request, 1);
+  ASSERT_EQ(client.wait_for_replies(1).size(), 1U);
+  server_.backend().serve(2);
+  client.send(request, 1);
+  client.send(request, 2);
+  const auto replies = client.wait_for_replies(3);
+  ASSERT_EQ(replies.size(), 3U);
+  for (const auto& reply : replies) {
+    const auto number = reply.header().related_request_id().sequence_number();
+    EXPECT_EQ(reply.model().version(), number == 1 ? 1 : 2);
+  }
+}
+
+TEST_F(ServiceTest, ClientsThatUseTheSameRequestIdsGetTheirOwnAnswers) {
+  server_.backend().serve(1);
+  server_.start();
+  const std::vector<std::string> names = {"raw-1", "raw-2"};
+  std::vector<std::unique_ptr<test::RawClient<wire::PredictError>>> clients;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    clients.push_back(std::make_unique<test::RawClient<wire::PredictError>>(server_.options().domain,
+                                                                            server_.options().port, names[k]));
+    ASSERT_TRUE(clients[k]->wait_for_server());
+    wire::PredictErrorRequest request;
+    request.about().cell("cell-7");
+    request.joints_rad(std::vector<std::vector<double>>(k + 1, kJoints));
+    clients[k]->send(request, 1);
+    const auto replies = clients[k]->wait_for_replies(1);
+    ASSERT_EQ(replies.size(), 1U);
+    EXPECT_EQ(replies[0].predictions().size(), k + 1);
+  }
+}
+
+TEST_F(ServiceTest, AProgramIsCorrectedByOneModelThoughAnotherIsPutInForceMeanwhile) {
+  server_.backend().serve(1);
+  server_.start();
+  const auto session = open_session(server_.options());
+  int calls = 0;
+  const auto swap_at_the_third_part = [&](double) {
+    if (++calls == 3) server_.backend().serve(2);
+  };
+  const std::vector<client::TargetMm> targets(3000, joint_target());
+  const auto corrected = session->correct_targets(kCell7, targets, swap_at_the_third_part);
+  ASSERT_TRUE(corrected) << corrected.error().message;
+  EXPECT_EQ(corrected->model.version, 2);
+  ASSERT_EQ(corrected->items.size(), targets.size());
+  for (const client::CorrectedTarget& item : corrected->items) EXPECT_NEAR(item.error_before_mm, 0.2, 1e-6);
+}
+
 TEST_F(ServiceTest, EveryRequestHasExactlyOneAnswer) {
   server_.backend().serve(1);
   server_.start();

@@ -12,7 +12,7 @@
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 using Eigen::Index;
@@ -48,23 +48,23 @@ class Beginning : public testing::Test {
     std::mt19937_64 random(11);
     std::normal_distribution<double> normal;
     Best always = one.typical();
-    always.at = 0;
+    always.pose = 0;
     Held held;
     for (int k = 0; k < steps; ++k) {
       Best truth = one.typical();
-      truth.at = static_cast<double>(8 + random() % 64);
+      truth.pose = static_cast<Index>(8 + random() % 64);
       const Eigen::MatrixXd columns = one.columns(truth);
       const VectorXd direction = VectorXd::NullaryExpr(columns.cols(), [&] { return normal(random); });
       VectorXd step = columns * direction;
       step *= std::sqrt(lambda / step.dot(rest.project(step).col(0)));
       const VectorXd data = noise.col(k) + step;
-      const auto found = static_cast<Index>(one.scan({rest}, rest.project(data)).front().at);
+      const Index found = one.scan({rest}, rest.project(data)).front().pose;
       const std::vector<Index> possible = possible_beginnings(*problem_, one.columns(always), rest, data, found);
       EXPECT_TRUE(std::is_sorted(possible.begin(), possible.end()));
       EXPECT_EQ(std::count(possible.begin(), possible.end(), found), 1);
       ++held.steps;
       held.poses += static_cast<int>(possible.size());
-      held.held += static_cast<int>(std::count(possible.begin(), possible.end(), static_cast<Index>(truth.at)));
+      held.held += static_cast<int>(std::count(possible.begin(), possible.end(), truth.pose));
     }
     return held;
   }
@@ -110,4 +110,4 @@ TEST(BeginningFound, IsToldWithTheFinding) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -12,7 +12,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 using Eigen::MatrixXd;
@@ -122,4 +122,4 @@ TEST(Dependence, TheTableOfNoiseAloneSaysNo) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

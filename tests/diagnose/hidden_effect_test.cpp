@@ -6,7 +6,7 @@
 #include <set>
 #include <sstream>
 
-#include "server/diagnose/tell/findings.h"
+#include "server/diagnose/tell/doubts.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/process.h"
@@ -214,33 +214,28 @@ TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnoth
   EXPECT_EQ(moved.sources_after, moved.sources_before);
 }
 
-TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
-  std::vector<Finding> findings(2);
-  findings[0].source = findings[1].source = "wrist_coupling";
-  findings[0].effect_rms = 4e-6;
-  findings[1].effect_rms = 12e-6;
-  doubt_beside({true, {"q2"}, 33e-6, 1e-6}, findings);
-  EXPECT_EQ(findings[0].could_also_be, (std::vector<Cause>{{"unknown", -1, "", "", {}}}));
-  EXPECT_TRUE(findings[1].could_also_be.empty());
+/// What a cause could also be beside `found` and an unknown dependence of that size (m), with everything recorded.
+std::vector<Cause> doubts(const Cause& cause, double effect_rms, const std::vector<Cause>& found,
+                          double unexplained_rms) {
+  const Unexplained unexplained{unexplained_rms > 0, {"q2"}, unexplained_rms, 1e-6};
+  return cause_search::judge(cause, effect_rms, {}, {found, unexplained, {}, {}}).could_also_be;
 }
 
-Finding found(const char* cause, int joint) {
-  Finding finding;
-  finding.cause = {cause, joint, "", "", {}};
-  return finding;
+TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
+  const Cause coupling{"wrist_coupling"};
+  EXPECT_EQ(doubts(coupling, 4e-6, {coupling}, 33e-6), std::vector<Cause>{{"unknown"}});
+  EXPECT_TRUE(doubts(coupling, 12e-6, {coupling}, 33e-6).empty());
+  EXPECT_TRUE(doubts(coupling, 4e-6, {coupling}, 0).empty());
 }
 
 TEST(Doubt, AGearBesideAMapOfItsJointOrAmongThreeMayBeMoreOfThatMap) {
-  std::vector<Finding> findings = {found("joint_map", 0), found("gear_transmission", 0), found("gear_transmission", 1),
-                                   found("gear_transmission", 1)};
-  doubt_single_orders(findings);
-  EXPECT_TRUE(findings[0].could_also_be.empty());
-  EXPECT_EQ(findings[1].could_also_be, (std::vector<Cause>{{"joint_map", 0, "", "", {}}}));
-  EXPECT_TRUE(findings[2].could_also_be.empty()) << "an order and its double are one gear's";
-  findings.push_back(found("gear_transmission", 1));
-  doubt_single_orders(findings);
-  EXPECT_EQ(findings[4].could_also_be, (std::vector<Cause>{{"joint_map", 1, "", "", {}}}));
-  EXPECT_EQ(findings[1].could_also_be.size(), 1U);
+  const Cause map{"joint_map", 0}, beside_it{"gear_transmission", 0}, gear{"gear_transmission", 1};
+  const std::vector<Cause> two = {map, beside_it, gear, gear};
+  EXPECT_TRUE(doubts(map, 1e-4, two, 0).empty());
+  EXPECT_EQ(doubts(beside_it, 1e-4, two, 0), std::vector<Cause>{map});
+  EXPECT_TRUE(doubts(gear, 1e-4, two, 0).empty()) << "an order and its double are one gear's";
+  const std::vector<Cause> three = {map, beside_it, gear, gear, gear};
+  EXPECT_EQ(doubts(gear, 1e-4, three, 0), (std::vector<Cause>{{"joint_map", 1}}));
 }
 
 /// The shipped robot in a cell that knows only of its base, these numbers of its geometry wrong.

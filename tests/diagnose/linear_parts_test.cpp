@@ -10,7 +10,7 @@
 #include "server/measurement/checked_batch.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 using Eigen::Index;
@@ -74,11 +74,11 @@ TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRows) {
   const FamilyPtr gear = make_gear_family(problem, 2);
   ASSERT_NE(gear, nullptr);
   Best planted = gear->typical();
-  planted.at = 37.3;
+  planted.order = 37.3;
   const Background background(problem.nuisance());
   const VectorXd effect = gear->columns(planted) * Eigen::Vector2d(0.03, -0.04);
   const Best found = gear->scan({background}, background.project(problem.residual() + effect)).front();
-  EXPECT_NEAR(found.at, 37.3, 0.1);
+  EXPECT_NEAR(found.order, 37.3, 0.1);
   const double strength = effect.dot(background.project(effect).col(0));
   EXPECT_NEAR(found.strength, strength, 5 * std::sqrt(strength));
 }
@@ -120,4 +120,4 @@ TEST(Chance, LetsTheBestOfAllPassThreeTimesInAThousand) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

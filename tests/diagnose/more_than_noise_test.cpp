@@ -8,7 +8,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 /// cell-7's virtual robot, whose errors are those of the cell's error sources, with noise so many times as stated.
@@ -91,4 +91,4 @@ TEST(MoreThanNoise, OrientationsInXyzwOrderAreRefused) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

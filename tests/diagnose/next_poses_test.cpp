@@ -15,7 +15,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 std::vector<std::string> shipped_robots() {
@@ -120,4 +120,4 @@ TEST(NextPoses, StayInTheWorkspaceAndInSightOnTheWayToo) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -12,7 +12,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 DiagnoseOptions quick() {
@@ -119,4 +119,4 @@ TEST(PlaySign, ARealRobotWhoseDirectionsAreItsMovesIsNotToldToAdjustItsGears) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

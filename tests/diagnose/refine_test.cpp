@@ -12,7 +12,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 /// The shipped rail with the tool and payload of cell-7; which way is down.
@@ -75,4 +75,4 @@ TEST(Refine, StepsAlongABoundAreTheBestOnesThatStayInside) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

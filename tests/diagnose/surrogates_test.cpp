@@ -5,7 +5,7 @@
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 DiagnoseOptions quick() {
@@ -94,4 +94,4 @@ TEST(Unrecorded, DirectionOfAPoseIsKnownWhereTheOneBeforeWasSetAside) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

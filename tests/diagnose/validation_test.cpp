@@ -8,7 +8,7 @@
 #include "tests/support/hidden_columns.h"
 #include "tests/support/virtual_robot.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 namespace {
 
 DiagnoseOptions quick() {
@@ -64,4 +64,4 @@ TEST(Validation, SuspectsAGoodPoseInOneOfAHundredBatches) {
 }
 
 }  // namespace
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -40,10 +40,10 @@ MeasurementBatch with_temperatures(bool have) {
 }
 
 TEST(Wording, KeepsDoubtfulFindingsApart) {
-  EXPECT_EQ(sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
-            "Some things are lacking that I cannot tell: they may be tracker_drift (20 um rms), which these poses "
-            "cannot tell from thermal_growth; and thermal_growth (20 um rms), which these poses cannot tell from "
-            "tracker_drift.");
+  EXPECT_EQ(
+      sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
+      "Missing, but these poses do not tell which it is: the tracker drifts (20 um rms), or links that grow as they "
+      "warm up; and links that grow as they warm up (20 um rms), or the tracker drifts.");
 }
 
 TEST(Wording, LeavesManyDoubtfulFindingsToTheTable) {
@@ -56,7 +56,8 @@ TEST(Wording, NamesASinglePoseAsAnOutlierAndSaysThatNothingElseWasFound) {
             "Pose 6 (0.02 mm) is an outlier: single pose, cause not separable; repeat it and its neighbours. Nothing "
             "else was found in 80 poses: 12 um rms are left.");
   EXPECT_EQ(sentence_for(with({found(kPose6), found(kPose9), found(kBacklash)})),
-            "The simulation lacks backlash:2 (20 um rms). Pose 6 (0.02 mm) and pose 9 (0.02 mm) are outliers: single "
+            "Missing from the simulation: backlash in joint 2 (20 um rms). Pose 6 (0.02 mm) and pose 9 (0.02 mm) are "
+            "outliers: single "
             "poses, cause not separable; repeat them and their neighbours.");
 }
 

@@ -517,7 +517,7 @@ TEST_F(CommandLine, ADiagnosisNamesTheGearAndExtendsTheCellByIt) {
   EXPECT_TRUE(found.at("applied").at("better").get<bool>());
   EXPECT_LT(found.at("applied").at("after").at("rms_mm").get<double>(),
             found.at("applied").at("before").at("rms_mm").get<double>());
-  EXPECT_NE(test::read_file(file("page.html")).find("gear transmission"), std::string::npos);
+  EXPECT_NE(test::read_file(file("page.html")).find("gear ripple"), std::string::npos);
 
   const std::string before = test::read_file(cell_);
   const std::string after = test::read_file(file("extended.yaml"));

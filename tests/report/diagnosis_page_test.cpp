@@ -77,8 +77,9 @@ TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
   const std::string page = diagnosis_page(diagnosis_, *cell_);
   for (const std::string& part :
        {diagnosis_.batch_hash, diagnosis_.cell_hash, std::string("these poses do not tell which"),
-        std::string("48.503"), std::string("parameter ± U (k = 2)"), std::string("0.040"), std::string("geometry d6"),
-        std::string("p28"), std::string("repeat it and its neighbours"), std::string("both approach directions")}) {
+        std::string("48.503"), std::string("parameter ± U (k = 2)"), std::string("0.040"),
+        std::string("link geometry (d6)"), std::string("p28"), std::string("repeat it and its neighbours"),
+        std::string("both approach directions")}) {
     EXPECT_TRUE(has(page, part)) << part;
   }
 }

@@ -13,7 +13,7 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr std::size_t kItemsOfOneCall = 1000;  // keeps answers of a service small
+constexpr std::size_t kPosesTogether = 1000;  // that a model predicts between two looks at the progress
 
 /// What predict and correct have in common.
 struct ApplyArguments {
@@ -29,32 +29,6 @@ void fill_in(JointList& list, const ApplyArguments& arguments) {
     if (pose.context.tool.empty()) pose.context.tool = arguments.tool;
     if (pose.context.payload.empty()) pose.context.payload = arguments.payload;
   }
-}
-
-/// Asks the service for all items, so many a call, of one model: the later calls name the model that answered the
-/// first.
-template <typename Item, typename Answered, typename Ask>
-Result<std::string> ask_in_parts(const std::vector<Item>& items, client::CallContext context, const char* what,
-                                 const Ask& ask, std::vector<Answered>& answers) {
-  ProgressLine progress;
-  std::string model_id;
-  for (std::size_t from = 0; from < items.size(); from += kItemsOfOneCall) {
-    progress.show(what, static_cast<double>(from) / static_cast<double>(items.size()));
-    const auto first = items.begin() + static_cast<std::ptrdiff_t>(from);
-    const auto count = static_cast<std::ptrdiff_t>(std::min(kItemsOfOneCall, items.size() - from));
-    Result<client::Answer<Answered>> answer = ask(context, std::vector<Item>(first, first + count));
-    if (!answer) return tl::make_unexpected(answer.error());
-    if (answer->items.size() != static_cast<std::size_t>(count)) {
-      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count)
-          .beyond(answer->items.size(), count);
-    }
-    if (from == 0) {
-      model_id = answer->model.id;
-      if (context.model.empty()) context.model = model_id;
-    }
-    answers.insert(answers.end(), answer->items.begin(), answer->items.end());
-  }
-  return model_id;
 }
 
 Result<client::CallContext> call_context(const ApplyArguments& arguments) {
@@ -88,9 +62,9 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   }
   Predictions predictions{model->provenance().id, {}};
   ProgressLine progress;
-  for (std::size_t from = 0; from < poses.size(); from += kItemsOfOneCall) {
+  for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
-    const std::size_t to = std::min(from + kItemsOfOneCall, poses.size());
+    const std::size_t to = std::min(from + kPosesTogether, poses.size());
     const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
     for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
@@ -132,14 +106,10 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   }
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
-  Predictions predictions;
-  const auto ask = [&](const client::CallContext& call, const std::vector<std::vector<double>>& part) {
-    return (*session)->predict_error(call, part);
-  };
-  return ask_in_parts(joints, *context, "predicting", ask, predictions.items).map([&](std::string model_id) {
-    predictions.model_id = std::move(model_id);
-    return predictions;
-  });
+  ProgressLine progress;
+  auto answer = (*session)->predict_error(*context, joints, [&](double share) { progress.show("predicting", share); });
+  if (!answer) return tl::make_unexpected(answer.error());
+  return Predictions{answer->model.id, std::move(answer->items)};
 }
 
 Status predict(const ApplyArguments& arguments) {
@@ -181,14 +151,11 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
-  Corrections corrections{"", file.joint_types, {}};
-  const auto ask = [&](const client::CallContext& call, const std::vector<client::TargetMm>& part) {
-    return (*session)->correct_targets(call, part);
-  };
-  return ask_in_parts(targets, *context, "correcting", ask, corrections.items).map([&](std::string model_id) {
-    corrections.model_id = std::move(model_id);
-    return corrections;
-  });
+  ProgressLine progress;
+  auto answer =
+      (*session)->correct_targets(*context, targets, [&](double share) { progress.show("correcting", share); });
+  if (!answer) return tl::make_unexpected(answer.error());
+  return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
 }
 
 /// Whether what could not be corrected counts.

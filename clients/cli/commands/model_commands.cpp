@@ -56,8 +56,10 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
                         source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
   if (seen.learn || refitted) return {};
-  return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id(), seen.sentence,
-                 fmt::join(refit, ","));
+  return refused("{}", seen.sentence)
+      .in("batch " + batch.id())
+      .of("--refit")
+      .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
 }
 
 Status train_model(const TrainArguments& arguments) {

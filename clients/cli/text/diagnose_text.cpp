@@ -14,14 +14,16 @@ using nlohmann::ordered_json;
 
 constexpr double kMicrometres = 1000;  // per mm
 
-/// `gear_transmission of joint 3`, `outlier at pose p28`.
-std::string cause_text(const ordered_json& cause) {
-  std::string text = cause.at("cause");
-  if (cause.contains("parameter")) text += fmt::format(" {}", cause.at("parameter").get<std::string>());
-  if (!cause.at("joint").is_null()) text += fmt::format(" of joint {}", cause.at("joint").get<int>());
-  if (cause.contains("pose_id")) text += fmt::format(" at pose {}", cause.at("pose_id").get<std::string>());
-  return text;
+Cause cause_of(const ordered_json& json) {
+  Cause cause{json.at("cause").get<std::string>()};
+  cause.parameter = json.value("parameter", "");
+  cause.pose_id = json.value("pose_id", "");
+  if (!json.at("joint").is_null()) cause.joint = json.at("joint").get<int>() - 1;
+  return cause;
 }
+
+/// `gear ripple in joint 3`, `a single bad pose at pose p28`.
+std::string cause_text(const ordered_json& cause) { return in_words(cause_of(cause)); }
 
 std::string causes_text(const ordered_json& causes) {
   std::string text;
@@ -65,9 +67,10 @@ std::string p_text(const ordered_json& value) {
   return p <= kLeastPValue ? "< 1e-6" : fmt::format("{:.2g}", p);
 }
 
-std::string finding_lines(const ordered_json& finding) {
+/// `width`: of the column of causes.
+std::string finding_lines(const ordered_json& finding, std::size_t width) {
   std::string text =
-      fmt::format("  {:<34}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding),
+      fmt::format("  {:<{}}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding), width,
                   kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
                   p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
@@ -86,10 +89,12 @@ std::string finding_lines(const ordered_json& finding) {
 
 std::string findings_table(const ordered_json& findings) {
   if (findings.empty()) return "";
-  constexpr auto kColumns = "  {:<34}{:>10}{:>10}{:>10}{:>10}{:>10}\n";
-  std::string text = "\n" + fmt::format(kColumns, "", "effect", "strength", "p", "held out", "") +
-                     fmt::format(kColumns, "cause", "um rms", "lambda", "", "before mm", "after mm");
-  for (const ordered_json& finding : findings) text += finding_lines(finding);
+  std::size_t width = 34;
+  for (const ordered_json& finding : findings) width = std::max(width, cause_text(finding).size() + 1);
+  constexpr auto kColumns = "  {:<{}}{:>10}{:>10}{:>10}{:>10}{:>10}\n";
+  std::string text = "\n" + fmt::format(kColumns, "", width, "effect", "strength", "p", "held out", "") +
+                     fmt::format(kColumns, "cause", width, "um rms", "lambda", "", "before mm", "after mm");
+  for (const ordered_json& finding : findings) text += finding_lines(finding, width);
   return text + "  (± is U(k=2): two standard uncertainties)\n";
 }
 
@@ -156,8 +161,7 @@ std::string unseen_lines(const ordered_json& unseen) {
     const bool by_order = one.value("looked_for_by_order", false);
     const char* how = by_order ? "been named for certain (looked for by the order of the poses)" : "shown";
     const std::string joint = one.at("joint").is_null() ? "" : fmt::format(" {}", one.at("joint").get<int>());
-    say(sayings, fmt::format("would not have {}: {}: needs {}", how, one.at("cause").get<std::string>(), needs), joint,
-        "");
+    say(sayings, fmt::format("would not have {}: {}: needs {}", how, kind_in_words(cause_of(one)), needs), joint, "");
   }
   std::string text;
   for (const auto& [what, joints] : sayings) {
@@ -180,13 +184,13 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
   std::vector<Saying> sayings;
   for (const ordered_json& group : diagnosis.at("not_separable")) {
     std::vector<std::string> others;
-    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(group[k]);
+    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(in_words(cause_from(group[k].get<std::string>())));
     say(sayings, group.front(), fmt::format("{}", fmt::join(others, ", ")), ", ");
   }
   std::string text;
   for (const auto& [name, others] : sayings) {
     const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
-    text += fmt::format("  not told apart by these poses: {} from {}{}\n", name, others,
+    text += fmt::format("  not told apart by these poses: {} from {}{}\n", in_words(cause_from(name)), others,
                         need.empty() ? "" : fmt::format(" (needs {})", need));
   }
   return text;

@@ -4,7 +4,7 @@
 
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 using Eigen::MatrixXd;
 
@@ -32,4 +32,4 @@ MatrixXd Background::estimate(const MatrixXd& y) const { return factor_.solve(tr
 
 MatrixXd Background::covariance() const { return factor_.solve(MatrixXd::Identity(columns_.cols(), columns_.cols())); }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` Z times
 /// unknown numbers of unit variance. The columns are the model's own parameters, in units of their priors, and the
@@ -31,4 +31,4 @@ class Background {
   Eigen::MatrixXd root_;
 };
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

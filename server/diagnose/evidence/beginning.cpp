@@ -1,6 +1,6 @@
 #include "server/diagnose/evidence/beginning.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -44,4 +44,4 @@ std::vector<Index> possible_beginnings(const LinearProblem& problem, const Matri
   return possible;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -3,7 +3,7 @@
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/linear_problem.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Twice the log likelihood by which a beginning may be worse than the best and still be in the 95 % set. The place of
 /// a step is no smooth parameter: chi-square's 3.84 would hold a small step in 73 % of the cases only. c solves 1 - (1
@@ -17,4 +17,4 @@ constexpr double kBeginning95 = 7.35;
                                                             const Background& rest, const Eigen::VectorXd& data,
                                                             Eigen::Index found);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -10,7 +10,7 @@
 #include "server/base/units.h"
 #include "server/robot/arm_state.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -240,4 +240,4 @@ std::vector<Dependence> dependence_of(const LinearProblem& problem, const Backgr
   return found;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

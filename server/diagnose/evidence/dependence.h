@@ -7,7 +7,7 @@
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/linear_problem.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Chance of a distance covariance as large as that of the rows of `x` and `y` (as many each, at least 4) if they are
 /// independent. The rows are permuted until ten permutations are as large (Besag and Clifford 1991). Where 999 of them
@@ -22,4 +22,4 @@ namespace trammel {
 [[nodiscard]] std::vector<Dependence> dependence_of(const LinearProblem& problem, const Background& background,
                                                     const Eigen::VectorXd& left, std::uint64_t seed);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace trammel {
+namespace trammel::cause_search {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -61,4 +61,4 @@ OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source
   return own;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

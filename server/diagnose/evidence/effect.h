@@ -4,7 +4,7 @@
 
 #include "server/diagnose/evidence/linear_problem.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// `model` without the source of that name.
 [[nodiscard]] PhysicalModel without_source(const PhysicalModel& model, const std::string& source);
@@ -25,4 +25,4 @@ struct OwnEstimate {
 [[nodiscard]] OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source,
                                        const Eigen::VectorXd& change, const Eigen::MatrixXd& covariance);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

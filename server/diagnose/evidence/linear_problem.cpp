@@ -7,7 +7,7 @@
 #include "server/base/check.h"
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -219,4 +219,4 @@ double LinearProblem::position_rms(const VectorXd& whitened) const {
   return std::sqrt(positions(whitened).squaredNorm() / static_cast<double>(poses()));
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

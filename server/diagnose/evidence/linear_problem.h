@@ -6,7 +6,7 @@
 
 #include "server/calibrate/calibrate.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// A candidate's effect on the poses: one column a parameter, in units of its prior.
 struct Effect {
@@ -78,4 +78,4 @@ class LinearProblem {
   Spread position_, rotation_;
 };
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

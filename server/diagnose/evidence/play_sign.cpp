@@ -7,7 +7,7 @@
 #include "server/diagnose/thresholds.h"
 #include "server/robot/arm_state.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -78,4 +78,4 @@ std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, boo
   return text + "are the dir columns reversed? So it is in every joint that shows anything";
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

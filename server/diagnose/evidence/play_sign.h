@@ -8,7 +8,7 @@
 /// The sign of play. A joint with play hangs back from where its motor is: after moving up it lies below. So the play
 /// b + k |tau| is positive by definition (backlash.cpp). With the other sign the joint goes beyond where it was sent,
 /// which no gap between teeth does.
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Play of one joint over the poses that were approached from a known side.
 struct PlaySign {
@@ -25,4 +25,4 @@ struct PlaySign {
 /// What may stand behind play of the wrong sign, for people. `every`: no joint has play of the right sign.
 [[nodiscard]] std::string what_negative_play_may_be(const std::vector<PlaySign>& negative, bool every);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -6,7 +6,7 @@
 #include "server/diagnose/evidence/effect.h"
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -144,4 +144,4 @@ double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std:
   return left;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -4,7 +4,7 @@
 
 #include "server/diagnose/evidence/linear_problem.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// An anonymous function that explains what no named cause does.
 struct Unnamed {
@@ -32,4 +32,4 @@ void remove_from(PriorModel& prior_model, const std::string& source);
 /// rows, maximum a posteriori. Returns the sum of squares that is left, that of the priors included.
 double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

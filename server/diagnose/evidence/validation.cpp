@@ -7,7 +7,7 @@
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -90,4 +90,4 @@ Validation validate(const LinearProblem& before, const LinearProblem& after, con
   return validation;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -3,7 +3,7 @@
 #include "server/diagnose/diagnosis.h"
 #include "server/diagnose/evidence/linear_problem.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// The error of held-out rows, before and after.
 struct Validation {
@@ -18,4 +18,4 @@ struct Validation {
 [[nodiscard]] Validation validate(const LinearProblem& before, const LinearProblem& after,
                                   const MeasurementBatch& rows);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -4,14 +4,13 @@
 #include <numeric>
 #include <set>
 
-namespace trammel {
+#include "server/diagnose/thresholds.h"
+
+namespace trammel::cause_search {
 
 namespace {
 
 using Eigen::Index;
-
-constexpr double kBendingFirst = 4;    // nat: links that bend where nobody has asked yet whether the joints do
-constexpr double kLeastWarming = 0.5;  // K between the coldest and the warmest pose
 
 bool any(const MeasurementBatch& batch, const std::function<bool(const PoseContext&)>& has) {
   return std::any_of(batch.measurements.begin(), batch.measurements.end(),
@@ -87,7 +86,7 @@ class Possible {
       leave({"time_lag", -1, "", "", {}}, "a continuous path with times (time_s)");
     }
     if (every(batch_, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
-        warming(batch_) > kLeastWarming) {
+        warming(batch_) > thresholds::kSameTemperature) {
       take("thermal_growth");
     } else {
       leave({"thermal_growth", -1, "", "", {}},
@@ -156,7 +155,8 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
       add(make_step_family(problem, effect, cause, effect.source.substr(0, at)));
       continue;
     }
-    const double surprise = cause.cause == "link_bending" && has_effect(problem, "compliance") ? kBendingFirst : 0;
+    const double surprise =
+        cause.cause == "link_bending" && has_effect(problem, "compliance") ? thresholds::kBendingFirst : 0;
     add(make_fixed_family(problem, effect, cause, all_columns(effect), surprise));
     if (!has_single_parameters(cause.cause) || effect.parameters.size() < 2) continue;
     for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
@@ -196,4 +196,4 @@ Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch) {
   return cause;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

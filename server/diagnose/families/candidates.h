@@ -5,7 +5,7 @@
 
 #include "server/diagnose/families/family.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// The error sources whose effect on the poses is wanted: all that `cell` can have and `batch` can show. What a batch
 /// does not record rules causes out: those are added to `unseen`, with what they would need.
@@ -19,4 +19,4 @@ namespace trammel {
 /// The cause that a source in a model's list stands for.
 [[nodiscard]] Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -11,25 +11,26 @@
 
 /// Candidates for what a model lacks: groups of whitened columns. A family is one cause (of one joint), with whatever
 /// must be searched for within it: an order, the pose at which it begins, a length scale.
-namespace trammel {
+namespace trammel::cause_search {
 
-/// The member of a family that explains a data vector best.
+/// The member of a family that explains a data vector best. A family has at most one of order, pose and length scale.
 struct Best {
-  double evidence = 0;  ///< nat: log marginal likelihood against none of it, its size chosen by the data
-  double strength = 0;  ///< squared whitened size of what it explains
-  int freedom = 0;      ///< how many numbers it needs for that
-  double at = 0;        ///< which member: order, index of a pose, number of a length scale
-  double size = 1;      ///< of a smooth function: its standard deviation in SI
+  double evidence = 0;           ///< nat: log marginal likelihood against none of it, its size chosen by the data
+  double strength = 0;           ///< squared whitened size of what it explains
+  int freedom = 0;               ///< how many numbers it needs for that
+  double order = 0;              ///< of a gear: cycles a joint turn; 0: none yet
+  Eigen::Index pose = 0;         ///< place in the batch at which it begins, or that is out
+  std::size_t length_scale = 0;  ///< of a smooth function: which of those that its family knows
+  double size = 1;               ///< of a smooth function: its standard deviation, SI
 };
 
-/// What a scan sees. With `keep` (R ones and zeros), the rows that are left in.
+/// What a scan sees of the rows.
 struct View {
-  const Background& background;  ///< its columns have zeros where `keep` has
-  const Eigen::VectorXd* keep = nullptr;
+  const Background& background;           ///< with zeros in the rows that are left out
+  const Eigen::VectorXd* keep = nullptr;  ///< R: 1 for a row that is scanned, 0 for one that is left out; null: all
 };
 
-/// What a column g that is multiplied by a function of the pose, g(row) f(pose), needs of a scan: pose by pose instead
-/// of row by row.
+/// A scan summed up pose by pose, for columns g(row) f(pose) of which only the function f of the pose differs.
 struct Shares {
   Eigen::MatrixXd along;   ///< N x k: g's rows of each pose times those of the projected data
   Eigen::MatrixXd root;    ///< N x p: the same with the background's root
@@ -92,4 +93,4 @@ using FamilyPtr = std::unique_ptr<Family>;
 /// The lambda of every order of a joint's gear and the orders, for its periodogram.
 [[nodiscard]] Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

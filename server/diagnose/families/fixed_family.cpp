@@ -2,7 +2,7 @@
 
 #include "server/diagnose/families/family.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -56,7 +56,7 @@ class FixedFamily final : public Family {
   Cause cause(const Best&) const override { return cause_; }
   std::string source(const Best&) const override { return source_; }
   MatrixXd columns(const Best&) const override { return columns_; }
-  Best typical() const override { return {0, 0, static_cast<int>(columns_.cols()), 0, 1}; }
+  Best typical() const override { return {.freedom = static_cast<int>(columns_.cols())}; }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;
@@ -74,7 +74,8 @@ class FixedFamily final : public Family {
     for (Index k = 0; k < projected.cols(); ++k) {
       const double strength = along.col(k).squaredNorm();
       const auto freedom = static_cast<int>(seen);
-      best[static_cast<std::size_t>(k)] = {log_evidence(strength, freedom), strength, freedom, 0, 1};
+      best[static_cast<std::size_t>(k)] = {
+          .evidence = log_evidence(strength, freedom), .strength = strength, .freedom = freedom};
     }
     return best;
   }
@@ -93,4 +94,4 @@ FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause ca
   return std::make_unique<FixedFamily>(std::move(cause), effect.source, effect.columns(Eigen::all, chosen), surprise);
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -3,9 +3,10 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/families/family.h"
+#include "server/diagnose/thresholds.h"
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -14,12 +15,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kAmplitude = 1e-3;      // rad, prior: wide, the data choose
-constexpr double kLowestOrder = 2;       // below lie eccentricity and geometry
-constexpr double kHighestOrder = 200;    // cycles a joint turn
-constexpr double kStep = 0.2;            // of what two orders differ by that the joint's range just tells apart
-constexpr double kFineSteps = 5;         // to a coarse one, about the best
-constexpr double kSmallestSpan = 0.035;  // rad
+constexpr double kAmplitude = 1e-3;    // rad, prior: wide, the data choose
+constexpr double kLowestOrder = 2;     // below lie eccentricity and geometry
+constexpr double kHighestOrder = 200;  // cycles a joint turn
+constexpr double kStep = 0.2;          // of what two orders differ by that the joint's range just tells apart
+constexpr double kFineSteps = 5;       // to a coarse one, about the best
+constexpr double kTypicalOrder = 50;   // cycles a joint turn: to speak of a gear where none was found
 constexpr Index kOrdersAtATime = 96;
 
 class GearFamily final : public Family {
@@ -29,18 +30,18 @@ class GearFamily final : public Family {
     for (Index i = 0; i < q_.size(); ++i)
       q_(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint);
     const double span = q_.maxCoeff() - q_.minCoeff();
-    step_ = kStep * 2 * kPi / std::max(span, kSmallestSpan);
+    step_ = kStep * 2 * kPi / std::max(span, thresholds::kSmallestSpan);
     orders_ = 1 + static_cast<Index>((kHighestOrder - kLowestOrder) / step_);
   }
 
-  bool moves() const { return q_.maxCoeff() - q_.minCoeff() > kSmallestSpan; }
+  bool moves() const { return q_.maxCoeff() - q_.minCoeff() > thresholds::kSmallestSpan; }
   Cause cause(const Best& best) const override {
-    return {"gear_transmission", joint_, "", "", best.at > 0 ? std::optional<double>(best.at) : std::nullopt};
+    return {"gear_transmission", joint_, "", "", best.order > 0 ? std::optional<double>(best.order) : std::nullopt};
   }
   std::string source(const Best& best) const override {
-    return fmt::format("gear_transmission:{}@{:.4f}", joint_ + 1, best.at);
+    return fmt::format("gear_transmission:{}@{:.4f}", joint_ + 1, best.order);
   }
-  Best typical() const override { return {0, 0, 2, 50, 1}; }
+  Best typical() const override { return {.freedom = 2, .order = kTypicalOrder}; }
 
   MatrixXd columns(const Best& best) const override {
     MatrixXd C(problem_.rows(), 2);
@@ -48,8 +49,8 @@ class GearFamily final : public Family {
       const Index row = problem_.first_row(i);
       const Index count = problem_.row_count(i);
       const auto turn = problem_.by_joint().col(joint_).segment(row, count);
-      C.col(0).segment(row, count) = kAmplitude * std::sin(best.at * q_(i)) * turn;
-      C.col(1).segment(row, count) = kAmplitude * std::cos(best.at * q_(i)) * turn;
+      C.col(0).segment(row, count) = kAmplitude * std::sin(best.order * q_(i)) * turn;
+      C.col(1).segment(row, count) = kAmplitude * std::cos(best.order * q_(i)) * turn;
     }
     return C;
   }
@@ -64,7 +65,7 @@ class GearFamily final : public Family {
     // Once more about the best of the data itself, which stands in the first column.
     if (projected.cols() == 1) {
       const double fine = step_ / kFineSteps;
-      const double from = std::max(kLowestOrder, best[0].at - step_);
+      const double from = std::max(kLowestOrder, best[0].order - step_);
       scan_orders(shares, from, fine, static_cast<Index>(2 * kFineSteps) + 1, best);
     }
     for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
@@ -116,7 +117,9 @@ class GearFamily final : public Family {
       const ArrayXd strength = (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant;
       for (Index d = 0; d < strength.size(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
-        if (strength(d) > one.strength) one = {0, strength(d), 2, from + step * static_cast<double>(k), 1};
+        if (strength(d) > one.strength) {
+          one = {.strength = strength(d), .freedom = 2, .order = from + step * static_cast<double>(k)};
+        }
       }
     }
   }
@@ -140,4 +143,4 @@ Periodogram periodogram(const LinearProblem& problem, int joint, const Backgroun
   return GearFamily(problem, joint).all_orders(background);
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

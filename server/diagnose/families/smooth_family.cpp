@@ -3,9 +3,10 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/families/family.h"
+#include "server/diagnose/thresholds.h"
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -13,8 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kBox = 1.2;             // half width of the box that the basis lives in; data lie in [-1, 1]
-constexpr double kSmallestSpan = 0.035;  // rad
+constexpr double kBox = 1.2;  // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr Index kFunctionsOfOne = 16;
 constexpr Index kFunctionsOfEach = 7;                      // of two
 constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
@@ -85,7 +85,7 @@ class SmoothFamily : public Family {
   }
 
   MatrixXd columns(const Best& best) const final {
-    const VectorXd& deviation = deviations_[static_cast<std::size_t>(best.at)];
+    const VectorXd& deviation = deviations_[best.length_scale];
     const Index each = deviation.size();
     MatrixXd all(problem_.rows(), static_cast<Index>(g_.size()) * each);
     for (Index i = 0; i < problem_.poses(); ++i) {
@@ -98,7 +98,7 @@ class SmoothFamily : public Family {
     }
     return all;
   }
-  Best typical() const final { return {0, 0, 1, static_cast<double>(deviations_.size() - 1), typical_}; }
+  Best typical() const final { return {.freedom = 1, .length_scale = deviations_.size() - 1, .size = typical_}; }
 
  protected:
   const LinearProblem& problem_;
@@ -137,8 +137,13 @@ class SmoothFamily : public Family {
       for (Index d = 0; d < strength.size(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
         const double evidence = 0.5 * (strength(d) - cost);
-        if (evidence > one.evidence)
-          one = {evidence, strength(d), static_cast<int>(std::ceil(freedom)), static_cast<double>(scale), size};
+        if (evidence > one.evidence) {
+          one = {.evidence = evidence,
+                 .strength = strength(d),
+                 .freedom = static_cast<int>(std::ceil(freedom)),
+                 .length_scale = scale,
+                 .size = size};
+        }
       }
     }
   }
@@ -163,7 +168,7 @@ class JointMapFamily final : public SmoothFamily {
   }
   Cause cause(const Best&) const override { return {"joint_map", joint_, "", "", {}}; }
   std::string source(const Best& best) const override {
-    return fmt::format("joint_map:{}@{}", joint_ + 1, kHarmonics[static_cast<std::size_t>(best.at)]);
+    return fmt::format("joint_map:{}@{}", joint_ + 1, kHarmonics[best.length_scale]);
   }
 
  private:
@@ -212,7 +217,7 @@ class AnonymousFamily final : public SmoothFamily {
 
 FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint) {
   const VectorXd q = angles(problem, joint);
-  if (q.maxCoeff() - q.minCoeff() < kSmallestSpan) return nullptr;
+  if (q.maxCoeff() - q.minCoeff() < thresholds::kSmallestSpan) return nullptr;
   return std::make_unique<JointMapFamily>(problem, joint, q);
 }
 
@@ -221,7 +226,7 @@ FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<
   std::vector<VectorXd> x;
   for (const int joint : joints) {
     on.push_back(fmt::format("q{}", joint + 1));
-    x.push_back(spread(angles(problem, joint), kSmallestSpan));
+    x.push_back(spread(angles(problem, joint), thresholds::kSmallestSpan));
   }
   if (joints.empty()) {
     on.emplace_back("time");
@@ -231,4 +236,4 @@ FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<
   return std::make_unique<AnonymousFamily>(problem, std::move(on), x);
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include "server/diagnose/families/family.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -28,12 +28,10 @@ class StepFamily final : public Family {
   }
   MatrixXd columns(const Best& best) const override {
     MatrixXd C = columns_;
-    C.topRows(problem_.first_row(static_cast<Index>(best.at))).setZero();
+    C.topRows(problem_.first_row(best.pose)).setZero();
     return C;
   }
-  Best typical() const override {
-    return {0, 0, static_cast<int>(columns_.cols()), static_cast<double>(problem_.poses() / 2), 1};
-  }
+  Best typical() const override { return {.freedom = static_cast<int>(columns_.cols()), .pose = problem_.poses() / 2}; }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const Index m = columns_.cols();
@@ -56,7 +54,7 @@ class StepFamily final : public Family {
       for (Index d = 0; d < projected.cols(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
         const double strength = whitened.col(d).squaredNorm();
-        if (strength > one.strength) one = {0, strength, static_cast<int>(m), static_cast<double>(i), 1};
+        if (strength > one.strength) one = {.strength = strength, .freedom = static_cast<int>(m), .pose = i};
       }
     }
     for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
@@ -65,7 +63,7 @@ class StepFamily final : public Family {
 
  private:
   const Measurement& measurement(const Best& best) const {
-    return problem_.batch().measurements[static_cast<std::size_t>(best.at)];
+    return problem_.batch().measurements[static_cast<std::size_t>(best.pose)];
   }
 
   const LinearProblem& problem_;
@@ -79,11 +77,11 @@ class OutlierFamily final : public Family {
   explicit OutlierFamily(const LinearProblem& problem) : problem_(problem) {}
 
   Cause cause(const Best& best) const override {
-    return {"outlier", -1, "", problem_.batch().measurements[static_cast<std::size_t>(best.at)].pose_id, {}};
+    return {"outlier", -1, "", problem_.batch().measurements[static_cast<std::size_t>(best.pose)].pose_id, {}};
   }
   bool predicts() const override { return false; }
   MatrixXd columns(const Best& best) const override {
-    const auto pose = static_cast<Index>(best.at);
+    const Index pose = best.pose;
     MatrixXd C = MatrixXd::Zero(problem_.rows(), problem_.row_count(pose));
     C.middleRows(problem_.first_row(pose), C.cols()).setIdentity();
     return kPriorSigmas * C;
@@ -117,7 +115,9 @@ class OutlierFamily final : public Family {
       Best& one = best[static_cast<std::size_t>(d)];
       const double strength = whitened.col(d).squaredNorm();
       const double evidence = log_evidence(strength, static_cast<double>(count));
-      if (evidence > one.evidence) one = {evidence, strength, static_cast<int>(count), static_cast<double>(pose), 1};
+      if (evidence > one.evidence) {
+        one = {.evidence = evidence, .strength = strength, .freedom = static_cast<int>(count), .pose = pose};
+      }
     }
   }
 
@@ -132,4 +132,4 @@ FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, C
 
 FamilyPtr make_outlier_family(const LinearProblem& problem) { return std::make_unique<OutlierFamily>(problem); }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -5,7 +5,7 @@
 
 #include "server/numerics/product.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kFolds = 8;
-constexpr Index kRunsPerFold = 5;
+constexpr Index kRunsPerFold = 5;  // so that every fold has poses of the whole batch
 
 VectorXd ones_without(Index rows, const std::vector<Index>& held) {
   VectorXd keep = VectorXd::Ones(rows);
@@ -85,4 +85,4 @@ Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<Fam
   return gain;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -5,7 +5,7 @@
 
 #include "server/diagnose/search/scan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Poses held out in turn: short runs of poses that were measured one after the other, dealt to a few folds, so that
 /// what creeps along with time does not leak from the poses next to a held-out one. Every fold fits `columns` (R x p,
@@ -37,4 +37,4 @@ class Folds {
   Eigen::MatrixXd total_;                        // of all rows, priors included
 };
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -5,7 +5,7 @@
 #include "server/diagnose/evidence/effect.h"
 #include "server/diagnose/search/folds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -115,4 +115,4 @@ bool leaves_compliance_open(const std::vector<std::string>& sources) {
   return std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

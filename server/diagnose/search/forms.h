@@ -4,7 +4,7 @@
 
 /// The forms in which a cause can go into a model: one of the forms of compliance, a map of more or fewer harmonics.
 /// Poses held out decide between them.
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Adds the source of `one` to `result.after`, in place of that of `poorer` where there is one, in the form that
 /// predicts poses held out best, and identifies all parameters anew. False, and nothing is changed, where they are
@@ -19,4 +19,4 @@ void choose_compliance_again(SearchResult& result, bool own_is_open);
 /// Whether a cell's list of error sources leaves the form of the compliance open.
 [[nodiscard]] bool leaves_compliance_open(const std::vector<std::string>& sources);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

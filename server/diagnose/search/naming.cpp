@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
-namespace trammel {
+#include "server/diagnose/thresholds.h"
+
+namespace trammel::cause_search {
 
 namespace {
 
@@ -10,21 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kRepetitions = 100;
-constexpr double kSureFrequency = 0.9;
-constexpr double kRivalFrequency = 0.03;
-constexpr double kMargin = 1.5;         // nat: odds of 4.5 to 1
-constexpr double kSafeMargin = 2.5;     // nat: odds of 12 to 1
-constexpr double kSameEffect = 0.9025;  // square of the canonical correlation 0.95
-constexpr double kRelated = 0.4;        // the same of 0.63
-constexpr double kTouches = 0.1;        // less is a coincidence
-constexpr double kAsGood = 6;           // of strength
-constexpr double kBeyondDoubt = 8;      // nat: nearly the same effect, from so many more numbers, is no accident
-constexpr double kAllOfIt = 0.995;      // the same of 0.9975: no strength of the effect tells them apart
-constexpr double kContender = 0.15;     // of the best score
-constexpr double kPathStep = 0.2;       // rad
-constexpr double kAtOnce = 0.05;        // of the poses
-constexpr double kShapeError = 0.02;    // of strength: real causes are not quite shaped like their models
+constexpr Index kRepetitions = 100;  // of the batch: a share of 90 % is known to 3 %
 
 bool no_rival(const Cause& named, const Cause& other) {
   return is_description_of(other, named) || is_whole_of(named, other);
@@ -32,7 +20,7 @@ bool no_rival(const Cause& named, const Cause& other) {
 
 /// A step so near to the first pose that it stands for something that always acted.
 bool begins_at_once(const Cause& cause, const Best& best, Index poses) {
-  return !cause.pose_id.empty() && best.at < kAtOnce * static_cast<double>(poses);
+  return !cause.pose_id.empty() && static_cast<double>(best.pose) < thresholds::kAtOnce * static_cast<double>(poses);
 }
 
 VectorXd fitted(const Background& background, const MatrixXd& columns, const VectorXd& data) {
@@ -70,7 +58,7 @@ namespace {
 bool is_path(const MeasurementBatch& batch) {
   for (std::size_t i = 1; i < batch.measurements.size(); ++i) {
     const JointVector step = batch.measurements[i].context.q - batch.measurements[i - 1].context.q;
-    if (step.cwiseAbs().maxCoeff() > kPathStep) return false;
+    if (step.cwiseAbs().maxCoeff() > thresholds::kPathStep) return false;
   }
   return true;
 }
@@ -98,55 +86,114 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
   return rivals;
 }
 
+namespace {
+
+/// The cause at `place` of a scan, and how its effect as fitted looks to all the others.
+class Doubt {
+ public:
+  Doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
+        const Scan& seen, std::size_t place)
+      : problem_(problem),
+        families_(families),
+        background_(background),
+        seen_(seen),
+        place_(place),
+        effect_(fitted(background, families[place]->columns(seen.best[place]), problem.residual())),
+        projected_(background.project(effect_)),
+        whole_(effect_.dot(projected_.col(0))) {}
+
+  /// Repeats the batch in simulation, with the effect as it was fitted.
+  void repeat(const Chance& chance, std::uint64_t seed) {
+    repeated_ = winners(families_, background_, draw_null(background_, kRepetitions, seed).colwise() + effect_, chance,
+                        [&](std::size_t f) { return contends(f); });
+  }
+  /// Share of the repetitions that give the name, or that of something that is no rival for it.
+  [[nodiscard]] double frequency() const {
+    double sum = 0;
+    for (std::size_t f = 0; f < families_.size(); ++f) {
+      if (families_[f]->named() && (f == place_ || no_rival(cause(), families_[f]->cause(seen_.best[f]))))
+        sum += share_of(f);
+    }
+    return sum;
+  }
+  /// Whether the cause at `f` explains the data as well. `frequency`: as above.
+  [[nodiscard]] bool is_rival(std::size_t f, double frequency) const;
+
+ private:
+  [[nodiscard]] Cause cause() const { return families_[place_]->cause(seen_.best[place_]); }
+  /// What explains nothing of the data cannot win their repetitions.
+  [[nodiscard]] bool contends(std::size_t f) const {
+    return seen_.score[f] > thresholds::kNamingContender * seen_.score[place_];
+  }
+  [[nodiscard]] double share_of(std::size_t f) const {
+    return static_cast<double>(std::count(repeated_.family.begin(), repeated_.family.end(), static_cast<int>(f))) /
+           static_cast<double>(repeated_.family.size());
+  }
+  /// Repetitions tell how often such data decide; these data may have decided.
+  [[nodiscard]] bool is_decided(std::size_t f, double frequency) const {
+    const double margin = frequency < thresholds::kSureFrequency ? thresholds::kDecidedUnsure : thresholds::kDecided;
+    return gap(f) > std::max(margin, thresholds::kShapeError * seen_.best[place_].strength);
+  }
+  /// nat.
+  [[nodiscard]] double gap(std::size_t f) const { return seen_.score[place_] - seen_.score[f]; }
+  [[nodiscard]] bool is_as_good(std::size_t f, double made) const;
+
+  const LinearProblem& problem_;
+  const std::vector<FamilyPtr>& families_;
+  const Background& background_;
+  const Scan& seen_;
+  std::size_t place_;
+  VectorXd effect_;
+  MatrixXd projected_;
+  double whole_;  // strength of the effect
+  Winners repeated_;
+};
+
+bool Doubt::is_rival(std::size_t f, double frequency) const {
+  if (f == place_ || !families_[f]->named() || !families_[f]->predicts() || !contends(f)) return false;
+  const Cause other = families_[f]->cause(seen_.best[f]);
+  const bool decided = is_decided(f, frequency);
+  // A more general description that is as likely says that the special one is not sure.
+  const bool only_describes =
+      no_rival(cause(), other) && (decided || other.cause != "joint_map" || cause().cause != "gear_transmission");
+  if (only_describes || begins_at_once(other, seen_.best[f], problem_.poses())) return false;
+  const double made = families_[f]->scan({background_}, projected_).front().strength;
+  if (is_as_good(f, made)) return true;
+  // Another cause may be there as well: only what makes much of this effect is a rival for it.
+  const bool related = made > thresholds::kRelatedShare * whole_;
+  const bool wins = frequency < thresholds::kSureFrequency && share_of(f) > thresholds::kRivalFrequency &&
+                    made > thresholds::kCoincidenceShare * whole_;
+  return !decided && (related || wins);
+}
+
+/// Whether the cause at `f`, which makes so much of the effect's strength, does the same to the poses and explains the
+/// data nearly as well.
+bool Doubt::is_as_good(std::size_t f, double made) const {
+  const Best& best = seen_.best[place_];
+  const double lacks = (best.strength - best.freedom) - (seen_.best[f].strength - seen_.best[f].freedom);
+  return made > thresholds::kSameShare * whole_ &&
+         lacks < std::max(thresholds::kAsGoodStrength, thresholds::kShapeError * best.strength) &&
+         (made > thresholds::kWholeShare * whole_ || gap(f) < thresholds::kMoreNumbers);
+}
+
+void add(std::vector<Cause>& causes, const Cause& cause) {
+  if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
+}
+
+}  // namespace
+
 Naming name_or_doubt(const LinearProblem& problem, const std::vector<FamilyPtr>& families, const Background& background,
                      const Scan& seen, const Chance& chance, std::size_t place, std::uint64_t seed) {
-  const Best& best = seen.best[place];
-  const Cause cause = families[place]->cause(best);
-  const VectorXd effect = fitted(background, families[place]->columns(best), problem.residual());
-  // What explains nothing of the data cannot win their repetitions.
-  const auto contends = [&](std::size_t f) { return seen.score[f] > kContender * seen.score[place]; };
-  const Winners repeated =
-      winners(families, background, draw_null(background, kRepetitions, seed).colwise() + effect, chance, contends);
-  const auto share_of = [&](std::size_t f) {
-    return static_cast<double>(std::count(repeated.family.begin(), repeated.family.end(), static_cast<int>(f))) /
-           static_cast<double>(repeated.family.size());
-  };
-  const MatrixXd projected = background.project(effect);
-  const double whole = effect.dot(projected.col(0));
-
-  Naming naming{0, {}};
+  Doubt doubt(problem, families, background, seen, place);
+  doubt.repeat(chance, seed);
+  Naming naming{doubt.frequency(), {}};
   for (std::size_t f = 0; f < families.size(); ++f) {
-    if (families[f]->named() && (f == place || no_rival(cause, families[f]->cause(seen.best[f]))))
-      naming.frequency += share_of(f);
+    if (doubt.is_rival(f, naming.frequency)) naming.could_also_be.push_back(families[f]->cause(seen.best[f]));
   }
-  for (std::size_t f = 0; f < families.size(); ++f) {
-    if (!families[f]->named() || !families[f]->predicts() || !contends(f)) continue;
-    const Cause other = families[f]->cause(seen.best[f]);
-    // Repetitions tell how often such data decide; these data may have decided.
-    const double margin = naming.frequency < kSureFrequency ? kSafeMargin : kMargin;
-    const double gap = seen.score[place] - seen.score[f];
-    const bool decided = gap > std::max(margin, kShapeError * best.strength);
-    // A more general description that is as likely says that the special one is not sure.
-    const bool only_describes =
-        no_rival(cause, other) && (decided || other.cause != "joint_map" || cause.cause != "gear_transmission");
-    if (f == place || only_describes || begins_at_once(other, seen.best[f], problem.poses())) continue;
-    const Best of_effect = families[f]->scan({background}, projected).front();
-    const bool same_effect = of_effect.strength > kSameEffect * whole;
-    const double lacks = (best.strength - best.freedom) - (seen.best[f].strength - seen.best[f].freedom);
-    const bool can_do_it_all = of_effect.strength > kAllOfIt * whole;
-    const bool as_good =
-        same_effect && lacks < std::max(kAsGood, kShapeError * best.strength) && (can_do_it_all || gap < kBeyondDoubt);
-    // Another cause may be there as well: only what makes much of this effect is a rival for it.
-    const bool related = of_effect.strength > kRelated * whole;
-    const bool wins =
-        naming.frequency < kSureFrequency && share_of(f) > kRivalFrequency && of_effect.strength > kTouches * whole;
-    if (as_good || (!decided && (related || wins))) naming.could_also_be.push_back(other);
-  }
-  for (const Cause& rival : untestable_rivals(cause, problem.batch())) {
-    if (std::find(naming.could_also_be.begin(), naming.could_also_be.end(), rival) == naming.could_also_be.end())
-      naming.could_also_be.push_back(rival);
+  for (const Cause& rival : untestable_rivals(families[place]->cause(seen.best[place]), problem.batch())) {
+    add(naming.could_also_be, rival);
   }
   return naming;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

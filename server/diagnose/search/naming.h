@@ -2,7 +2,7 @@
 
 #include "server/diagnose/search/scan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Whether `whole` is `step` from the first pose on: a base that is elsewhere for a tracker that moved, and so on. A
 /// step near the first pose looks like it, and is the less likely of the two.
@@ -26,4 +26,4 @@ struct Naming {
                                    const Background& background, const Scan& seen, const Chance& chance,
                                    std::size_t place, std::uint64_t seed);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

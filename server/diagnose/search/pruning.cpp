@@ -5,7 +5,7 @@
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/effect.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -55,4 +55,4 @@ std::optional<std::size_t> weak_function(const SearchResult& result, double limi
   return std::nullopt;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include "server/diagnose/search/search_result.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// The place in `result.accepted` of the first cause that does not pass `limit` (nat) any more beside all the rest;
 /// empty where all pass.
@@ -11,4 +11,4 @@ namespace trammel {
 /// The same of an anonymous function in `result.unnamed`.
 [[nodiscard]] std::optional<std::size_t> weak_function(const SearchResult& result, double limit);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -11,8 +11,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kRepetitions = 25;
-constexpr double kStrengths[] = {5, 15, 30, 45, 60, 90, 150};
+constexpr Index kRepetitions = 25;                             // of each size: a share is known to a tenth
+constexpr double kStrengths[] = {5, 15, 30, 45, 60, 90, 150};  // hidden, from never named to always
 
 }  // namespace
 
@@ -49,4 +49,4 @@ std::vector<Recovery> recovery_of(const LinearProblem& problem, const std::vecto
   return all;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include "server/diagnose/search/scan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Hides causes of a few sizes in noise on the user's own poses, and counts how often each is named. `places`: families
 /// to hide.
@@ -10,4 +10,4 @@ namespace trammel {
                                                 const Background& background, const Chance& chance,
                                                 const std::vector<std::size_t>& places, std::uint64_t seed);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

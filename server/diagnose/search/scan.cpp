@@ -6,7 +6,7 @@
 
 #include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -122,4 +122,4 @@ Winners winners(const std::vector<FamilyPtr>& families, const Background& backgr
   return winners;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

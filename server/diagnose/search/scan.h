@@ -9,7 +9,7 @@
 
 #include "server/diagnose/families/family.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// What chance alone brings at these poses, from a parametric bootstrap of the background.
 struct Chance {
@@ -61,4 +61,4 @@ struct Winners {
                               const Eigen::MatrixXd& data, const Chance& chance,
                               const std::function<bool(std::size_t)>& admitted = {});
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

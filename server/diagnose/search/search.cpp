@@ -10,7 +10,7 @@
 #include "server/diagnose/search/standing.h"
 #include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -46,7 +46,7 @@ class Search {
   [[nodiscard]] Result<bool> step();
   /// Drops one that does not pass any more beside all the rest; false where all pass.
   [[nodiscard]] bool prune();
-  void choose_compliance_again() { trammel::choose_compliance_again(result_, own_compliance_is_open_); }
+  void choose_compliance_again() { cause_search::choose_compliance_again(result_, own_compliance_is_open_); }
   /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
   /// more like it.
   [[nodiscard]] Status reconsider();
@@ -235,7 +235,7 @@ void Search::take_outlier(const LinearProblem& problem, Accepted one) {
     result_.too_many_outliers = true;
     return;
   }
-  const auto pose = static_cast<Index>(one.best.at);
+  const Index pose = one.best.pose;
   const auto out = result_.batch.measurements.begin() + pose;
   one.pose = {.pose_id = out->pose_id,
               .row = out->row,
@@ -394,4 +394,4 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
   return search.take();
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -7,7 +7,7 @@
 #include "server/diagnose/diagnose_options.h"
 #include "server/diagnose/search/search_result.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// Forward selection, one cause at a time, each on what the model found so far leaves over. The best candidate is
 /// accepted if it passes the line that the best of all candidates passes by chance in 3 of 1000 batches, and if it
@@ -19,4 +19,4 @@ namespace trammel {
                                                  const std::vector<std::string>& sources, const MeasurementBatch& batch,
                                                  const DiagnoseOptions& options);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

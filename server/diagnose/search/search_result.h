@@ -7,7 +7,7 @@
 #include "server/diagnose/evidence/refine.h"
 #include "server/diagnose/search/scan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// A cause that was accepted.
 struct Accepted {
@@ -40,4 +40,4 @@ struct SearchResult {
   bool too_many_outliers = false;  ///< more poses are out than may be; the rest stayed in
 };
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -4,7 +4,7 @@
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -23,7 +23,7 @@ Standing::Standing(const SearchResult& found)
       background(columns) {}
 
 Scan Standing::scan(const Chance& chance) const {
-  return trammel::scan(families, {background}, problem.residual(), chance);
+  return cause_search::scan(families, {background}, problem.residual(), chance);
 }
 
 std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families, const Choice& choice) {
@@ -37,4 +37,4 @@ std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families, co
   return simpler && seen.score[*simpler] > seen.score[*strongest] - thresholds::kSimplerMargin ? simpler : strongest;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

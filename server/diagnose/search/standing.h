@@ -5,7 +5,7 @@
 
 #include "server/diagnose/search/search_result.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// What the model found so far leaves over, and all that may explain it. `found` outlives it.
 struct Standing {
@@ -35,4 +35,4 @@ struct Choice {
 /// and a map of a joint's angle to an eccentric encoder.
 [[nodiscard]] std::optional<std::size_t> best_named(const std::vector<FamilyPtr>& families, const Choice& choice);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -4,25 +4,20 @@
 #include <cmath>
 #include <map>
 
-#include "server/diagnose/search/naming.h"
+#include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
 constexpr double kBetweenPoses = 30;  // s, as a tracker and a robot take that measure one after the other
 constexpr double kWarming = 5;        // K over the batch
-constexpr double kConstant = 0.5;     // K between the coldest and the warmest pose
 constexpr double kUnrecorded = 1e9;
 constexpr double kWarmingScale = 0.5;  // of the batch: the time constant of its approach
 
 bool none(const MeasurementBatch& batch, bool (*has)(const PoseContext&)) {
   return std::none_of(batch.measurements.begin(), batch.measurements.end(),
                       [&](const Measurement& m) { return has(m.context); });
-}
-
-void add(std::vector<Cause>& causes, const Cause& cause) {
-  if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
 }
 
 }  // namespace
@@ -76,28 +71,8 @@ bool is_by_surrogate(const Surrogates& surrogates, const Cause& cause) {
          (surrogates.direction && cause.cause == "backlash");
 }
 
-void doubt_what_was_not_recorded(const Surrogates& surrogates, const MeasurementBatch& recorded,
-                                 std::vector<Finding>& findings) {
-  for (Finding& finding : findings) {
-    for (const Cause& rival : untestable_rivals(finding.cause, recorded)) add(finding.could_also_be, rival);
-    if (!is_by_surrogate(surrogates, finding.cause)) continue;
-    if (finding.cause.cause == "backlash") {
-      add(finding.could_also_be, {"unknown", finding.cause.joint, "", "", {}});
-      finding.action =
-          "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
-      continue;
-    }
-    // Hours and kelvins are made up here, and so are the numbers per hour and per kelvin.
-    finding.parameters.clear();
-    if (finding.cause.cause == "thermal_growth") add(finding.could_also_be, {"tracker_drift", -1, "", "", {}});
-    if (finding.could_also_be.empty()) add(finding.could_also_be, {"unknown", -1, "", "", {}});
-    finding.action = fmt::format(
-        "record {} with every pose, and measure reference reflectors in between: what was not recorded was taken from "
-        "the order of the rows",
-        !surrogates.temperature ? "the time (time_s)"
-        : surrogates.time       ? "temperature and time (temperature_c, time_s)"
-                                : "the temperature (temperature_c)");
-  }
+bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause) {
+  return is_by_surrogate(surrogates, cause) && cause.cause != "backlash";
 }
 
 std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model, const MeasurementBatch& recorded) {
@@ -121,11 +96,12 @@ std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model, const M
       std::minmax_element(rows.begin(), rows.end(), [](const Measurement& a, const Measurement& b) {
         return a.context.temperature.value_or(-kUnrecorded) < b.context.temperature.value_or(-kUnrecorded);
       });
-  const bool constant = low->context.temperature && *high->context.temperature - *low->context.temperature < kConstant;
+  const bool constant =
+      low->context.temperature && *high->context.temperature - *low->context.temperature < thresholds::kSameTemperature;
   const bool lengths = std::any_of(model.sources.begin(), model.sources.end(),
                                    [](const ErrorSourcePtr& source) { return source->name() == "geometry"; });
   if (constant && lengths) pairs.push_back({{{"thermal_growth", -1, "", "", {}}, {"geometry", -1, "", "", {}}}, 1});
   return pairs;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -2,7 +2,7 @@
 
 #include "server/diagnose/diagnosis.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// What a batch does not record, put in from the order of its rows, so that its causes are looked for all the same:
 /// the time goes on by the row, the arm warms up along it, and a joint comes from the side on which it was before.
@@ -21,15 +21,12 @@ void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch);
 
 /// Whether the cause was looked for by a surrogate only.
 [[nodiscard]] bool is_by_surrogate(const Surrogates& surrogates, const Cause& cause);
-
-/// A cause that was found by a surrogate is never sure: adds to each finding what it may be instead, and says in its
-/// action what to record. `recorded`: the batch without surrogates.
-void doubt_what_was_not_recorded(const Surrogates& surrogates, const MeasurementBatch& recorded,
-                                 std::vector<Finding>& findings);
+/// Whether its numbers are per hour or per kelvin that a surrogate made up.
+[[nodiscard]] bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause);
 
 /// Causes whose circumstances were recorded and the same at all poses (one side of approach, one temperature), so that
 /// the geometry of `model` takes them over whole.
 [[nodiscard]] std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model,
                                                            const MeasurementBatch& recorded);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -16,7 +16,7 @@
 #include "server/diagnose/tell/separability.h"
 #include "server/diagnose/tell/wording.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -24,8 +24,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPeriodogramLine = 0.01;
-constexpr std::size_t kRecoveries = 3;
+constexpr double kPeriodogramLine = 0.01;  // share of the batches in which chance passes the line of a periodogram
+constexpr std::size_t kRecoveries = 3;     // curves on the page
 
 LinearProblem problem_of(const Cell& cell, const PriorModel& model, const MeasurementBatch& batch) {
   return {model.model, batch, model.priors, candidate_sources(cell, batch, nullptr)};
@@ -86,7 +86,7 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   std::iota(chosen.begin(), chosen.end(), Index{0});
   std::vector<WaterfallStep> tail;
   for (auto finding = found.accepted.rbegin(); finding != found.accepted.rend(); ++finding) {
-    if (finding->source.empty()) continue;
+    if (finding->is_outlier()) continue;
     const Background fitted(after.nuisance()(Eigen::all, chosen));
     tail.push_back({to_string(finding->cause), after.position_rms(data - fitted.columns() * fitted.estimate(data))});
     data += effect_of_source(after, finding->in_model);
@@ -142,19 +142,11 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
                    Diagnosis& diagnosis) {
   const SearchResult& found = explained.found;
-  diagnosis.findings = findings_of(found, explained.after);
-  if (prepared.surrogates.time) {
-    for (Finding& finding : diagnosis.findings) {
-      for (PossibleBeginning& place : finding.may_begin_at) place.time.reset();
-    }
-  }
-  doubt_what_was_not_recorded(prepared.surrogates, recorded, diagnosis.findings);
   diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
-  doubt_beside(diagnosis.unexplained, diagnosis.findings);
-  doubt_single_orders(diagnosis.findings);
+  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded);
   diagnosis.verdict = verdict_of(diagnosis);
   for (const Accepted& one : found.accepted) {
-    if (one.source.empty()) diagnosis.suspects.push_back(one.pose);
+    if (one.is_outlier()) diagnosis.suspects.push_back(one.pose);
   }
 }
 
@@ -283,4 +275,4 @@ void tell_limits(const Explained& explained, const PreparedBatch& prepared, cons
     limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

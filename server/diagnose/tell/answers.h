@@ -9,7 +9,7 @@
 #include "server/measurement/repeats.h"
 
 /// What a search found, told: each function fills its part of a diagnosis.
-namespace trammel {
+namespace trammel::cause_search {
 
 /// A batch made ready to be searched.
 struct PreparedBatch {
@@ -55,4 +55,4 @@ void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& fam
 void tell_limits(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
                  Diagnosis& diagnosis);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -9,18 +9,17 @@
 #include "server/diagnose/evidence/effect.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
+#include "server/diagnose/tell/doubts.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kDwarfed = 0.25;   // of the size of what is unknown
-constexpr double kOthersSpeak = 5;  // nat
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -116,7 +115,7 @@ bool others_speak(const LinearProblem& problem, const Accepted& one, const Estim
   for (Index i = 0; i < own.size.size(); ++i) {
     if (priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])].name != one.cause.parameter) continue;
     const double alone = std::pow(own.precision.row(i).dot(own.size), 2) / own.precision(i, i);
-    return log_evidence(own.strength() - alone, static_cast<double>(own.size.size() - 1)) > kOthersSpeak;
+    return log_evidence(own.strength() - alone, static_cast<double>(own.size.size() - 1)) > thresholds::kOthersSpeak;
   }
   return false;
 }
@@ -129,111 +128,143 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
-/// The poses at which `one` may have begun, given what `effect` it has and everything else that is free.
-std::vector<PossibleBeginning> beginnings_of(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
-                                             const Accepted& one, const VectorXd& effect, const Background& rest) {
-  const auto family = std::find_if(families.begin(), families.end(), [&](const FamilyPtr& other) {
+/// A search's findings, measured beside each other.
+class Findings {
+ public:
+  Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
+           const Surrogates& surrogates, const MeasurementBatch& recorded);
+
+  [[nodiscard]] Finding of(const Accepted& one) const { return one.is_outlier() ? outlier(one) : cause(one); }
+
+ private:
+  [[nodiscard]] Finding outlier(const Accepted& one) const;
+  [[nodiscard]] Finding cause(const Accepted& one) const;
+  /// As it is told: by one number only where that is alone.
+  [[nodiscard]] Cause named(const Accepted& one) const;
+  /// The poses at which `one` may have begun, given its `effect` and everything else that is free (`rest`).
+  [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one, const VectorXd& effect,
+                                                          const Background& rest) const;
+  /// The family of `one`; null where it does not begin at a pose.
+  [[nodiscard]] const Family* step_family(const Accepted& one) const;
+
+  const LinearProblem& problem_;
+  const Surrogates& surrogates_;
+  std::vector<Cause> causes_;
+  Beside beside_;
+  MatrixXd columns_;
+  Estimated estimated_;
+  Folds folds_;
+  VectorXd held_out_;
+  std::vector<FamilyPtr> families_;  // none where nothing begins at a pose
+};
+
+std::vector<Cause> causes_of(const std::vector<Accepted>& accepted) {
+  std::vector<Cause> causes;
+  for (const Accepted& one : accepted) causes.push_back(one.cause);
+  return causes;
+}
+
+Estimated estimated_beside(const MatrixXd& columns, const VectorXd& data) {
+  const Background all(columns);
+  return {all.estimate(data), all.covariance()};
+}
+
+bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_id.empty(); }
+
+Findings::Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
+                   const Surrogates& surrogates, const MeasurementBatch& recorded)
+    : problem_(problem),
+      surrogates_(surrogates),
+      causes_(causes_of(found.accepted)),
+      beside_{causes_, unexplained, surrogates, recorded},
+      columns_(background_columns(problem, found.unnamed)),
+      estimated_(estimated_beside(columns_, problem.residual())),
+      folds_(problem, columns_),
+      held_out_(folds_.held_out_residual(problem.residual())) {
+  if (std::any_of(found.accepted.begin(), found.accepted.end(), begins)) families_ = make_families(problem);
+}
+
+Finding Findings::outlier(const Accepted& one) const {
+  const ErrorFigures held_out = figures_of(problem_.positions(held_out_));
+  return {.cause = one.cause,
+          .parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * problem_.noise())}},
+          .effect_rms = one.pose.distance,
+          .held_out_before = held_out,
+          .held_out_after = held_out,
+          .strength = one.best.strength,
+          .p_value = one.p_value,
+          .action = action_for(one.cause, {})};
+}
+
+Cause Findings::named(const Accepted& one) const {
+  Cause cause = one.cause;
+  if (others_speak(problem_, one, estimated_)) cause.parameter.clear();
+  return cause;
+}
+
+Finding Findings::cause(const Accepted& one) const {
+  Cause cause = named(one);
+  std::vector<Estimate> parameters = parameters_of(problem_, one.in_model, cause, estimated_);
+  if (cause.order && !parameters.empty()) cause.order = parameters.front().value;
+  if (has_made_up_numbers(surrogates_, cause)) parameters.clear();
+  const std::vector<Index> others = all_but(columns_.cols(), places_of_source(problem_.model(), one.in_model));
+  const VectorXd effect = effect_of_source(problem_, one.in_model);
+  const Background rest(columns_(Eigen::all, others));
+  const double effect_rms = problem_.position_rms(rest.project(effect));
+  const VectorXd without = folds_.held_out_residual(problem_.residual() + effect, others);
+  const ErrorFigures before = figures_of(problem_.positions(without));
+  const ErrorFigures after = figures_of(problem_.positions(held_out_));
+  Judgement judgement = judge(one.cause, effect_rms, one.could_also_be, beside_);
+  return {.cause = cause,
+          .source = one.source,
+          .parameters = std::move(parameters),
+          .may_begin_at = beginnings(one, effect, rest),
+          .effect_rms = effect_rms,
+          .held_out_before = before,
+          .held_out_after = after,
+          .held_out_gain = before.rms - after.rms,
+          .strength = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance).strength(),
+          .p_value = one.p_value,
+          .naming_frequency = one.naming_frequency,
+          .could_also_be = std::move(judgement.could_also_be),
+          .action = std::move(judgement.action)};
+}
+
+const Family* Findings::step_family(const Accepted& one) const {
+  const auto family = std::find_if(families_.begin(), families_.end(), [&](const FamilyPtr& other) {
     const Cause cause = other->cause(other->typical());
     return other->predicts() && !cause.pose_id.empty() && cause.cause == one.cause.cause &&
            cause.joint == one.cause.joint;
   });
-  const auto& poses = problem.batch().measurements;
+  return one.cause.pose_id.empty() || family == families_.end() ? nullptr : family->get();
+}
+
+std::vector<PossibleBeginning> Findings::beginnings(const Accepted& one, const VectorXd& effect,
+                                                    const Background& rest) const {
+  const Family* family = step_family(one);
+  const auto& poses = problem_.batch().measurements;
   const auto found =
       std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.pose_id == one.cause.pose_id; });
-  if (one.cause.pose_id.empty() || family == families.end() || found == poses.end()) return {};
-  Best always;
-  always.at = 0;
+  if (family == nullptr || found == poses.end()) return {};
+  const MatrixXd always = family->columns({.pose = 0});
   std::vector<PossibleBeginning> beginnings;
-  for (const Index i : possible_beginnings(problem, (*family)->columns(always), rest, problem.residual() + effect,
-                                           static_cast<Index>(found - poses.begin()))) {
+  for (const Index i :
+       possible_beginnings(problem_, always, rest, problem_.residual() + effect, found - poses.begin())) {
     const Measurement& m = poses[static_cast<std::size_t>(i)];
-    beginnings.push_back({m.pose_id, m.row, m.context.time});
+    beginnings.push_back({m.pose_id, m.row, surrogates_.time ? std::nullopt : m.context.time});
   }
   return beginnings;
 }
 
-Finding outlier(const Accepted& one, double noise, const ErrorFigures& held_out) {
-  Finding finding;
-  finding.cause = one.cause;
-  finding.parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * noise)}};
-  finding.effect_rms = one.pose.distance;
-  finding.strength = one.best.strength;
-  finding.p_value = one.p_value;
-  finding.held_out_before = finding.held_out_after = held_out;
-  finding.action = action_for(one.cause, {});
-  return finding;
-}
-
 }  // namespace
 
-std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem) {
-  const MatrixXd columns = background_columns(problem, found.unnamed);
-  const Background all(columns);
-  const Estimated estimated{all.estimate(problem.residual()), all.covariance()};
-  const Folds folds(problem, columns);
-  const VectorXd held_out = folds.held_out_residual(problem.residual());
-  const bool begins = std::any_of(found.accepted.begin(), found.accepted.end(), [](const Accepted& one) {
-    return !one.source.empty() && !one.cause.pose_id.empty();
-  });
-  const std::vector<FamilyPtr> families = begins ? make_families(problem) : std::vector<FamilyPtr>();
-  std::vector<Finding> findings;
-  for (const Accepted& one : found.accepted) {
-    if (one.source.empty()) {
-      findings.push_back(outlier(one, problem.noise(), figures_of(problem.positions(held_out))));
-      continue;
-    }
-    Finding finding;
-    finding.cause = one.cause;
-    if (others_speak(problem, one, estimated)) finding.cause.parameter.clear();
-    finding.source = one.source;
-    finding.parameters = parameters_of(problem, one.in_model, finding.cause, estimated);
-    if (finding.cause.order && !finding.parameters.empty()) finding.cause.order = finding.parameters.front().value;
-    const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
-    const VectorXd effect = effect_of_source(problem, one.in_model);
-    const Background rest(columns(Eigen::all, all_but(columns.cols(), places)));
-    finding.effect_rms = problem.position_rms(rest.project(effect));
-    finding.may_begin_at = beginnings_of(problem, families, one, effect, rest);
-    finding.strength = own_estimate(problem, one.in_model, estimated.change, estimated.covariance).strength();
-    finding.p_value = one.p_value;
-    finding.naming_frequency = one.naming_frequency;
-    finding.could_also_be = one.could_also_be;
-    finding.held_out_after = figures_of(problem.positions(held_out));
-    finding.held_out_before = figures_of(
-        problem.positions(folds.held_out_residual(problem.residual() + effect, all_but(columns.cols(), places))));
-    finding.held_out_gain = finding.held_out_before.rms - finding.held_out_after.rms;
-    finding.action = action_for(one.cause, one.could_also_be);
-    findings.push_back(std::move(finding));
-  }
-  return findings;
-}
-
-void doubt_beside(const Unexplained& unexplained, std::vector<Finding>& findings) {
-  if (!unexplained.present) return;
-  for (Finding& finding : findings) {
-    if (finding.source.empty() || finding.effect_rms > kDwarfed * unexplained.rms) continue;
-    finding.could_also_be.push_back({"unknown", -1, "", "", {}});
-    finding.action = "find first what is unknown here: it is several times larger";
-  }
-}
-
-void doubt_single_orders(std::vector<Finding>& findings) {
-  constexpr int kFewOrders = 2;
-  const auto at_joint = [&](const char* cause, int joint) {
-    return std::count_if(findings.begin(), findings.end(), [&](const Finding& other) {
-      return other.cause.cause == cause && other.cause.joint == joint;
-    });
-  };
-  for (Finding& finding : findings) {
-    const int joint = finding.cause.joint;
-    if (finding.cause.cause != "gear_transmission") continue;
-    if (at_joint("joint_map", joint) == 0 && at_joint("gear_transmission", joint) <= kFewOrders) continue;
-    const Cause map{"joint_map", joint, "", "", {}};
-    if (std::find(finding.could_also_be.begin(), finding.could_also_be.end(), map) != finding.could_also_be.end())
-      continue;
-    finding.could_also_be.push_back(map);
-    finding.action =
-        fmt::format("measure more poses over the range of joint {}: its error has no single order", joint + 1);
-  }
+std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
+                                 const Unexplained& unexplained, const Surrogates& surrogates,
+                                 const MeasurementBatch& recorded) {
+  const Findings findings(found, problem, unexplained, surrogates, recorded);
+  std::vector<Finding> all;
+  for (const Accepted& one : found.accepted) all.push_back(findings.of(one));
+  return all;
 }
 
 HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {
@@ -243,4 +274,4 @@ HeldOut held_out_of(const LinearProblem& before, const LinearProblem& after) {
   return {of(before, before.nuisance()), of(after, after.nuisance())};
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

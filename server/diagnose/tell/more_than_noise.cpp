@@ -4,21 +4,17 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
-
-constexpr double kNote = 1.1;  // times the stated sigma, which is known to a tenth
-constexpr double kMore = 1.3;
-constexpr double kOneInHundred = 2.326;  // standard deviations
-constexpr double kLeastChance = 1e-6;
 
 double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / left.stated : 1; }
 
 /// What chance exceeds in 1 of 100 batches, of noise `times` as large as stated.
 double by_chance(const LeftOver& left, double times) {
-  return times * (1 + kOneInHundred / std::sqrt(2 * left.freedom));
+  return times * (1 + thresholds::kOneInHundred / std::sqrt(2 * left.freedom));
 }
 
 LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
@@ -44,7 +40,7 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
   if (prepared.repeats.degrees_of_freedom == 0)
     return "measure some poses repeatedly, which tells a noisy measurement from something that the model lacks, and "
            "see that the cell's tracker sigma is right";
-  if (prepared.repeats.sigma > kMore * position.stated)
+  if (prepared.repeats.sigma > thresholds::kMoreThanNoise * position.stated)
     return fmt::format("poses measured repeatedly scatter by {} as well: the measurement is noisier than the cell says",
                        micrometres(prepared.repeats.sigma));
   return fmt::format(
@@ -57,17 +53,20 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
 
 NoiseVerdict judge_noise(const LeftOver& left) {
   const double ratio = ratio_of(left);
-  if (left.freedom <= 0 || ratio <= std::max(kNote, by_chance(left, 1))) return NoiseVerdict::kAsStated;
-  return ratio > std::max(kMore, by_chance(left, kNote)) ? NoiseVerdict::kMoreThanNoise : NoiseVerdict::kLarger;
+  if (left.freedom <= 0 || ratio <= std::max(thresholds::kLargerNoise, by_chance(left, 1)))
+    return NoiseVerdict::kAsStated;
+  return ratio > std::max(thresholds::kMoreThanNoise, by_chance(left, thresholds::kLargerNoise))
+             ? NoiseVerdict::kMoreThanNoise
+             : NoiseVerdict::kLarger;
 }
 
 double chance_of_noise(const LeftOver& left) {
   if (left.freedom <= 0) return 1;
   // Wilson and Hilferty: the cube root of chi-square over its degrees of freedom is nearly normal.
-  const double square = std::pow(ratio_of(left) / kNote, 2);
+  const double square = std::pow(ratio_of(left) / thresholds::kLargerNoise, 2);
   const double spread = 2 / (9 * left.freedom);
   const double z = (std::cbrt(square) - (1 - spread)) / std::sqrt(spread);
-  return std::max(kLeastChance, 0.5 * std::erfc(z / std::sqrt(2.0)));
+  return std::max(kLeastPValue, 0.5 * std::erfc(z / std::sqrt(2.0)));
 }
 
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
@@ -95,4 +94,4 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   if (diagnosis.verdict == Verdict::kNothing) diagnosis.verdict = Verdict::kUnknown;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -9,7 +9,7 @@
 /// With sigma known to a tenth, the sum of squares left is (1.1 sigma)^2 times a chi-square of as many degrees of
 /// freedom as the fit has left, at the most. More than 1.3 times the stated sigma is more than noise, if chance makes
 /// it in less than 1 of 100 batches: something is there that the poses do not say anything else of.
-namespace trammel {
+namespace trammel::cause_search {
 
 enum class NoiseVerdict {
   kAsStated,
@@ -24,4 +24,4 @@ enum class NoiseVerdict {
 /// on nothing known; where it is larger than stated, `limits` says so. Verdict as the findings say, else `unknown`.
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -7,10 +7,11 @@
 
 #include "server/base/check.h"
 #include "server/diagnose/families/candidates.h"
+#include "server/diagnose/thresholds.h"
 #include "server/plan/approach.h"
 #include "server/plan/plan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -18,11 +19,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kPool = 600;
-constexpr int kRounds = 3;     // of moving the poses chosen
-constexpr int kVariants = 40;  // of each, in a round
-constexpr int kRandomSets = 20;
-constexpr double kWorthwhile = 0.9;
+constexpr int kPool = 600;       // poses to choose from
+constexpr int kRounds = 3;       // of moving the poses chosen; a fourth changes little
+constexpr int kVariants = 40;    // of each pose, in a round
+constexpr int kRandomSets = 20;  // of poses, to compare with on average
 
 /// A cause as a member of its family.
 struct Member {
@@ -32,10 +32,10 @@ struct Member {
 };
 
 /// The index of a pose in a batch, 0 where it has none of that name.
-double index_of(const MeasurementBatch& batch, const std::string& pose_id) {
+Index index_of(const MeasurementBatch& batch, const std::string& pose_id) {
   const auto& all = batch.measurements;
   const auto found = std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.pose_id == pose_id; });
-  return found == all.end() ? 0 : static_cast<double>(found - all.begin());
+  return found == all.end() ? 0 : found - all.begin();
 }
 
 /// `cause` among the families of `problem`; its size and length scale as the data have them.
@@ -48,8 +48,8 @@ std::optional<Member> member_of(const LinearProblem& problem, const std::vector<
     Member member{family.get(), family->scan({background}, background.project(problem.residual())).front(),
                   !cause.pose_id.empty()};
     if (!(member.best.evidence > 0)) member.best = family->typical();
-    if (cause.order) member.best.at = *cause.order;
-    if (member.begins) member.best.at = index_of(problem.batch(), cause.pose_id);
+    if (cause.order) member.best.order = *cause.order;
+    if (member.begins) member.best.pose = index_of(problem.batch(), cause.pose_id);
     return member;
   }
   return std::nullopt;
@@ -80,7 +80,7 @@ std::vector<Member> afterwards(const std::vector<Member>& members, const std::ve
                                    [&](const FamilyPtr& family) { return family->label() == member.family->label(); });
     if (same == families.end()) return {};
     later.push_back({same->get(), member.best, member.begins});
-    if (member.begins) later.back().best.at = 0;
+    if (member.begins) later.back().best.pose = 0;
   }
   return later;
 }
@@ -289,10 +289,10 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
   next.stddev_now = std::sqrt(now.variance());
   next.stddev_expected = std::sqrt(with(now, chosen).variance());
   // What no pose tells apart needs something else, as the finding's action says.
-  if (next.stddev_expected > kWorthwhile * next.stddev_now) return {};
+  if (next.stddev_expected > thresholds::kWorthMeasuring * next.stddev_now) return {};
   for (const Candidate& one : chosen) next.q.push_back(one.q);
   next.stddev_random = stddev_with_random(*pool, chosen.size(), now, options.seed);
   return next;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

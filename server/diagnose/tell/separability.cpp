@@ -6,8 +6,9 @@
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/diagnose/thresholds.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 namespace {
 
@@ -15,12 +16,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPower = 1.2816;        // standard deviations: nine of ten
-constexpr double kAbsorbedShare = 0.05;  // of an effect's length is left: nothing to go by
-constexpr double kSameEffect = 0.95;     // canonical correlation
-constexpr double kMarginStrength = 20;   // between a cause and its imitator, for one to be told from the other
-constexpr Index kMostSingles = 8;
-constexpr double kLeastAlignment = 0.9;  // of an effect with one parameter, to say that it is that one
+constexpr Index kMostSingles = 8;  // parameters of a cause that are asked about one by one; a map has a hundred
 
 /// A family's effect, on average over the sizes that its priors allow.
 struct Average {
@@ -51,7 +47,7 @@ double imitation(const Average& own, const Average& other, const Background& bac
 /// The model's own parameter that an effect is most like, if any.
 std::optional<Cause> absorbing(const LinearProblem& problem, const VectorXd& effect) {
   Index best = -1;
-  double highest = kLeastAlignment;
+  double highest = thresholds::kLikeOneParameter;
   for (Index k = 0; k < problem.nuisance().cols(); ++k) {
     const VectorXd column = problem.nuisance().col(k);
     const double length = column.norm() * effect.norm();
@@ -92,7 +88,7 @@ void add_absorbed(const LinearProblem& problem, const Background& background, co
     const VectorXd column = columns.col(k);
     const double whole = std::max(1e-300, column.squaredNorm());
     const double left = column.dot(background.project(column).col(0)) / whole;
-    if (left > kAbsorbedShare * kAbsorbedShare) continue;
+    if (left > thresholds::kAbsorbed * thresholds::kAbsorbed) continue;
     const std::optional<Cause> absorber = absorbing(problem, column);
     if (absorber) add_pair(inseparable, cause, *absorber, std::sqrt(1 - std::clamp(left, 0.0, 1.0)));
   }
@@ -118,7 +114,7 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
     const Average& own = averages[i];
     const Cause cause = families[places[i]]->cause(families[places[i]]->typical());
     Unseen unseen{cause, own.share, {}, {}, ""};
-    if (own.strength < 1 || own.share < kAbsorbedShare) {
+    if (own.strength < 1 || own.share < thresholds::kAbsorbed) {
       unseen.needs = what_it_needs(cause);
       result.unseen.push_back(std::move(unseen));
       continue;
@@ -129,24 +125,25 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
       if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
       const double correlation = imitation(own, averages[j], background);
       imitated = std::max(imitated, correlation);
-      if (correlation > kSameEffect) add_pair(result.inseparable, cause, other, correlation);
+      if (correlation > thresholds::kSameEffect) add_pair(result.inseparable, cause, other, correlation);
     }
     const int freedom = std::max(1, families[places[i]]->typical().freedom);
-    const double needed =
-        std::pow(std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) + kPower, 2);
+    const double needed = std::pow(
+        std::sqrt(strength_for(chance.limit + chance.penalty_of(*families[places[i]]), freedom)) + thresholds::kPower,
+        2);
     const auto size_for = [&](double strength) { return own.rms * std::sqrt(strength / own.strength); };
     unseen.detectable = size_for(needed);
-    if (imitated < kSameEffect)
-      unseen.identifiable = size_for(std::max(needed, kMarginStrength / (1 - imitated * imitated)));
+    if (imitated < thresholds::kSameEffect)
+      unseen.identifiable = size_for(std::max(needed, thresholds::kToldApart / (1 - imitated * imitated)));
     else
       unseen.needs = what_it_needs(cause);
     const bool partly = std::any_of(result.inseparable.begin(), result.inseparable.end(),
                                     [&](const Inseparable& pair) { return pair.causes.front() == cause; }) ||
-                        imitated > kSameEffect;
+                        imitated > thresholds::kSameEffect;
     if (partly && unseen.needs.empty()) unseen.needs = what_it_needs(cause);
     result.unseen.push_back(std::move(unseen));
   }
   return result;
 }
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

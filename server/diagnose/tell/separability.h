@@ -4,7 +4,7 @@
 
 #include "server/diagnose/search/scan.h"
 
-namespace trammel {
+namespace trammel::cause_search {
 
 /// What a batch could not have shown, and what it cannot tell apart.
 struct Blindness {
@@ -18,4 +18,4 @@ struct Blindness {
 [[nodiscard]] Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& families,
                                   const Background& background, const Chance& chance);
 
-}  // namespace trammel
+}  // namespace trammel::cause_search

@@ -4,6 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/search/surrogates.h"
+#include "server/diagnose/thresholds.h"
 #include "server/plan/separation.h"
 
 namespace trammel {
@@ -11,7 +12,6 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
-constexpr double kMuchMore = 1.3;         // than what is stated for the measurement: what the model lacks is in it
 
 struct Words {
   const char* cause;
@@ -73,21 +73,21 @@ std::string listed_clauses(const std::vector<std::string>& clauses) {
   return all;
 }
 
+/// Where a step may have begun besides the pose where it was found.
+std::string beginning_said(const Finding& finding) {
+  if (finding.may_begin_at.size() < 2) return "";
+  return fmt::format(", or at another of {} to {},", finding.may_begin_at.front().pose_id,
+                     finding.may_begin_at.back().pose_id);
+}
+
 std::string said(const Finding& finding) {
   if (finding.cause.cause == "outlier")
     return fmt::format("pose {} ({:.2f} mm)", finding.cause.pose_id, to_mm(finding.effect_rms));
-  std::string text = to_string(finding.cause);
-  if (finding.cause.order) text += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
-  if (!finding.cause.pose_id.empty()) text += fmt::format(" from pose {}", finding.cause.pose_id);
-  if (finding.may_begin_at.size() > 1) {
-    text += fmt::format(", or another of {} to {},", finding.may_begin_at.front().pose_id,
-                        finding.may_begin_at.back().pose_id);
-  }
-  text += fmt::format(" ({:.0f} um rms)", to_mm(finding.effect_rms) * 1e3);
-  if (finding.could_also_be.empty()) return text;
-  std::vector<std::string> others;
-  for (const Cause& other : finding.could_also_be) others.push_back(to_string(other));
-  return text + ", which these poses cannot tell from " + listed(others);
+  std::vector<std::string> names = {in_words(finding.cause) + beginning_said(finding)};
+  if (finding.cause.order) names.front() += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
+  names.front() += fmt::format(" ({:.0f} um rms)", to_mm(finding.effect_rms) * 1e3);
+  for (const Cause& other : finding.could_also_be) names.push_back(in_words(other));
+  return fmt::format("{}", fmt::join(names, ", or "));
 }
 
 }  // namespace
@@ -105,56 +105,81 @@ std::string what_it_needs(const Cause& cause) {
 }
 
 bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
-  return !unseen.detectable && is_by_surrogate(put_in_surrogates(recorded), unseen.cause);
+  return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
 }
 
 std::string noise_name(double noise, double instrument) {
-  return noise > kMuchMore * instrument ? "what stays unexplained of a pose" : "noise of one measurement";
+  return noise > cause_search::thresholds::kMoreThanNoise * instrument ? "what stays unexplained of a pose"
+                                                                       : "noise of one measurement";
 }
 
 std::string why_no_next_poses(const std::vector<Finding>& findings) {
   const auto doubt = std::find_if(findings.begin(), findings.end(),
                                   [](const Finding& finding) { return !finding.could_also_be.empty(); });
   if (doubt == findings.end()) return "no cause that was found is in doubt";
-  return fmt::format("no poses of this cell tell {} from {}; {}", to_string(doubt->cause),
-                     to_string(doubt->could_also_be.front()), doubt->action);
+  return fmt::format("no poses of this cell tell {} from {}; {}", in_words(doubt->cause),
+                     in_words(doubt->could_also_be.front()), doubt->action);
 }
 
+namespace {
+
+/// The findings as clauses, by how sure they are.
+struct Said {
+  std::vector<std::string> sure, doubtful, bad_poses;
+};
+
+Said said(const std::vector<Finding>& findings) {
+  Said all;
+  for (const Finding& finding : findings) {
+    (finding.cause.cause == "outlier" ? all.bad_poses
+     : finding.could_also_be.empty()  ? all.sure
+                                      : all.doubtful)
+        .push_back(said(finding));
+  }
+  if (const std::size_t count = all.doubtful.size(); count > kMostDoubtful) {
+    all.doubtful.resize(kMostDoubtful - 1);
+    all.doubtful.push_back(fmt::format("{} more, which the findings list", count - all.doubtful.size()));
+  }
+  return all;
+}
+
+std::string bad_poses_said(const std::vector<std::string>& poses) {
+  return poses.size() > 1
+             ? listed(poses) + " are outliers: single poses, cause not separable; repeat them and their neighbours"
+             : poses.front() + " is an outlier: single pose, cause not separable; repeat it and its neighbours";
+}
+
+/// Poses held out that fit neither model; empty where there are none.
+std::string held_out_said(const std::vector<SuspectedPose>& suspects) {
+  std::vector<std::string> poses;
+  for (const SuspectedPose& pose : suspects) {
+    if (pose.held_out) poses.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
+  }
+  if (poses.empty()) return "";
+  return fmt::format("Of the poses held out, {} {} neither model", listed(poses), poses.size() > 1 ? "fit" : "fits");
+}
+
+}  // namespace
+
 std::string sentence_for(const Diagnosis& d) {
-  std::vector<std::string> sure, doubtful, bad;
-  for (const Finding& finding : d.findings) {
-    (finding.cause.cause == "outlier" ? bad : finding.could_also_be.empty() ? sure : doubtful).push_back(said(finding));
-  }
-  if (const std::size_t all = doubtful.size(); all > kMostDoubtful) {
-    doubtful.resize(kMostDoubtful - 1);
-    doubtful.push_back(fmt::format("{} more, which the findings list", all - doubtful.size()));
-  }
+  const Said all = said(d.findings);
+  const Unexplained& left = d.unexplained;
   std::string text;
-  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : " ") + as_sentence(sentence); };
-  if (!sure.empty()) add("The simulation lacks " + listed(sure));
-  if (doubtful.size() == 1) add("Something is lacking that I cannot tell: it may be " + doubtful.front());
-  if (doubtful.size() > 1) add("Some things are lacking that I cannot tell: they may be " + listed_clauses(doubtful));
-  if (bad.size() == 1)
-    add(bad.front() + " is an outlier: single pose, cause not separable; repeat it and its neighbours");
-  if (bad.size() > 1)
-    add(listed(bad) + " are outliers: single poses, cause not separable; repeat them and their neighbours");
-  const bool known_of = !d.unexplained.depends_on.empty();
-  if (d.unexplained.present && known_of) {
+  const auto add = [&](const std::string& sentence) {
+    if (!sentence.empty()) text += (text.empty() ? "" : " ") + as_sentence(sentence);
+  };
+  if (!all.sure.empty()) add("Missing from the simulation: " + listed_clauses(all.sure));
+  if (!all.doubtful.empty()) add("Missing, but these poses do not tell which it is: " + listed_clauses(all.doubtful));
+  if (!all.bad_poses.empty()) add(bad_poses_said(all.bad_poses));
+  if (left.present && !left.depends_on.empty()) {
     add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it",
-                    text.empty() ? "" : " else", listed(d.unexplained.depends_on), 1e6 * d.unexplained.rms));
+                    text.empty() ? "" : " else", listed(left.depends_on), 1e6 * left.rms));
   }
-  if (!d.unexplained.hint.empty()) add(d.unexplained.hint);
-  std::vector<std::string> held_out;
-  for (const SuspectedPose& pose : d.suspects) {
-    if (pose.held_out) held_out.push_back(fmt::format("{} ({:.2f} mm)", pose.pose_id, to_mm(pose.distance)));
-  }
-  if (!held_out.empty()) {
-    add(fmt::format("Of the poses held out, {} {} neither model", listed(held_out),
-                    held_out.size() > 1 ? "fit" : "fits"));
-  }
-  if (sure.empty() && doubtful.empty() && !d.unexplained.present) {
-    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", bad.empty() ? "was" : "else was", d.poses,
-                    1e6 * d.after.rms));
+  add(left.hint);
+  add(held_out_said(d.suspects));
+  if (all.sure.empty() && all.doubtful.empty() && !left.present) {
+    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", all.bad_poses.empty() ? "was" : "else was",
+                    d.poses, 1e6 * d.after.rms));
   }
   return text;
 }

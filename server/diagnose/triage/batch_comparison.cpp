@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "server/diagnose/thresholds.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel::batch_triage {
@@ -12,11 +13,10 @@ namespace trammel::batch_triage {
 namespace {
 
 constexpr int kMostIterations = 30;
-constexpr double kDone = 1e-4;         // last step, in units of the parameters' own scales
-constexpr double kFarthest = 9;        // times the median of |residual|^2: annealing towards the final limit
-constexpr double kGoodMisfit = 2.25;   // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
-constexpr double kMostOutliers = 0.1;  // of the poses
-constexpr double kWeakPrior = 1e-8;    // of what an alternative sets free, per squared scale of the parameter
+constexpr double kDone = 1e-4;        // last step, in units of the parameters' own scales
+constexpr double kFarthest = 9;       // times the median of |residual|^2: annealing towards the final limit
+constexpr double kGoodMisfit = 2.25;  // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
+constexpr double kWeakPrior = 1e-8;   // of what an alternative sets free, per squared scale of the parameter
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -224,8 +224,8 @@ Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) c
   const double freedom = judged_rows - k;
   fit.misfit = freedom > 0 ? inside / freedom : inside;
   fit.misfit_all = all / std::max(all_rows() - k, 1.0);
-  fit.explains =
-      freedom > 0 && fit.misfit <= kGoodMisfit && outliers <= std::max<double>(kFewOutliers, kMostOutliers * n);
+  fit.explains = freedom > 0 && fit.misfit <= kGoodMisfit &&
+                 outliers <= std::max<double>(kFewOutliers, cause_search::thresholds::kMostOutliers * n);
   return fit;
 }
 

@@ -43,10 +43,11 @@ bool same_tools(const CompensatedModel& model, const Cell& cell) {
 
 Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which) {
   if (!same_robot(model.cell().robot, cell.robot)) {
-    return refused("{} was trained for another robot than cell {} has", which, cell.name);
+    return refused("{} was trained for another robot than cell {} has", which, cell.name).of("robot");
   }
   if (!same_tools(model, cell)) {
-    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name);
+    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name)
+        .of("tools");
   }
   return {};
 }

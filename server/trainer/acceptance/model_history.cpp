@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/trainer/acceptance/fits_cell.h"
 
 namespace trammel {
@@ -112,7 +113,9 @@ Result<int> ModelHistory::import_model(const std::string& cell, const std::strin
   const auto model = deserialize(text, "imported model");
   if (!model) return tl::make_unexpected(model.error());
   if (model->cell().name != cell) {
-    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell);
+    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell)
+        .of("cell")
+        .with_text(model->cell().name);
   }
   const Status fits = check_fits_cell(*model, **cell_found, "imported model " + model->provenance().id);
   if (!fits) return tl::make_unexpected(fits.error());

@@ -149,8 +149,10 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
     return {};
   }
   if (batch.measurements.size() < kLeastBiasPoses) {
-    return refused("batch {}: {} poses to learn a bias from, at least {} are needed (or bias: none)", batch.id,
-                   batch.measurements.size(), kLeastBiasPoses);
+    return refused("{} poses to learn a bias from, at least {} are needed", batch.measurements.size(), kLeastBiasPoses)
+        .in("batch " + batch.id)
+        .beyond(batch.measurements.size(), kLeastBiasPoses)
+        .next("measure more, or say bias: none");
   }
   if (!progress(0)) return given_up();
   BiasOptions options;

@@ -57,7 +57,10 @@ Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, co
                                      const TrainOptions& options) {
   if (const Status allowed = check_can_extend(diagnosis); !allowed) return tl::make_unexpected(allowed.error());
   if (batch.held_out().measurements.empty())
-    return refused("batch {}: no rows are held out to judge an extended model by", batch.id());
+    return refused("no rows are held out to judge an extended model by")
+        .in("batch " + batch.id())
+        .of("set")
+        .beyond(0, 1);
   Result<Supported> supported = supported_by(
       cell, own, added_sources(own, diagnosis), batch.training(), judges_of(diagnosis, batch.held_out()).batch,
       [&options](double share) {

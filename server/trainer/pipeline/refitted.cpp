@@ -228,9 +228,10 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   const bool is_its_own = batch.hash() == from.provenance().batch_hash;
   if (of_this_batch && !is_its_own && lasting_sources(sources) != sources) {
     return refused(
-        "batch {}: the model to start from has sources that began during batch {}: none that began during this one can "
-        "be added",
-        batch.id(), from.provenance().batch_id);
+               "the model to start from has sources that began during batch {}: none that began during this one can be "
+               "added",
+               from.provenance().batch_id)
+        .in("batch " + batch.id());
   }
   Refitted result;
   result.poses = as_met(from, *cell, trained, of_this_batch || is_its_own);

@@ -180,7 +180,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
       check_orientations(batch.rows(), options.from ? with_known_tools(*cell, *options.from, options.refit) : *cell);
   if (!oriented) return tl::make_unexpected(oriented.error());
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
-  if (split.train.measurements.empty()) return refused("batch {}: no rows to train on", batch.id());
+  if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
 
   if (!report("calibrating", 0.0)) return given_up();
   Result<CompensatedModel> model = options.from ? train_from(*options.from, cell, batch, split, options, report)

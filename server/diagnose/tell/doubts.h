@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/diagnose/diagnosis.h"
+#include "server/diagnose/search/surrogates.h"
+
+namespace trammel::cause_search {
+
+/// What a finding is judged beside.
+struct Beside {
+  const std::vector<Cause>& found;   ///< all causes found, the one that is judged among them
+  const Unexplained& unexplained;    ///< what depends on something and has no name
+  const Surrogates& surrogates;      ///< what was put in for what nobody recorded
+  const MeasurementBatch& recorded;  ///< without the surrogates
+};
+
+/// How sure the name of a finding is, and what people do about it.
+struct Judgement {
+  std::vector<Cause> could_also_be;  ///< empty: its name is sure
+  std::string action;
+};
+
+/// Judges a cause whose effect is `effect_rms` (m). `rivals`: what the search could not tell from it. Its name is
+/// doubted
+/// - where something was not recorded that would show whether it is another cause;
+/// - beside something unknown that is several times larger, of which it may be part;
+/// - of a gear, where its joint has a map or more than two orders: an error with no single order has as many sines as
+///   the poses show.
+/// Of several doubts the action answers the one that comes last in this list.
+[[nodiscard]] Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals,
+                              const Beside& beside);
+
+}  // namespace trammel::cause_search
