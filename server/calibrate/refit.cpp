@@ -224,8 +224,8 @@ Status place_anew(CalibrationProblem& problem, const Anew& anew, const Refit& re
   const PhysicalModel before = problem.model;
   const std::vector<Parameter> parameters = problem.model.parameters();
   for (const Index at : refit.anew) problem.model.values(at) = parameters[static_cast<std::size_t>(at)].prior;
-  const bool base = contains(anew.sources, "base");
-  const bool tool = contains(anew.sources, "tool");
+  const bool base = corrects(anew.sources, Part::kBase);
+  const bool tool = corrects(anew.sources, Part::kTool);
   for (const Measurement& m : problem.batch.measurements) {
     const auto& X_FT = problem.model.cell->tools.at(m.context.tool);
     if (tool && X_FT) problem.model.tools[m.context.tool] = *X_FT;
