@@ -154,7 +154,7 @@ Triage Judge::told(const Tried& none) const {
   return triage;
 }
 
-std::string in_words(const Cause& cause) {
+std::string told_as(const Cause& cause) {
   if (cause.cause == "tracker_moved") return "the tracker, or the robot's base, stands elsewhere";
   if (cause.cause == "tool_changed") return "the tool is another one, or sits elsewhere on the flange";
   if (cause.cause == "payload_changed") return "the payload is another one";
@@ -186,10 +186,10 @@ std::string Judge::sentence(const Triage& triage) const {
     return fmt::format("as the model in force expects it but for single poses: {}", fmt::join(triage.outliers, ", "));
   }
   std::string text = triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
-  text += fmt::format("{} ({})", in_words(triage.cause), how_much(triage));
+  text += fmt::format("{} ({})", told_as(triage.cause), how_much(triage));
   if (triage.tracker_elsewhere) text += ", and the tracker stands elsewhere";
   for (const Cause& other : triage.could_also_be) {
-    text += "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + in_words(other);
+    text += "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + told_as(other);
   }
   return text + bad;
 }
