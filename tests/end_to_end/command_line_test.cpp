@@ -111,10 +111,12 @@ std::vector<std::string> commands_of(const std::string& help) {
 }
 
 TEST_F(CommandLine, HelpOfEveryCommandSaysTheUnitOfEveryQuantity) {
-  const std::regex blanks("\\s+"), unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation", std::regex::icase);
+  const std::regex blanks("\\s+"), goes_with("(Needs|Excludes): --"),
+      unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation", std::regex::icase);
   int quantities = 0;
   for (const std::string& command : commands_of(must({"--help"}).out)) {
-    const std::string help = std::regex_replace(must({command, "--help"}).out, blanks, " ");
+    const std::string one_line = std::regex_replace(must({command, "--help"}).out, blanks, " ");
+    const std::string help = std::regex_replace(one_line, goes_with, "$1: ");
     for (auto at = help.find(" FLOAT"); at != std::string::npos; at = help.find(" FLOAT", at + 1)) {
       const std::string described = help.substr(at, help.find(" --", at) - at);
       EXPECT_TRUE(std::regex_search(described, unit)) << command << ":" << described;
