@@ -22,6 +22,10 @@ Refusal refusal(const std::string& json, const JsonLimits& limits = {}) {
   return refusal_of(fine);
 }
 
+Refusal too_large(double count, double limit) {
+  return Refusal("x.json").of(ErrorCode::kTooLarge).beyond(count, limit);
+}
+
 TEST(JsonGuard, WhatIsWithinTheLimitsPasses) {
   EXPECT_EQ(refusal("{}"), Refusal::none());
   EXPECT_EQ(refusal(R"({"a": [1, -2.5e-3, "b\"]]]", true, null], "c": {"d": []}})"), Refusal::none());
@@ -33,15 +37,15 @@ TEST(JsonGuard, TooMuchOfAnythingIsRefusedAndNamedWithItsLimit) {
   limits.bytes = 200;
   limits.values = limits.members = limits.containers = 5;
   limits.text_bytes = limits.scalar_bytes = 10;
-  EXPECT_EQ(refusal(std::string(201, ' '), limits), Refusal("?"));
-  EXPECT_EQ(refusal(repeated("[", 17)), Refusal("?"));
-  EXPECT_EQ(refusal(repeated("{\"\":", 17)), Refusal("?"));
-  EXPECT_EQ(refusal(repeated("[],", 6), limits), Refusal("?"));
-  EXPECT_EQ(refusal(repeated("1,", 6), limits), Refusal("?"));
-  EXPECT_EQ(refusal(repeated(":", 6), limits), Refusal("?"));
-  EXPECT_EQ(refusal('"' + std::string(20, 'x') + '"', limits), Refusal("?"));
-  EXPECT_EQ(refusal(std::string(20, '7'), limits), Refusal("?"));
-  EXPECT_EQ(refusal("]"), Refusal("?"));
+  EXPECT_EQ(refusal(std::string(201, ' '), limits), too_large(201, 200));
+  EXPECT_EQ(refusal(repeated("[", 17)), too_large(17, 16));
+  EXPECT_EQ(refusal(repeated("{\"\":", 17)), too_large(17, 16));
+  EXPECT_EQ(refusal(repeated("[],", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal(repeated("1,", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal(repeated(":", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal('"' + std::string(20, 'x') + '"', limits), too_large(22, 10));
+  EXPECT_EQ(refusal(std::string(20, '7'), limits), too_large(20, 10));
+  EXPECT_EQ(refusal("]"), Refusal("x.json"));
 }
 
 TEST(JsonGuard, MillionsOfBracketsTakeNeitherStackNorMemory) {

@@ -152,11 +152,12 @@ TEST(BiasModel, GrowsToRoundingWhereTheMedianSigmaMoves) {
 
 TEST(BiasModel, RefusesToGrowOrShrinkIntoWhatItCannotLearnFrom) {
   const BiasModel model = fit(smooth_problem(12, 33));
-  EXPECT_EQ(refusal_of(model.without({0, 1, 2})), Refusal("?"));
-  EXPECT_EQ(refusal_of(model.without({12})), Refusal("?"));
+  EXPECT_EQ(refusal_of(model.without({0, 1, 2})), Refusal("bias data").beyond(9, 10));
+  EXPECT_EQ(refusal_of(model.without({12})), Refusal("bias data", {}, "observation").beyond(12, 12));
   BiasProblem bad = smooth_problem(2, 34);
   bad.q(1, 0) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refusal_of(model.with(bad)), Refusal("?"));
+  EXPECT_EQ(refusal_of(model.with(bad)),
+            Refusal("bias data", 14, "joint 1").value(std::numeric_limits<double>::quiet_NaN()));
 }
 
 TEST(BiasModel, RefitsFromWhereItWasInAFewEvaluations) {
@@ -287,45 +288,47 @@ TEST(BiasModel, ReportsProgressAndStopsWhenToldTo) {
   const auto stopped = BiasModel::fit(smooth_problem(60, 17), options);
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kBusy);
-  EXPECT_EQ(refusal_of(stopped), Refusal("?"));
+  EXPECT_EQ(refusal_of(stopped), Refusal().of(ErrorCode::kBusy));
 }
 
 TEST(BiasModel, RefusesWhatItCannotLearnFrom) {
   const BiasProblem good = smooth_problem(20, 18);
-  EXPECT_EQ(refusal_of(BiasModel::fit(smooth_problem(9, 18), BiasOptions{})), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(smooth_problem(9, 18), BiasOptions{})), Refusal("bias data").beyond(9, 10));
 
   BiasProblem bad = good;
   bad.q(3, 1) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})),
+            Refusal("bias data", 4, "joint 2").value(std::numeric_limits<double>::quiet_NaN()));
 
   bad = good;
   bad.residual_B(0, 2) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})),
+            Refusal("bias data", 1, "residual z").value(std::numeric_limits<double>::infinity()));
 
   bad = good;
   bad.sigma[6] = -0.001;
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("bias data", 7, "sigma").beyond(-1, 0));
 
   bad = good;
   bad.sigma.conservativeResize(19);
-  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(bad, BiasOptions{})), Refusal("bias data", {}, "sigma").beyond(19, 20));
 
   BiasOptions options;
   options.kernel = "sea";
-  EXPECT_EQ(refusal_of(BiasModel::fit(good, options)), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(good, options)), Refusal("", {}, "bias").text("sea"));
   options.kernel = "se";
   options.starts = 0;
-  EXPECT_EQ(refusal_of(BiasModel::fit(good, options)), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::fit(good, options)), Refusal("", {}, "starts").beyond(0, 1));
 }
 
 TEST(BiasModel, RefusesAStateThatDoesNotFit) {
   const BiasModel model = fit(smooth_problem(20, 19));
   BiasState state = model.state();
   state.hyperparameters.conservativeResize(5, 3);
-  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("", {}, "hyperparameters").beyond(5, 8));
   state = model.state();
   state.offset.resize(0);
-  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("", {}, "offset").beyond(0, 3));
   state = model.state();
   state.hyperparameters(0, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(BiasModel::restore(state).has_value());

@@ -155,19 +155,20 @@ TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
   };
   BiasProblem problem = gear_problem(20, 5);
   problem.features.pop_back();
-  EXPECT_EQ(refusal(problem, "se + joint_map"), Refusal("?"));
+  EXPECT_EQ(refusal(problem, "se + joint_map"), Refusal("bias data", {}, "features").beyond(19, 20));
   problem = gear_problem(20, 5);
   problem.features[7].by_parameter.resize(6, 1);
-  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("?"));
+  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
   problem = gear_problem(20, 5);
   problem.features[7].by_joint(2, 2) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("?"));
-  EXPECT_EQ(refusal(gear_problem(4001, 5), "se + joint_map"), Refusal("?"));
-  EXPECT_EQ(refusal(gear_problem(20, 5), "se * joint_map"), Refusal("?"));
+  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
+  EXPECT_EQ(refusal(gear_problem(4001, 5), "se + joint_map"),
+            Refusal("", {}, "bias").beyond(4001, 4000).text("se + joint_map"));
+  EXPECT_EQ(refusal(gear_problem(20, 5), "se * joint_map"), Refusal("", {}, "bias").text("se * joint_map"));
 
   BiasState state = fitted().state();
   state.block_hyperparameters.conservativeResize(4);
-  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("?"));
+  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("", {}, "block_hyperparameters").beyond(4, 6));
 }
 
 TEST(CoupledModel, StopsWhenTold) {
@@ -175,7 +176,7 @@ TEST(CoupledModel, StopsWhenTold) {
   options.progress = [](double share) { return share < 0.2; };
   const auto model = BiasModel::fit(gear_problem(60, 6), options);
   ASSERT_FALSE(model.has_value());
-  EXPECT_EQ(refusal_of(model), Refusal("?"));
+  EXPECT_EQ(refusal_of(model), Refusal().of(ErrorCode::kBusy));
   EXPECT_EQ(model.error().code, ErrorCode::kBusy);
 }
 

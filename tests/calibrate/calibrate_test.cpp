@@ -300,7 +300,7 @@ TEST(Calibrate, RefusesWhatCannotBeFound) {
   const Result<CalibrationResult> result = calibrate(cell, {"base"}, few, {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::kRefused);
-  EXPECT_EQ(refusal_of(result), Refusal("?"));
+  EXPECT_EQ(refusal_of(result), Refusal("batch virtual").beyond(4, 6));
   few.measurements.clear();
   EXPECT_FALSE(calibrate(cell, {"base"}, few, {}));
 }

@@ -284,13 +284,13 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   };
   ArcList missing = good;
   std::erase_if(missing.points, [](const ArcPoint& point) { return point.joint == 3; });
-  EXPECT_EQ(refusal(missing, nominal), Refusal("?"));
+  EXPECT_EQ(refusal(missing, nominal), Refusal(good.where, {}, "joint").value(4));
   ArcList few = good;
   few.points.erase(few.points.begin());
-  EXPECT_EQ(refusal(few, nominal), Refusal("?"));
+  EXPECT_EQ(refusal(few, nominal), Refusal(good.where, 2, "joint").beyond(4, 5));
   ArcList moved = good;
   moved.points[6].q(4) = 0.1;
-  EXPECT_EQ(refusal(moved, nominal), Refusal("?"));
+  EXPECT_EQ(refusal(moved, nominal), Refusal(good.where, 8, "q5_deg").beyond(5.72958, 0));
   ArcList wrong_angle = good;
   wrong_angle.points[6].q(1) += from_deg(3);
   EXPECT_EQ(refusal(wrong_angle, nominal), Refusal("?"));
@@ -303,8 +303,8 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   std::vector<Joint> plain;
   for (int i = 0; i < 6; ++i) plain.push_back(nominal.joint(i));
   plain[1].hayati = false;
-  EXPECT_EQ(refusal(good, *Chain::make("plain", plain)), Refusal("?"));
-  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal("?"));
+  EXPECT_EQ(refusal(good, *Chain::make("plain", plain)), Refusal("", {}, "joints 2: hayati"));
+  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal("", {}, "joint 1"));
 }
 
 TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {
@@ -321,10 +321,10 @@ TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {
   EXPECT_NEAR(point.q(1), from_deg(-45), 1e-12);  // the turning joint's own angle
   EXPECT_NEAR(point.p_W.z(), 0.3, 1e-12);
   const auto refusal = [&](const std::string& text) { return refusal_of(parse_arcs_csv(text, "a.csv", robot)); };
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm\n"), Refusal("?"));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n"), Refusal("?"));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n"), Refusal("?"));
-  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n"), Refusal("?"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm\n"), Refusal("a.csv", {}, "z_mm"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n"), Refusal("a.csv", 2, "joint").beyond(7, 6));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n"), Refusal("a.csv", 2, "y_mm").text("far"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n"), Refusal("a.csv").beyond(1, 6));
 }
 
 }  // namespace

@@ -193,9 +193,9 @@ TEST(Deflection, Refuses) {
   const DeflectionData data = measured(forearm(), 13e-6, 1);
   DeflectionData one_load = data;
   std::erase_if(one_load.readings, [](const DeflectionReading& reading) { return reading.load != kLoads[0]; });
-  EXPECT_EQ(refusal_of(fit_deflection(one_load, {})), Refusal("?"));
-  EXPECT_EQ(refusal_of(fit_deflection(data, {.validation_loads = {500}})), Refusal("?"));
-  EXPECT_EQ(refusal_of(fit_deflection(data, {.load_bias = {5}})), Refusal("?"));
+  EXPECT_EQ(refusal_of(fit_deflection(one_load, {})), Refusal(data.where, {}, "load").beyond(1, 2));
+  EXPECT_EQ(refusal_of(fit_deflection(data, {.validation_loads = {500}})), Refusal(data.where, {}, "load").value(500));
+  EXPECT_EQ(refusal_of(fit_deflection(data, {.load_bias = {5}})), Refusal(data.where, {}, "element").value(5));
   Truth one_place = forearm();
   one_place.reflectors = {0.5};
   EXPECT_EQ(refusal_of(fit_deflection(measured(one_place, 13e-6, 1), {.load_bias = {3}})), Refusal("?"));
@@ -212,10 +212,10 @@ TEST(DeflectionCsv, ReadsReadingsAndRefusesWithRow) {
   const auto refusal = [&](const std::string& rows) {
     return refusal_of(parse_deflection_csv(header + rows, "d.csv"));
   };
-  EXPECT_EQ(refusal("3,266,200,0,0,10,1342,200,0,train\n"), Refusal("?"));
-  EXPECT_EQ(refusal("3,266,200,0,0,10,0,200,,\n"), Refusal("?"));
-  EXPECT_EQ(refusal("3,1,200,0,0,10,1342,200,,\n3,1,200,0,0,11,1342,200,,\n"), Refusal("?"));
-  EXPECT_EQ(refusal("3,1,200,0,0,10,1342,200,,test\n"), Refusal("?"));
+  EXPECT_EQ(refusal("3,266,200,0,0,10,1342,200,0,train\n"), Refusal("d.csv", 2, "sigma_mm").beyond(0, 0));
+  EXPECT_EQ(refusal("3,266,200,0,0,10,0,200,,\n"), Refusal("d.csv", 2, "length_mm").beyond(0, 0));
+  EXPECT_EQ(refusal("3,1,200,0,0,10,1342,200,,\n3,1,200,0,0,11,1342,200,,\n"), Refusal("d.csv", 3, "element").value(3));
+  EXPECT_EQ(refusal("3,1,200,0,0,10,1342,200,,test\n"), Refusal("d.csv", 2, "set").text("test"));
 }
 
 }  // namespace

@@ -69,7 +69,7 @@ TEST_F(OutputsTest, AreWrittenAllOrNone) {
   std::filesystem::remove(file("later"));
   const Status written = outputs.write();
   ASSERT_FALSE(written);
-  EXPECT_EQ(refusal_of(written), Refusal("?"));
+  EXPECT_EQ(refusal_of(written), Refusal(file("later/b")));
   EXPECT_EQ(test::read_file(file("a")), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1) << "a part was left";
 

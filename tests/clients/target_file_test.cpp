@@ -56,15 +56,15 @@ TEST(TargetFile, ReadsJointTargetsAlone) {
 }
 
 TEST(TargetFile, RefusesWhatIsNoTarget) {
-  EXPECT_EQ(refusal(""), Refusal("?"));
-  EXPECT_EQ(refusal("a,b\n1,2\n"), Refusal("?"));
-  EXPECT_EQ(refusal(kPose + "\n1,2,3,1,0,0,0\n"), Refusal("?"));
-  EXPECT_EQ(refusal("x_mm,y_mm,q1_deg\n1,2,3\n"), Refusal("?"));
-  EXPECT_EQ(refusal(kPose + ",conf\n"), Refusal("?"));
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), Refusal("?"));
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), Refusal("?"));
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"), Refusal("?"));
-  EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), Refusal("?"));
+  EXPECT_EQ(refusal(""), Refusal("t.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("a,b\n1,2\n"), Refusal("t.csv", {}, "x_mm"));
+  EXPECT_EQ(refusal(kPose + "\n1,2,3,1,0,0,0\n"), Refusal("t.csv", {}, "conf"));
+  EXPECT_EQ(refusal("x_mm,y_mm,q1_deg\n1,2,3\n"), Refusal("t.csv", {}, "z_mm"));
+  EXPECT_EQ(refusal(kPose + ",conf\n"), Refusal("t.csv").beyond(0, 1));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), Refusal("t.csv", 2, "conf"));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), Refusal("t.csv", 2, "conf").beyond(8, 7));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"), Refusal("t.csv", 2, "qw").beyond(1.00499, 1));
+  EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), Refusal("t.csv", 3, "q1_deg").text("nan"));
 }
 
 TEST(TargetFile, IsHeldAgainstTheRobot) {
@@ -74,10 +74,10 @@ TEST(TargetFile, IsHeldAgainstTheRobot) {
     return refusal_of(checked);
   };
   EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", robot), Refusal::none());
-  EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), Refusal("?"));
+  EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), Refusal("t.csv").beyond(2, 6));
   const Chain one = Chain::make("turntable", {Joint{}}).value();
   EXPECT_EQ(check("q1_deg\n1\n", one), Refusal::none());
-  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one), Refusal("?"));
+  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one), Refusal("t.csv", 2, "conf").value(1));
 }
 
 }  // namespace

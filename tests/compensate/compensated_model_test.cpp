@@ -250,7 +250,7 @@ TEST_F(Compensated, WhatWasLearnedWithOneToolIsNotAppliedToAnother) {
   const Status other = model().check_trained_with("spindle", "probe");
   ASSERT_FALSE(other);
   EXPECT_EQ(other.error().code, ErrorCode::kRefused);
-  EXPECT_EQ(refusal_of(other), Refusal("?"));
+  EXPECT_EQ(refusal_of(other), Refusal("", {}, "tool_id").text("spindle"));
   CompensatedModel::Parts parts = model().parts();
   parts.trained_with = {{"probe", "spindle"}};
   const CompensatedModel of_another_tool = CompensatedModel::make(std::move(parts)).value();
@@ -452,7 +452,7 @@ TEST_F(Compensated, ADamagedModelIsRefused) {
   text[place] = text[place] == '1' ? '2' : '1';
   const Result<CompensatedModel> damaged = deserialize(text, "cell.model");
   ASSERT_FALSE(damaged);
-  EXPECT_EQ(refusal_of(damaged), Refusal("?"));
+  EXPECT_EQ(refusal_of(damaged), Refusal("cell.model", {}, "hash"));
   EXPECT_FALSE(deserialize("{}", "cell.model"));
   EXPECT_FALSE(deserialize("", "cell.model"));
   EXPECT_FALSE(deserialize(serialize(model()).substr(0, 1000), "cell.model"));

@@ -88,13 +88,14 @@ TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThe
 
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"]["poses"][3]["payload"] = "feather";
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("?"));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "hash"));
   // Even with a fitting hash a pose that the cell cannot have is refused, and so are too few of them.
   file["hash"] = sha256_hex(file["content"].dump());
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("?"));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")),
+            Refusal("cell.model", {}, "bias").text("spindle feather"));
   file["content"]["bias"].erase("poses");
   file["hash"] = sha256_hex(file["content"].dump());
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("?"));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "bias").beyond(0, 120));
 }
 
 TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
@@ -110,27 +111,28 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
   };
   static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal([](PoseContext&) {}), Refusal::none());
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction.pop_back(); }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction[2] = 2; }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.velocity = JointVector::Zero(5); }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.velocity)(1) = kNan; }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.time = kNan; }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.temperature = kNan; }), Refusal("?"));
-  EXPECT_EQ(refusal([](PoseContext& pose) { pose.index = -1; }), Refusal("?"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction.pop_back(); }), Refusal("", {}, "direction").beyond(5, 6));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.direction[2] = 2; }), Refusal("", {}, "direction").beyond(2, 1));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.velocity = JointVector::Zero(5); }),
+            Refusal("", {}, "velocity").beyond(5, 6));
+  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.velocity)(1) = kNan; }), Refusal("", {}, "velocity"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.time = kNan; }), Refusal("", {}, "time"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.temperature = kNan; }), Refusal("", {}, "temperature"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.index = -1; }), Refusal("", {}, "index").beyond(-1, 0));
 
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"]["poses"][3]["velocity"] = {{"rows", 3}, {"columns", 2}, {"values", {0, 0, 0, 0, 0, 0}}};
   file["hash"] = sha256_hex(file["content"].dump());
   const Result<CompensatedModel> read = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(read);
-  EXPECT_EQ(refusal_of(read), Refusal("?"));
+  EXPECT_EQ(refusal_of(read), Refusal("cell.model"));
 
   constexpr std::int64_t kHuge = std::int64_t{1} << 32;  // whose square overflows to 0
   file["content"]["covariance"] = {{"rows", kHuge}, {"columns", kHuge}, {"values", nlohmann::json::array()}};
   file["hash"] = sha256_hex(file["content"].dump());
   const Result<CompensatedModel> huge = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(huge);
-  EXPECT_EQ(refusal_of(huge), Refusal("?"));
+  EXPECT_EQ(refusal_of(huge), Refusal("cell.model"));
 }
 
 TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {
@@ -183,7 +185,7 @@ TEST_F(CoupledBias, AModelOfBeforeBlocksLastedIsRefusedNotServedOtherwise) {
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"].erase("fades");
   file["hash"] = sha256_hex(file["content"].dump());
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("?"));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "bias"));
 }
 
 TEST_F(CoupledBias, ACorrectionFarOutSettlesWithTheBlocksAndWithoutTheKernel) {

@@ -103,52 +103,53 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
 }
 
 TEST_F(ServerConfigTest, RefusesUnknownDoubledAndMissingKeys) {
-  EXPECT_EQ(refusal_for("dds: {prot: 17500}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("trainer: {}\ntrainer: {}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of("version: 1\nserver: a\nstore: t.db\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), Refusal("?"));
+  EXPECT_EQ(refusal_for("dds: {prot: 17500}\n"), at(5, "dds: prot"));
+  EXPECT_EQ(refusal_for("trainer: {}\ntrainer: {}\n"), at(5, "trainer"));
+  EXPECT_EQ(refusal_of("version: 1\nserver: a\nstore: t.db\n"), at(1, "cells"));
+  EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), at(1, "version").beyond(0, 1));
 }
 
 TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
-  EXPECT_EQ(refusal_for("dds: {port: 80}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {domain: 233}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {peer_ports: [17500]}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {peer_ports: [1e4]}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("log: {level: loud}\n"), Refusal("?"));
+  EXPECT_EQ(refusal_for("dds: {port: 80}\n"), at(5, "dds: port").beyond(80, 1024));
+  EXPECT_EQ(refusal_for("dds: {domain: 233}\n"), at(5, "dds: domain").beyond(233, 232));
+  EXPECT_EQ(refusal_for("dds: {peer_ports: [17500]}\n"), at(5, "dds: peer_ports").value(17500));
+  EXPECT_EQ(refusal_for("dds: {peer_ports: [1e4]}\n"), at(5, "dds: peer_ports").text("1e4"));
+  EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), at(5, "dds: compute_workers").beyond(0, 1));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
+  EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
+  EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), at(5, "trainer: seed").beyond(-1, 0));
+  EXPECT_EQ(refusal_for("log: {level: loud}\n"), at(5, "log: level").text("loud"));
 }
 
 TEST_F(ServerConfigTest, RefusesWrongTypes) {
-  EXPECT_EQ(refusal_for("trainer: {queue_capacity: many}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("trainer: {validation_share: .nan}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: 17500\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of("- a\n- b\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of("version: [1\n"), Refusal("?"));
+  EXPECT_EQ(refusal_for("trainer: {queue_capacity: many}\n"), at(5, "trainer: queue_capacity").text("many"));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: .nan}\n"), at(5, "trainer: validation_share").text(".nan"));
+  EXPECT_EQ(refusal_for("dds: 17500\n"), at(5, "dds"));
+  EXPECT_EQ(refusal_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), at(5, "dds: allow_network").text("maybe"));
+  EXPECT_EQ(refusal_of("- a\n- b\n"), at(1));
+  EXPECT_EQ(refusal_of("version: [1\n"), at(2));
 }
 
 TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
-  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), Refusal("?"));
-  EXPECT_EQ(refusal_for("dds: {address: localhost}\n"), Refusal("?"));
+  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), at(5, "dds: address").text("192.168.1.5"));
+  EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), at(5, "dds: address").text("0.0.0.0"));
+  EXPECT_EQ(refusal_for("dds: {address: localhost}\n"), at(5, "dds: address").text("localhost"));
   EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true}\n").dds.address, "192.168.1.5");
 }
 
 TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {
   for (const std::string& name : {std::string("\"\""), std::string("a b"), std::string(65, 'x')}) {
-    EXPECT_EQ(refusal_of("version: 1\nserver: " + name + "\ncells: [cell-7.yaml]\nstore: t.db\n"), Refusal("?"));
+    EXPECT_EQ(refusal_of("version: 1\nserver: " + name + "\ncells: [cell-7.yaml]\nstore: t.db\n"),
+              at(2, "server").text(name == "\"\"" ? "" : name));
   }
 }
 
 TEST_F(ServerConfigTest, RefusesTwoCellsOfOneNameAndACellThatCannotBeRead) {
   const std::string start = "version: 1\nserver: a\nstore: t.db\n";
   folder_.write("copy.yaml", test::small_cell_yaml("cell-7"));
-  EXPECT_EQ(refusal_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of(start + "cells: [nowhere.yaml]\n"), Refusal("?"));
-  EXPECT_EQ(refusal_of(start + "cells: []\n"), Refusal("?"));
+  EXPECT_EQ(refusal_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), at({}, "cells").text("cell-7"));
+  EXPECT_EQ(refusal_of(start + "cells: [nowhere.yaml]\n"), Refusal(folder_.file("nowhere.yaml")));
+  EXPECT_EQ(refusal_of(start + "cells: []\n"), at(4, "cells").beyond(0, 1));
 }
 
 TEST_F(ServerConfigTest, RefusesAFileThatIsNotThere) { EXPECT_FALSE(read_server_config(folder_.file("nowhere.yaml"))); }

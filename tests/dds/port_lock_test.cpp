@@ -25,7 +25,7 @@ TEST(PortLock, ASecondServerOnThePortIsRefused) {
     const auto second = PortLock::take(kHere, port);
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().code, ErrorCode::kConflict);
-    EXPECT_EQ(refusal_of(second), Refusal("?"));
+    EXPECT_EQ(refusal_of(second), Refusal("", {}, "port").of(ErrorCode::kConflict).value(port));
     EXPECT_TRUE(PortLock::take(kHere, static_cast<std::uint16_t>(port + 1)));
   }
   EXPECT_TRUE(PortLock::take(kHere, port));
@@ -42,7 +42,7 @@ TEST(PortLock, APortOfAnotherProgramIsRefused) {
   const auto lock = PortLock::take(kHere, port);
   ::close(other);
   ASSERT_FALSE(lock);
-  EXPECT_EQ(refusal_of(lock), Refusal("?"));
+  EXPECT_EQ(refusal_of(lock), Refusal("", {}, "port").of(ErrorCode::kConflict).value(port));
 }
 
 }  // namespace

@@ -110,7 +110,9 @@ TEST_F(ServiceTest, NobodyThereIsUnreachable) {
   const auto answer = session->predict_error(kCell7, {kJoints});
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().code, ErrorCode::kUnreachable);
-  EXPECT_EQ(refusal_of(answer), Refusal("?"));
+  EXPECT_EQ(answer.error().field, "server");
+  EXPECT_EQ(answer.error().text, fmt::format("300 ms, looking at 127.0.0.1:{} in domain {}", server_.options().port,
+                                             server_.options().domain));
   EXPECT_FALSE(session->servers());
 }
 
@@ -136,7 +138,7 @@ TEST_F(ServiceTest, ATextThatANulWouldCutShortIsNotSent) {
   const auto submitted = session->submit_measurements("cell-7", "lt-07", torn);
   ASSERT_FALSE(submitted) << "the rows before the NUL were taken for the batch";
   EXPECT_EQ(submitted.error().code, ErrorCode::kRefused);
-  EXPECT_EQ(refusal_of(submitted), Refusal("?"));
+  EXPECT_EQ(refusal_of(submitted), Refusal("batch lt-07", 42));
   EXPECT_FALSE(session->import_model("cell-7", torn));
 }
 

@@ -230,7 +230,7 @@ TEST(MeasuringProgram, RefusesRobotsThatAreNoSixAxisArms) {
   Plan plan;
   const Result<std::string> seven = to_rapid(Chain::make("seven", joints).value(), plan, {});
   ASSERT_FALSE(seven);
-  EXPECT_EQ(refusal_of(seven), Refusal("?"));
+  EXPECT_EQ(refusal_of(seven), Refusal("", {}, "joints").beyond(7, 6));
   joints[3].type = JointType::kPrismatic;
   EXPECT_FALSE(to_krl(Chain::make("rail in the middle", joints).value(), plan, {}));
   joints.resize(4);

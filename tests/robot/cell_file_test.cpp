@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "server/base/text_file.h"
@@ -69,13 +70,16 @@ TEST(CellFile, RefusesWithFileKeyAndReason) {
     EXPECT_FALSE(read);
     return refusal_of(read);
   };
-  EXPECT_EQ(refusal(with(cell, "gravity:", "gravtiy:"), robot), Refusal("?"));
-  EXPECT_EQ(refusal(with(cell, "mass_kg: 100", "mass_kg: heavy"), robot), Refusal("?"));
-  EXPECT_EQ(refusal(with(cell, "q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 1, 0, 0]"), robot), Refusal("?"));
-  EXPECT_EQ(refusal(with(cell, "version: 1", "version: 2"), robot), Refusal("?"));
-  EXPECT_EQ(refusal(cell, with(robot, "limits_deg: [-65, 85]", "limits_deg: [85, -65]")), Refusal("?"));
-  EXPECT_EQ(refusal(cell + "cell: twice\n", robot), Refusal("?"));
-  EXPECT_EQ(refusal("", robot), Refusal("?"));
+  EXPECT_EQ(refusal(with(cell, "gravity:", "gravtiy:"), robot), Refusal("cell.yaml", 6, "gravtiy"));
+  EXPECT_EQ(refusal(with(cell, "mass_kg: 100", "mass_kg: heavy"), robot),
+            Refusal("cell.yaml", 10, "payloads: spindle: mass_kg").text("heavy"));
+  EXPECT_EQ(refusal(with(cell, "q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 1, 0, 0]"), robot),
+            Refusal("cell.yaml", 5, "base: q_wxyz").beyond(std::sqrt(2.0), 1));
+  EXPECT_EQ(refusal(with(cell, "version: 1", "version: 2"), robot), Refusal("cell.yaml", 2, "version").beyond(2, 1));
+  EXPECT_EQ(refusal(cell, with(robot, "limits_deg: [-65, 85]", "limits_deg: [85, -65]")),
+            Refusal("cell.yaml (robot)", {}, "joints 2: limits").beyond(from_deg(85), from_deg(-65)));
+  EXPECT_EQ(refusal(cell + "cell: twice\n", robot), Refusal("cell.yaml", 3, "cell"));
+  EXPECT_EQ(refusal("", robot), Refusal("cell.yaml"));
   EXPECT_FALSE(read_cell("/no/such/cell.yaml"));
 }
 
@@ -88,7 +92,7 @@ TEST(CellFile, TheOnlyToolNeedsNoName) {
   two.tools["gripper"] = Pose::Identity();
   const Result<std::string> ambiguous = resolve_tool(two, "");
   ASSERT_FALSE(ambiguous);
-  EXPECT_EQ(refusal_of(ambiguous), Refusal("?"));
+  EXPECT_EQ(refusal_of(ambiguous), Refusal("", {}, "tool_id"));
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ TEST(CellSources, OfAnAliasAreRefusedInsteadOfChangedElsewhere) {
   const auto edited =
       with_error_sources("list: &l [base]\nmodel: {error_sources: *l, bias: se}\n", kExtended, "c.yaml");
   ASSERT_FALSE(edited);
-  EXPECT_EQ(refusal_of(edited), Refusal("?"));
+  EXPECT_EQ(refusal_of(edited), Refusal("c.yaml", {}, "model: error_sources"));
 }
 
 }  // namespace

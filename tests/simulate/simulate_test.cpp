@@ -50,7 +50,7 @@ TEST(Simulate, RefusesPosesTheRobotCannotTake) {
   q(1, 2) = from_deg(71);
   const Result<MeasurementBatch> beyond = simulate(robot, q, {});
   ASSERT_FALSE(beyond);
-  EXPECT_EQ(refusal_of(beyond), Refusal("?"));
+  EXPECT_EQ(refusal_of(beyond), Refusal("", {}, "q3_deg").beyond(71, 70));
 }
 
 TEST(TruthFile, RefusesUnknownSourcesParametersAndKeys) {
@@ -60,9 +60,11 @@ TEST(TruthFile, RefusesUnknownSourcesParametersAndKeys) {
     EXPECT_FALSE(read) << text;
     return refusal_of(read);
   };
-  EXPECT_EQ(refusal("version: 1\nerror_sources: {gremlins: {}}\n"), Refusal("?"));
-  EXPECT_EQ(refusal("version: 1\nerror_sources: {base: {x0: 1}}\n"), Refusal("?"));
-  EXPECT_EQ(refusal("version: 1\nerror_sources: {}\nnoises: {}\n"), Refusal("?"));
+  EXPECT_EQ(refusal("version: 1\nerror_sources: {gremlins: {}}\n"),
+            Refusal(folder.file("truth.yaml"), 2, "error_sources").text("gremlins"));
+  EXPECT_EQ(refusal("version: 1\nerror_sources: {base: {x0: 1}}\n"),
+            Refusal(folder.file("truth.yaml"), 2, "error_sources: base: x0"));
+  EXPECT_EQ(refusal("version: 1\nerror_sources: {}\nnoises: {}\n"), Refusal(folder.file("truth.yaml"), 3, "noises"));
 }
 
 }  // namespace

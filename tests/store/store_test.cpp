@@ -402,7 +402,7 @@ TEST_F(StoreTest, RefusesASecondWriterAndNamesTheFirst) {
   const auto second = Store::open(path_);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kConflict);
-  EXPECT_EQ(refusal_of(second), Refusal("?"));
+  EXPECT_EQ(refusal_of(second), Refusal(path_).of(ErrorCode::kConflict));
 }
 
 TEST_F(StoreTest, RefusesASecondWriterThatComesByALink) {
@@ -429,7 +429,7 @@ TEST_F(StoreTest, RefusesANewerSchema) {
   const auto opened = Store::open(path_);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kRefused);
-  EXPECT_EQ(refusal_of(opened), Refusal("?"));
+  EXPECT_EQ(refusal_of(opened), Refusal(path_, {}, "schema").beyond(3, 2));
 }
 
 TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
@@ -437,7 +437,7 @@ TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
   const auto opened = Store::open(text);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
-  EXPECT_EQ(refusal_of(opened), Refusal("?"));
+  EXPECT_EQ(refusal_of(opened), Refusal(text).of(ErrorCode::kInternal));
 }
 
 TEST_F(StoreTest, AFolderThatDoesNotExistIsAnError) {
@@ -463,7 +463,7 @@ TEST_F(StoreTest, ADamagedFileIsAnErrorThatNamesIt) {
   const auto opened = Store::open(path_);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
-  EXPECT_EQ(refusal_of(opened), Refusal("?"));
+  EXPECT_EQ(refusal_of(opened), Refusal(path_).of(ErrorCode::kInternal));
 }
 
 TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {

@@ -143,7 +143,7 @@ TEST_F(Extend, IsRefusedWhereNothingWasNamed) {
   diagnosis_.sources_after = diagnosis_.sources_before;
   const auto extension = extend(cell_, batch_, diagnosis_, {});
   ASSERT_FALSE(extension);
-  EXPECT_EQ(refusal_of(extension), Refusal("?"));
+  EXPECT_EQ(refusal_of(extension), Refusal("batch " + diagnosis_.batch.id));
 }
 
 TEST_F(Extend, IsRefusedWithoutPosesToJudgeItBy) {

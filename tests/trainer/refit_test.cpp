@@ -150,7 +150,8 @@ TEST(Refit, OrientationsOfFewPosesAreHeldAgainstTheToolThatTheModelKnows) {
   for (Measurement& m : four.measurements) m.R_WT = *m.R_WT * rotation_exp({0, 0, from_deg(30)});
   const auto refused = train(cell, four, from(model, {"base"}));
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refusal_of(refused), Refusal("?"));
+  EXPECT_EQ(refused.error().text, "against tool 'spindle'");
+  EXPECT_NEAR(refused.error().value.value_or(0), 30, 0.5) << sentence(refused.error());
 }
 
 TEST(Refit, ABaseFromTwentyPositionsAtOneWristIsAsGoodAsTheModelItself) {
@@ -310,7 +311,7 @@ TEST(Refit, RefusesAFrameThatIsNotTheModelsAndIsNotNamed) {
   other->tools.at("spindle")->translation().z() += 0.05;
   const auto refused = train(other, test::measured(robot, 20, 89), from(model, {"base"}));
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refusal_of(refused), Refusal("?"));
+  EXPECT_EQ(refusal_of(refused), Refusal("", {}, "tool: xyz_mm").value(50));
 }
 
 TEST(Refit, AToolThatIsTurnedInTheCellFileAndNotNamedIsToldAsAFrameNotAsOrientations) {
@@ -321,7 +322,7 @@ TEST(Refit, AToolThatIsTurnedInTheCellFileAndNotNamedIsToldAsAFrameNotAsOrientat
   turned->tools.at("spindle")->linear() = Matrix3::Identity();
   const auto refused = train(turned, test::measured(robot, 20, 96), from(model, {"base"}));
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refusal_of(refused), Refusal("?"));
+  EXPECT_EQ(refusal_of(refused), Refusal("", {}, "tool: q_wxyz").value(45));
 }
 
 class MeasuredRobot : public testing::Test {

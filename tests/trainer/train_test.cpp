@@ -253,7 +253,8 @@ TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
 TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
   const auto cell = test::cell_7();
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 63);
-  EXPECT_EQ(refusal_of(train(cell, batch, quick("M1", "se * joint_map"))), Refusal("?"));
+  EXPECT_EQ(refusal_of(train(cell, batch, quick("M1", "se * joint_map"))),
+            Refusal("", {}, "bias").text("se * joint_map"));
 }
 
 /// A real robot with base and tool unknown: ../shared/data, where it is at hand.

@@ -163,7 +163,7 @@ TEST_F(TrainerTest, ARetrainChoosesTheBiasItselfWhereAsked) {
   EXPECT_EQ(store_->model("cell-7", chosen.model_version)->parts().bias_choice->kernel, "none");
   const auto unknown = trainer_->retrain("cell-7", {"lt-07"}, "", "automatic");
   ASSERT_FALSE(unknown);
-  EXPECT_EQ(refusal_of(unknown), Refusal("?"));
+  EXPECT_EQ(refusal_of(unknown), Refusal("", {}, "bias").text("automatic"));
 }
 
 TEST_F(TrainerTest, StoresAWorseModelAndLeavesTheBetterOneInForce) {
@@ -606,7 +606,7 @@ TEST_F(TrainerTest, ABatchThatNothingExplainsIsKeptApartUntilItIsReleased) {
 
   const auto again = trainer_->retrain("cell-7", {"lt-07", "lt-08"}, "", "");
   ASSERT_FALSE(again);
-  EXPECT_EQ(refusal_of(again), Refusal("?"));
+  EXPECT_EQ(refusal_of(again), Refusal("", {}, "batch").text("lt-08"));
   ASSERT_TRUE(trainer_->release("cell-7", "lt-08"));
   EXPECT_TRUE(trainer_->quarantined("")->empty());
   EXPECT_EQ(retrain({"lt-08"}).stage, JobStage::kDone);
