@@ -19,10 +19,6 @@ constexpr int kMostRounds = 5;         // of taking off the bias and finding the
 constexpr double kSettledTurn = 1e-9;  // rad
 constexpr double kBeyondChance = 3;    // standard deviations of chi^2
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 /// A frame that the cell knows, and that is not named, must be the model's.
 Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said, const Pose& kept,
                         const std::string& source) {
