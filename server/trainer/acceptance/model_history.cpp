@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "server/trainer/acceptance/fits_cell.h"
 
 namespace trammel {

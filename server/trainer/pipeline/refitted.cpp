@@ -29,10 +29,13 @@ Status check_same_frame(const Cell& cell, const std::string& what, const std::op
   if (!said) return {};
   const Vector6 difference = pose_difference(*said, kept);
   if (difference.cwiseAbs().maxCoeff() <= kSameFrame) return {};
+  const double shift_mm = to_mm(difference.head<3>().norm());
+  const double turn_deg = to_deg(difference.tail<3>().norm());
+  const bool shifted = shift_mm > to_mm(kSameFrame);
   return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from", cell.name, what,
-                 to_mm(difference.head<3>().norm()), to_deg(difference.tail<3>().norm()))
-      .of(source)
-      .with_value(to_mm(difference.head<3>().norm()))
+                 shift_mm, turn_deg)
+      .of(fmt::format("{}: {}", source, shifted ? "xyz_mm" : "q_wxyz"))
+      .with_value(shifted ? shift_mm : turn_deg)
       .next(fmt::format("name {} among what is refitted, or leave it in the cell file as the model has it", source));
 }
 
