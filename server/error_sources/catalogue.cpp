@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <memory>
-#include <mutex>
 
 #include "server/base/check.h"
+#include "server/base/mutex.h"
 #include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
@@ -23,20 +23,20 @@ Records shipped() {
 class Catalogue {
  public:
   std::shared_ptr<const Records> records() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return records_;
   }
   template <typename Change>
   void change(const Change& change) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     auto changed = std::make_shared<Records>(*records_);
     change(*changed);
     records_ = std::move(changed);
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Records> records_ = std::make_shared<Records>(shipped());
+  mutable Mutex mutex_;
+  std::shared_ptr<const Records> records_ TRAMMEL_GUARDED_BY(mutex_) = std::make_shared<Records>(shipped());
 };
 
 /// Made at its first use, whichever comes first of the program's own.
@@ -68,6 +68,14 @@ const CauseRecord& cause_spelled(std::string_view spelling) {
   const CauseRecord* found = find_cause(spelling);
   TRAMMEL_CHECK(found != nullptr);
   return *found;
+}
+
+const CauseRecord& first_searched_by(causes::SearchFamily family) {
+  const auto records = catalogue().records();
+  const auto found = std::find_if(records->begin(), records->end(),
+                                  [&](const CauseRecord* record) { return record->search == family; });
+  TRAMMEL_CHECK(found != records->end());
+  return **found;
 }
 
 namespace {
@@ -114,11 +122,7 @@ class Missing {
     want(record_.scope != causes::Scope::kJoint || !record_.plain_name_of_joint.empty(), "plain_name_of_joint");
     const bool is_step = record_.lasting == causes::Lasting::kFromAPose;
     want(!is_step || record_.whole_batch.has_value(), "whole_batch: what a batch shows that it began before");
-    want(!is_step || std::any_of(record_.rivals.begin(), record_.rivals.end(),
-                                 [](const causes::Rival& rival) {
-                                   return rival.likeness == causes::Likeness::kFromTheFirstPose;
-                                 }),
-         "rivals: what it would be from the first pose on");
+    want(!is_step || whole_of(record_) != nullptr, "rivals: what it would be from the first pose on");
   }
 
   const CauseRecord& record_;

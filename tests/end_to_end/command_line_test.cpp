@@ -171,6 +171,24 @@ TEST_F(CommandLine, WrongUsageEndsWith2AndNamesWhatIsWrong) {
   }
 }
 
+TEST_F(CommandLine, ARefusalIsDataWhereTheResultWasToBeJsonOnStandardOutput) {
+  const std::string batch = folder_.write("bad.csv", "q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n1,2,3e7,4\n");
+  const Finished refused = trammel({"diagnose", "--cell", cell_, "--batch", batch, "--json", "-"});
+  EXPECT_EQ(refused.exit_code, kRefusedData);
+  const json error = json::parse(refused.out).at("error");
+  EXPECT_EQ(error.at("code"), "refused");
+  EXPECT_EQ(error.at("file"), batch);
+  EXPECT_EQ(error.at("row"), 3);
+  EXPECT_EQ(error.at("field"), "y_mm");
+  EXPECT_EQ(error.at("value"), 3e7);
+  EXPECT_EQ(error.at("limit"), 1e6);
+  EXPECT_EQ(refused.err, "trammel diagnose: " + error.at("sentence").get<std::string>() + "\n");
+  const Finished into_file = trammel({"diagnose", "--cell", cell_, "--batch", batch, "--json", file("out")});
+  EXPECT_EQ(into_file.exit_code, kRefusedData);
+  EXPECT_EQ(into_file.out, "");
+  EXPECT_FALSE(std::filesystem::exists(file("out"))) << "a file stays as it was";
+}
+
 TEST_F(CommandLine, ALevelThatDoesNotExistIsWrongUsage) {
   const std::string batch = measure("b", 20, 1);
   const Finished finished = trammel({"train", "--cell", cell_, "--batch", batch, "--level", "M9", "-o", file("out")});
