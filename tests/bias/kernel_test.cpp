@@ -226,7 +226,7 @@ TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
     EXPECT_EQ(refusal_of(spelled_kernel(spelling)), Refusal("", {}, "bias").value(character).text(spelling))
         << spelling;
   }
-  for (const std::string& unknown : {"se + gauss", "none + se"}) {
+  for (const std::string unknown : {"se + gauss", "none + se"}) {
     const auto kernel = spelled_kernel(unknown);
     EXPECT_EQ(refusal_of(kernel), Refusal("", {}, "bias").text(unknown));
     for (const char* known : {"auto", "se", "matern52", "periodic", "joint_map", "parameters"}) {

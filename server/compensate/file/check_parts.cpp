@@ -126,7 +126,9 @@ Status check_ranges(const ModelParts& parts) {
   for (const auto& [tool, payload] : parts.trained_with) {
     const Cell& cell = *parts.physics.cell;
     if (!cell.tools.contains(tool) || (!payload.empty() && !cell.payloads.contains(payload)))
-      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload);
+      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload)
+          .of("trained_with")
+          .with_text(tool);
   }
   return {};
 }
