@@ -14,8 +14,8 @@
 #include "tests/support/from_rows.h"
 #include "tests/support/virtual_robot.h"
 
-// The README's recipe for adding a cause, followed to the letter: one file (tests/error_sources/hose_pull.h) and one
-// line that registers it. Nothing else anywhere knows of it.
+// The recipe of server/error_sources/README.md for adding a cause, followed to the letter: one file
+// (tests/error_sources/hose_pull.h) and one line that registers it. Nothing else anywhere knows of it.
 
 namespace trammel {
 namespace {
