@@ -110,7 +110,7 @@ Status check_origin(const CompensatedModel::Parts::BiasOrigin& origin, Eigen::In
     if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
       return refused("model: the physics that its bias was learned beside has no {}", name).of("bias").with_text(name);
   }
-  Status fine = check_frames(origin.physics, "where its bias was learned, ");
+  Status fine = check_frames(origin.physics, "bias_origin: ");
   if (fine) fine = check_size(origin.covariance, P);
   if (fine) fine = check_covariance(origin.covariance);
   return fine;
@@ -124,7 +124,9 @@ Status check_ranges(const CompensatedModel::Parts& parts) {
   for (const auto& [tool, payload] : parts.trained_with) {
     const Cell& cell = *parts.physics.cell;
     if (!cell.tools.contains(tool) || (!payload.empty() && !cell.payloads.contains(payload)))
-      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload);
+      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload)
+          .of("trained_with")
+          .with_text(tool);
   }
   return {};
 }

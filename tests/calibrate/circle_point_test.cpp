@@ -287,19 +287,19 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   EXPECT_EQ(refusal(missing, nominal), Refusal(good.where, {}, "joint").value(4));
   ArcList few = good;
   few.points.erase(few.points.begin());
-  EXPECT_EQ(refusal(few, nominal), Refusal(good.where, 2, "joint").beyond(4, 5));
+  EXPECT_EQ(refusal(few, nominal), Refusal(good.where, 3, "joint").beyond(4, 5));
   ArcList moved = good;
   moved.points[6].q(4) = 0.1;
   EXPECT_EQ(refusal(moved, nominal), Refusal(good.where, 8, "q5_deg").beyond(5.72958, 0));
   ArcList wrong_angle = good;
   wrong_angle.points[6].q(1) += from_deg(3);
-  EXPECT_EQ(refusal(wrong_angle, nominal), Refusal("?"));
+  EXPECT_EQ(refusal(wrong_angle, nominal), Refusal(good.where, 7, "q_deg").beyond(2.57143, 1));
   ArcList line = good;
   for (ArcPoint& point : line.points) {
     if (point.joint == 1) point.p_W = Vector3(point.q(1), 0, 0);
   }
-  EXPECT_EQ(refusal(line, nominal), Refusal("?"));
-  EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")), Refusal("?"));
+  EXPECT_EQ(refusal(line, nominal), Refusal(good.where, 7, "joint").value(2));
+  EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")), Refusal(good.where, {}, "a1").beyond(320, 100));
   std::vector<Joint> plain;
   for (int i = 0; i < 6; ++i) plain.push_back(nominal.joint(i));
   plain[1].hayati = false;

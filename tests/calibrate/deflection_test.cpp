@@ -198,7 +198,8 @@ TEST(Deflection, Refuses) {
   EXPECT_EQ(refusal_of(fit_deflection(data, {.load_bias = {5}})), Refusal(data.where, {}, "element").value(5));
   Truth one_place = forearm();
   one_place.reflectors = {0.5};
-  EXPECT_EQ(refusal_of(fit_deflection(measured(one_place, 13e-6, 1), {.load_bias = {3}})), Refusal("?"));
+  EXPECT_EQ(refusal_of(fit_deflection(measured(one_place, 13e-6, 1), {.load_bias = {3}})),
+            Refusal("d.csv").beyond(4, 5));
 }
 
 TEST(DeflectionCsv, ReadsReadingsAndRefusesWithRow) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/support/refusal.h"
 
 namespace trammel {
@@ -80,7 +82,8 @@ TEST(CsvTable, ReadsNumbersWholeOrNotAtAll) {
   EXPECT_EQ(refusal_of(table->number(2, 0)), Refusal("f.csv", 4, "a").text("1.5mm"));
   EXPECT_EQ(refusal_of(table->number(3, 0)), Refusal("f.csv", 5, "a").text("nan"));
   EXPECT_EQ(refusal_of(table->number(4, 0)), Refusal("f.csv", 6, "a").text("-inf"));
-  EXPECT_EQ(refusal_of(table->number(5, 0, 1000)), Refusal("f.csv", 7, "a").beyond(inf, 1000).text("1e400"));
+  EXPECT_EQ(refusal_of(table->number(5, 0, 1000)),
+            Refusal("f.csv", 7, "a").beyond(std::numeric_limits<double>::infinity(), 1000).text("1e400"));
   EXPECT_EQ(refusal_of(table->number(6, 0, 1000)), Refusal("f.csv", 8, "a").beyond(2000, 1000));
   EXPECT_EQ(refusal_of(table->number(7, 0)), Refusal("f.csv", 9, "a"));
   EXPECT_FALSE(table->number(8, 0));
