@@ -129,12 +129,12 @@ TEST(ModelFile, NestedAMillionDeepIsRefusedOnTheSmallestStack) {
 }
 
 TEST(ModelFile, WhatIsTooLargeIsRefusedBeforeItIsParsed) {
-  EXPECT_EQ(refusal_with(repeated("[", 30'000'000)), Refusal("?"));
-  EXPECT_EQ(refusal_with(file_with("[" + repeated("[],", 10'000'000) + "1]")), Refusal("?"));
-  EXPECT_EQ(refusal_with(file_with("[" + repeated("0,", 20'000'000) + "0]")), Refusal("?"));
-  EXPECT_EQ(refusal_with(file_with('"' + std::string(100'000'000, 'x') + '"')), Refusal("?"));
-  EXPECT_EQ(refusal_with(file_with(std::string(100'000'000, '9'))), Refusal("?"));
-  EXPECT_EQ(refusal_with(std::string(300'000'000, ' ')), Refusal("?"));
+  EXPECT_EQ(refusal_with(repeated("[", 30'000'000)), too_large(17, 16));
+  EXPECT_EQ(refusal_with(file_with("[" + repeated("[],", 10'000'000) + "1]")), too_large(200'001, 200'000));
+  EXPECT_EQ(refusal_with(file_with("[" + repeated("0,", 20'000'000) + "0]")), too_large(16'000'001, 16'000'000));
+  EXPECT_EQ(refusal_with(file_with('"' + std::string(100'000'000, 'x') + '"')), too_large(100'000'002, 1'048'576));
+  EXPECT_EQ(refusal_with(file_with(std::string(100'000'000, '9'))), too_large(100'000'000, 64));
+  EXPECT_EQ(refusal_with(std::string(300'000'000, ' ')), too_large(300'000'000, 268'435'456));
 }
 
 TEST(ModelFile, AnyTypeInAnyPlaceIsRefusedInASentence) {
@@ -174,46 +174,60 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
     return json{{"rows", 3}, {"columns", 4}, {"values", std::move(values)}};
   };
   const auto refused_with = [](const std::function<void(json&)>& change) { return refusal_with(spoiled(change)); };
-  EXPECT_EQ(refused_with([&](json& c) { c["X_WB"] = frame({2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}); }), Refusal("?"));
+  EXPECT_EQ(refused_with([&](json& c) {
+              c["X_WB"] = frame({2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+            }),
+            Refusal("cell.model", {}, "base").beyond(3, 1e-06));
   EXPECT_EQ(refused_with([&](json& c) {
               c["tools"]["spindle"] = frame({-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
             }),
-            Refusal("?"));
-  EXPECT_EQ(refused_with([&](json& c) { c["X_WB"] = frame({1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0}); }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["values"]["values"][0] = nullptr; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][1] = 1e-9; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][0] = -1e-9; }), Refusal("?"));
+            Refusal("cell.model", {}, "tool spindle").beyond(0, 1e-06));
+  EXPECT_EQ(refused_with([&](json& c) {
+              c["X_WB"] = frame({1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0});
+            }),
+            Refusal("cell.model", {}, "base"));
+  EXPECT_EQ(refused_with([](json& c) { c["values"]["values"][0] = nullptr; }), Refusal("cell.model"));
+  EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][1] = 1e-9; }),
+            Refusal("cell.model", {}, "covariance").beyond(0.1, 1e-06));
+  EXPECT_EQ(refused_with([](json& c) { c["covariance"]["values"][0] = -1e-9; }),
+            Refusal("cell.model", {}, "covariance").beyond(-1e-09, 0));
   EXPECT_EQ(refused_with([](json& c) {
               c["covariance"]["values"][0] = 0;
               c["covariance"]["values"][1] = 1e-9;
             }),
-            Refusal("?"));
+            Refusal("cell.model", {}, "covariance"));
   EXPECT_EQ(refused_with([](json& c) {
               const std::size_t P = c["covariance"]["rows"];
               c["covariance"]["values"][1] = c["covariance"]["values"][P] = 1.5e-8;
             }),
-            Refusal("?"));
+            Refusal("cell.model", {}, "covariance"));
   EXPECT_EQ(refused_with([](json& c) {
               c["covariance"] = {{"rows", 1}, {"columns", 1}, {"values", {1.0}}};
             }),
-            Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["parameters"].erase(0); }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["parameters"][0]["stddev"] = -1; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["rank"] = 99; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["q_min"]["values"][0] = 9; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["trained_with"] = json::array({json::array({"drill", ""})}); }), Refusal("?"));
+            Refusal("cell.model", {}, "covariance").beyond(1, 6));
+  EXPECT_EQ(refused_with([](json& c) { c["parameters"].erase(0); }),
+            Refusal("cell.model", {}, "parameters").beyond(5, 6));
+  EXPECT_EQ(refused_with([](json& c) { c["parameters"][0]["stddev"] = -1; }),
+            Refusal("cell.model", {}, "x0").beyond(-1, 0));
+  EXPECT_EQ(refused_with([](json& c) { c["rank"] = 99; }), Refusal("cell.model", {}, "rank").beyond(99, 6));
+  EXPECT_EQ(refused_with([](json& c) { c["q_min"]["values"][0] = 9; }), Refusal("cell.model", {}, "joint_ranges"));
+  EXPECT_EQ(refused_with([](json& c) {
+              c["trained_with"] = json::array({json::array({"drill", ""})});
+            }),
+            Refusal("cell.model", {}, "trained_with").text("drill"));
   EXPECT_EQ(refused_with([](json& c) { c["error_sources"] = std::vector<std::string>(100'000, "base"); }),
-            Refusal("?"));
+            Refusal("cell.model", {}, "error_sources").beyond(100000, 500));
   EXPECT_EQ(refused_with([](json& c) { c["error_sources"] = {"gear_transmission:3@" + repeated("5+", 9999)}; }),
-            Refusal("?"));
+            Refusal("cell.model", {}, "error_sources").beyond(20018, 1000));
   EXPECT_EQ(refused_with([](json& c) {
               c["error_sources"] = json::array();
               for (int joint = 1; joint <= 6; ++joint)
                 c["error_sources"].push_back(fmt::format("joint_map:{}@500", joint));
             }),
-            Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["cell_yaml"] = "[[["; }), Refusal("?"));
-  EXPECT_EQ(refused_with([](json& c) { c["robot_yaml"] = repeated("[", 100'000); }), Refusal("?"));
+            Refusal("cell.model", {}, "error_sources").beyond(5000, 4000).text("joint_map:5@500"));
+  EXPECT_EQ(refused_with([](json& c) { c["cell_yaml"] = "[[["; }), Refusal("cell.model"));
+  EXPECT_EQ(refused_with([](json& c) { c["robot_yaml"] = repeated("[", 100'000); }),
+            Refusal("cell.model (robot)").of(ErrorCode::kTooLarge).beyond(21, 20));
 }
 
 TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
@@ -228,23 +242,27 @@ TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
                 {"offset", matrix(3, 1, 0)},
                 {"hyperparameters", matrix(3, 3, -9)}};
   };
-  const auto message = [&](const std::string& kernel, std::size_t poses) {
+  const auto refused_bias = [&](const std::string& kernel, std::size_t poses) {
     return refusal_with(spoiled([&](json& c) { c["bias"] = bias_of(kernel, poses); }));
   };
-  EXPECT_EQ(message("se", 100'000), Refusal("?"));
-  EXPECT_EQ(message("se" + repeated(" + se", 50), 20), Refusal("?"));
-  EXPECT_EQ(message(repeated("(", 100'000), 20), Refusal("?"));
+  EXPECT_EQ(refused_bias("se", 100'000),
+            Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(100000, 20000));
+  EXPECT_EQ(
+      refused_bias("se" + repeated(" + se", 50), 20),
+      Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(51, 32).text("se" + repeated(" + se", 50)));
+  EXPECT_EQ(refused_bias(repeated("(", 100'000), 20),
+            Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(100000, 1000));
   EXPECT_EQ(refusal_with(spoiled([&](json& c) {
               c["bias"] = bias_of("se", 20);
               c["bias"]["hyperparameters"]["values"][0] = 1e300;
             })),
-            Refusal("?"));
+            Refusal("cell.model", {}, "bias"));
 }
 
 TEST(ModelFile, ADeviceThatNeverEndsIsNoModel) {
   const Result<CompensatedModel> endless = load_model("/dev/zero");
   ASSERT_FALSE(endless);
-  EXPECT_EQ(refusal_of(endless), Refusal("?"));
+  EXPECT_EQ(refusal_of(endless), Refusal("/dev/zero").of(ErrorCode::kTooLarge).beyond((1 << 28) + (1 << 16), 1 << 28));
 }
 
 }  // namespace

@@ -112,7 +112,7 @@ Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
                      [&](const auto& one) { return &one->cause() == find_cause(name); }))
       return refused("model: the physics that its bias was learned beside has no {}", name).of("bias").with_text(name);
   }
-  Status fine = check_frames(origin.physics, "where its bias was learned, ");
+  Status fine = check_frames(origin.physics, "bias_origin: ");
   if (fine) fine = check_size(origin.covariance, P);
   if (fine) fine = check_covariance(origin.covariance);
   return fine;
