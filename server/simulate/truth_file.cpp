@@ -78,7 +78,11 @@ VirtualRobot read_truth(const YamlMap& map, const std::shared_ptr<const Cell>& c
   if (map.integer("version", 0) != 1) map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
   const YamlMap sources = map.map("error_sources");
   Result<PhysicalModel> model = make_physical_model(cell, sources.keys());
-  if (!model) map.refuse("error_sources", Failure(model.error()).as(ErrorCode::kRefused));
+  if (!model) {
+    Error wrong = model.error();
+    wrong.field.clear();  // it is the key's
+    map.refuse("error_sources", Failure(std::move(wrong)).as(ErrorCode::kRefused));
+  }
   VirtualRobot robot{std::move(*model), cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
   read_sources(sources, robot.truth);
   if (map.has("noise")) read_noise(map.map("noise"), robot);

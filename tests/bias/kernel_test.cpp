@@ -226,9 +226,11 @@ TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
     EXPECT_EQ(refusal_of(spelled_kernel(spelling)), Refusal("", {}, "bias").value(character).text(spelling))
         << spelling;
   }
-  for (const std::string unknown : {"se + gauss", "none + se"}) {
-    const auto kernel = spelled_kernel(unknown);
-    EXPECT_EQ(refusal_of(kernel), Refusal("", {}, "bias").text(unknown));
+  const std::vector<std::pair<std::string, std::string>> unknown_words = {{"se + gauss", "gauss"},
+                                                                          {"none + se", "none"}};
+  for (const auto& [spelling, word] : unknown_words) {
+    const auto kernel = spelled_kernel(spelling);
+    EXPECT_EQ(refusal_of(kernel), Refusal("", {}, "bias").text(word));
     for (const char* known : {"auto", "se", "matern52", "periodic", "joint_map", "parameters"}) {
       EXPECT_TRUE(kernel.error().next.find(known) != std::string::npos) << known;
     }

@@ -293,7 +293,7 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   EXPECT_EQ(refusal(moved, nominal), Refusal(good.where, 8, "q5_deg").beyond(5.72958, 0));
   ArcList wrong_angle = good;
   wrong_angle.points[6].q(1) += from_deg(3);
-  EXPECT_EQ(refusal(wrong_angle, nominal), Refusal(good.where, 7, "q_deg").beyond(2.57143, 1));
+  EXPECT_EQ(refusal(wrong_angle, nominal), Refusal(good.where, 8, "q_deg").beyond(2.57143, 1));
   ArcList line = good;
   for (ArcPoint& point : line.points) {
     if (point.joint == 1) point.p_W = Vector3(point.q(1), 0, 0);

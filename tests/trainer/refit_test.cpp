@@ -277,14 +277,17 @@ TEST(Refit, AModelFileWhoseBiasWasLearnedNowhereIsRefusedThoughItsHashFits) {
               origin["error_sources"] = nlohmann::json::array();
               origin["values"] = {{"rows", 0}, {"columns", 1}, {"values", nlohmann::json::array()}};
             }),
-            Refusal("?"));
-  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["X_WB"]["values"][0] = 5; }), Refusal("?"));
-  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; }), Refusal("?"));
-  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["covariance"]["values"][0] = -1e-3; }), Refusal("?"));
+            Refusal("file", {}, "bias").text("base"));
+  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["X_WB"]["values"][0] = 5; }),
+            Refusal("file", {}, "where its bias was learned, base").beyond(24, 1e-6));
+  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; }),
+            Refusal("file", {}, "where its bias was learned, tool spindle"));
+  EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["covariance"]["values"][0] = -1e-3; }),
+            Refusal("file", {}, "covariance").beyond(-1e-3, 0));
   EXPECT_EQ(refusal([](nlohmann::json& origin) {
               origin["covariance"] = {{"rows", 1}, {"columns", 1}, {"values", {1.0}}};
             }),
-            Refusal("?"));
+            Refusal("file", {}, "covariance").beyond(1, 30));
 }
 
 TEST(Refit, ACauseThatTheModelDidNotHaveIsAdded) {

@@ -18,7 +18,11 @@ Status check_frame(const Pose& X, const std::string& name) {
     return refused("model: {}: its place is no length, limit {:g} m", name, kMostMetres).of(name);
   const Matrix3 R = X.linear();
   const double off = (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
-  if (off > kRigid || R.determinant() < 0)
+  if (R.determinant() < 0)
+    return refused("model: {}: its rotation is a mirror image, determinant {:.3g}", name, R.determinant())
+        .of(name)
+        .beyond(R.determinant(), 0);
+  if (off > kRigid)
     return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid)
         .of(name)
         .beyond(off, kRigid);
