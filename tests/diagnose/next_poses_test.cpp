@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/diagnose.h"
+#include "server/diagnose/families/candidates.h"
 #include "server/measurement/checked_batch.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/pose_columns.h"

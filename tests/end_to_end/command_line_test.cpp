@@ -588,7 +588,9 @@ TEST_F(CommandLine, ADiagnosisIsNotBegunWhereItsResultsCouldNotBeKept) {
     EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
     const bool tells_a_program = std::find(more.begin(), more.end(), "-") != more.end();
     EXPECT_EQ(finished.out.empty(), !tells_a_program) << finished.out;
-    if (tells_a_program) EXPECT_EQ(nlohmann::json::parse(finished.out).at("error").at("code"), "usage");
+    if (tells_a_program) {
+      EXPECT_EQ(nlohmann::json::parse(finished.out).at("error").at("code"), "usage");
+    }
   };
   wrong({"--json", "-", "--report", "-"}, kWrongUsage, "both go to standard output");
   wrong({"--json", file("a"), "--report", file("a")}, kWrongUsage, "--report and --json both go to");
