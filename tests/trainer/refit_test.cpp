@@ -279,9 +279,9 @@ TEST(Refit, AModelFileWhoseBiasWasLearnedNowhereIsRefusedThoughItsHashFits) {
             }),
             Refusal("file", {}, "bias").text("base"));
   EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["X_WB"]["values"][0] = 5; }),
-            Refusal("file", {}, "where its bias was learned, base").beyond(24, 1e-6));
+            Refusal("file", {}, "bias_origin: base").beyond(24, 1e-6));
   EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["tools"]["spindle"]["values"][3] = 1e300; }),
-            Refusal("file", {}, "where its bias was learned, tool spindle"));
+            Refusal("file", {}, "bias_origin: tool spindle"));
   EXPECT_EQ(refusal([](nlohmann::json& origin) { origin["covariance"]["values"][0] = -1e-3; }),
             Refusal("file", {}, "covariance").beyond(-1e-3, 0));
   EXPECT_EQ(refusal([](nlohmann::json& origin) {
