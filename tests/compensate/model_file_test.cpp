@@ -181,7 +181,7 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
   EXPECT_EQ(refused_with([&](json& c) {
               c["tools"]["spindle"] = frame({-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
             }),
-            Refusal("cell.model", {}, "tool spindle").beyond(0, 1e-06));
+            Refusal("cell.model", {}, "tool spindle").beyond(-1, 0));
   EXPECT_EQ(refused_with([&](json& c) {
               c["X_WB"] = frame({1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0});
             }),
