@@ -357,6 +357,41 @@ void find_in_code(const SourceTree& tree, const std::regex& pattern, const std::
   }
 }
 
+/// The spellings of the causes that ship, as their list has them.
+std::vector<std::string> shipped_causes(const SourceTree& tree) {
+  static const std::regex kLine(R"(\bCAUSE\((\w+)\))");
+  std::vector<std::string> causes;
+  const auto list = tree.find("server/error_sources/shipped_causes.h");
+  if (list == tree.end()) return causes;
+  for (std::sregex_iterator one(list->second.begin(), list->second.end(), kLine), end; one != end; ++one)
+    if ((*one)[1] != "CAUSE") causes.push_back((*one)[1]);
+  return causes;
+}
+
+/// Complains of whoever asks for a cause by its spelling instead of asking its record: by a comparison, by the
+/// beginning or end of a text, or by a table with a spelling for a key.
+Complaints check_causes(const SourceTree& tree) {
+  std::string any;
+  for (const std::string& cause : shipped_causes(tree)) any += (any.empty() ? "" : "|") + cause;
+  Complaints complaints;
+  if (any.empty()) return complaints;
+  const std::string spelling = "\"(" + any + ")[:@_]?\"";
+  const std::regex asks("[=!]= *" + spelling + "|" + spelling +
+                        " *[=!]=|(starts_with|ends_with|contains|find|count|compare)\\(" + spelling + "|(^|[{,]) *\\{" +
+                        spelling + ", \"");
+  for (const auto& [path, text] : tree) {
+    const bool is_of_server = is_under(path, "server") && !is_under(path, "server/error_sources");
+    if (!is_source(path) || !(is_of_server || is_under(path, "clients"))) continue;
+    std::istringstream lines(text);
+    std::string line;
+    for (int number = 1; std::getline(lines, line); ++number) {
+      if (std::regex_search(line, asks))
+        complaints.push_back(path + ":" + std::to_string(number) + ": asks for a cause by its spelling");
+    }
+  }
+  return complaints;
+}
+
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
   static const std::regex kMayStart(R"(^server/main\.cpp$|^(server/trainer|server/dds|clients/session)/.*)");
@@ -519,9 +554,9 @@ std::vector<Function> functions_of(const SourceTree& tree) {
   return all;
 }
 
-Complaints check_lengths(const SourceTree& tree) {
+Complaints check_lengths(const std::vector<Function>& functions) {
   Complaints complaints;
-  for (const Function& function : functions_of(tree)) {
+  for (const Function& function : functions) {
     if (function.lines <= kMostLines) continue;
     complaints.push_back(function.name + ": " + std::to_string(function.lines) + " lines, limit " +
                          std::to_string(kMostLines));
@@ -530,9 +565,9 @@ Complaints check_lengths(const SourceTree& tree) {
 }
 
 /// `1234 functions, median 8 lines, 90 % at most 23, longest 60`; of one room where `folder` says it.
-std::string lengths_in(const SourceTree& tree, const std::string& folder) {
+std::string lengths_in(const std::vector<Function>& functions, const std::string& folder) {
   std::vector<int> lines;
-  for (const Function& function : functions_of(tree)) {
+  for (const Function& function : functions) {
     if (function.name.starts_with(folder + "/")) lines.push_back(function.lines);
   }
   std::sort(lines.begin(), lines.end());
@@ -594,20 +629,27 @@ TEST(Tidy, LibrariesStayInTheFoldersThatOwnThem) { EXPECT_EQ(shown(check_reserve
 
 TEST(Tidy, NothingIncludesItselfByWayOfOthers) { EXPECT_EQ(shown(check_circles(read_source_tree())), ""); }
 
+TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
+  const SourceTree tree = read_source_tree();
+  EXPECT_GT(shipped_causes(tree).size(), 15u);
+  EXPECT_EQ(shown(check_causes(tree)), "");
+}
+
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
 TEST(Tidy, NobodySleeps) { EXPECT_EQ(shown(check_sleeps(read_source_tree())), ""); }
 
 TEST(Tidy, NoFunctionIsLongerThanAScreen) {
   const SourceTree tree = read_source_tree();
-  EXPECT_EQ(shown(check_lengths(tree)), "");
+  const std::vector<Function> all = functions_of(tree);
+  EXPECT_EQ(shown(check_lengths(all)), "");
   std::set<std::string> rooms;
   for (const auto& [path, text] : tree) rooms.insert(room_of(folder_of(path)));
   for (const std::string& room : rooms) {
     if (is_under(room, "server") || is_under(room, "clients"))
-      std::cout << room << ": " << lengths_in(tree, room) << "\n";
+      std::cout << room << ": " << lengths_in(all, room) << "\n";
   }
-  std::cout << "server: " << lengths_in(tree, "server") << "\nclients: " << lengths_in(tree, "clients") << "\n";
+  std::cout << "server: " << lengths_in(all, "server") << "\nclients: " << lengths_in(all, "clients") << "\n";
 }
 
 TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) { EXPECT_EQ(shown(check_locks(read_source_tree())), ""); }
@@ -763,6 +805,20 @@ TEST(TidyChecks, FindCirclesOfSubfoldersButLetARoomAndItsSubfoldersMeet) {
             "server/a/x: includes itself by way of others\nserver/a/y: includes itself by way of others\n");
 }
 
+TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
+  const std::string list = "#define CAUSES(CAUSE) \\\n  CAUSE(tool) \\\n  CAUSE(joint_map)\n";
+  const auto complaints = [&](const std::string& path, const std::string& line) {
+    return check_causes({{"server/error_sources/shipped_causes.h", list}, {path, line}}).size();
+  };
+  EXPECT_EQ(complaints("server/plan/a.cpp", "if (cause == \"tool\") return;"), 1u);
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (\"joint_map\" != cause) return;"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "name.starts_with(\"joint_map:\")"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "contains(\"tool\")"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "{\"joint_map\", \"a map of a joint\"},"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(\"tool\");"), 0u);
+  EXPECT_EQ(complaints("server/error_sources/tool.cpp", "if (cause == \"tool\") return;"), 0u);
+}
+
 TEST(TidyChecks, FindThreadsInCodeAndNotInComments) {
   EXPECT_EQ(shown(check_threads(
                 {{"server/bias/a.cpp", "int a;\nstd::jthread worker;\n"},
@@ -815,15 +871,19 @@ TEST(TidyChecks, ComplainOfFunctionsThatAreTooLong) {
     for (int i = 2; i < count; ++i) text += "  g();\n";
     return text + "}\n";
   };
-  EXPECT_EQ(shown(check_lengths({{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}})), "");
-  EXPECT_EQ(shown(check_lengths({{"server/a/a.cpp", "\n" + lines(61)}, {"clients/b/b.h", lines(3) + lines(70)}})),
+  EXPECT_EQ(
+      shown(check_lengths(functions_of(SourceTree{{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}}))), "");
+  EXPECT_EQ(shown(check_lengths(functions_of(
+                SourceTree{{"server/a/a.cpp", "\n" + lines(61)}, {"clients/b/b.h", lines(3) + lines(70)}}))),
             "clients/b/b.h:4: f: 70 lines, limit 60\nserver/a/a.cpp:2: f: 61 lines, limit 60\n");
 }
 
 TEST(TidyChecks, TellMedianAndLongestOfARoom) {
-  EXPECT_EQ(lengths_in({{"server/a/a.cpp", "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}},
-                       "server/a"),
-            "2 functions, median 3 lines, 90 % at most 3, longest 4");
+  EXPECT_EQ(
+      lengths_in(functions_of(SourceTree{
+                     {"server/a/a.cpp", "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}}),
+                 "server/a"),
+      "2 functions, median 3 lines, 90 % at most 3, longest 4");
 }
 
 TEST(TidyChecks, FindSleepsEverywhere) {

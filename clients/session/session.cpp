@@ -82,7 +82,7 @@ struct Session::Participant {
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
       Error error = reply.error();
       error.message += fmt::format(" ({})", where_it_looked());
-      return Failure(std::move(error));
+      return Failure(std::move(error)).of("server").with_text(where_it_looked());
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;

@@ -99,7 +99,7 @@ std::optional<long> YamlMap::line_of(const std::string& key) const {
 }
 
 void YamlMap::refuse_at(std::optional<long> line, Failure why) const {
-  if (line) why = std::move(why).at_row(*line);
+  if (!why.value().row) why.value().row = line;
   throw YamlRefusal{(path_.empty() ? std::move(why) : std::move(why).under(path_)).in(file_).value()};
 }
 

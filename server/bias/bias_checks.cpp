@@ -11,8 +11,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kOutputs = 3;
-constexpr Index kFewestObservations = 10;
+constexpr Index kFewestObservations = 10;  // an arm of six joints has eight hyperparameters: fewer decide nothing
 constexpr std::string_view kAxis[] = {"x", "y", "z"};
 
 Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd& sigma) {
@@ -22,7 +21,7 @@ Status check_shape(const MatrixXd& q, const MatrixXd& residual_B, const VectorXd
         .beyond(n, kFewestObservations)
         .in("bias data");
   if (q.cols() < 1) return refused("0 joints, at least 1").beyond(0, 1).in("bias data");
-  if (residual_B.rows() != n || residual_B.cols() != kOutputs)
+  if (residual_B.rows() != n || residual_B.cols() != kCoordinates)
     return refused("residual is {} x {}, should be {} x 3", residual_B.rows(), residual_B.cols(), n)
         .of("residual")
         .beyond(residual_B.rows(), n)
@@ -45,7 +44,7 @@ Status check_numbers(const MatrixXd& q, const MatrixXd& residual_B, const Vector
             .with_value(q(i, j))
             .at_row(i + 1);
     }
-    for (Index d = 0; d < kOutputs; ++d) {
+    for (Index d = 0; d < kCoordinates; ++d) {
       if (!std::isfinite(residual_B(i, d)))
         return refused("residual {} is {}, not finite", kAxis[d], residual_B(i, d))
             .in("bias data")
@@ -100,15 +99,15 @@ Status check_features(const std::string& kernel, const std::vector<BiasFeatures>
 
 Status check_hyperparameters(const BiasState& state, const SpelledBias& bias) {
   const Index rows = bias.kernel->parameter_count(state.q.cols()) + 2;
-  if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kOutputs)
+  if (state.hyperparameters.rows() != rows || state.hyperparameters.cols() != kCoordinates)
     return refused("bias state: hyperparameters are {} x {}, should be {} x 3 for kernel `{}`",
                    state.hyperparameters.rows(), state.hyperparameters.cols(), rows, state.kernel)
         .of("hyperparameters")
         .beyond(state.hyperparameters.rows(), rows);
-  if (state.offset.size() != kOutputs)
+  if (state.offset.size() != kCoordinates)
     return refused("bias state: {} offsets, should be 3", state.offset.size())
         .of("offset")
-        .beyond(state.offset.size(), kOutputs);
+        .beyond(state.offset.size(), kCoordinates);
   Index of_blocks = 0;
   for (const LinearBlockPtr& block : bias.blocks) of_blocks += block->parameter_count(state.features.front());
   if (state.block_hyperparameters.size() != of_blocks)

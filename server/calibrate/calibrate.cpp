@@ -52,21 +52,31 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   return identify(complete, options);
 }
 
-Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
-                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
-  std::vector<std::vector<std::string>> candidates = {{}};
+namespace {
+
+/// Every combination of the forms that the causes in `specs` have.
+std::vector<std::vector<std::string>> combinations(const std::vector<std::string>& specs, const Cell& cell) {
+  std::vector<std::vector<std::string>> all = {{}};
   for (const std::string& spec : specs) {
     std::vector<std::vector<std::string>> longer;
-    for (const auto& candidate : candidates) {
-      for (const std::string& form : alternatives(spec, *cell)) {
-        longer.push_back(candidate);
+    for (const auto& one : all) {
+      for (const std::string& form : alternatives(spec, cell)) {
+        longer.push_back(one);
         longer.back().push_back(form);
       }
     }
-    candidates = std::move(longer);
+    all = std::move(longer);
   }
+  return all;
+}
+
+}  // namespace
+
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
   std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
+  std::vector<std::vector<std::string>> candidates = combinations(specs, *cell);
   for (std::vector<std::string>& candidate : candidates) {
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;

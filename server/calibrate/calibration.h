@@ -11,7 +11,12 @@
 /// What a calibration is asked, and what it found.
 namespace trammel {
 
-/// A model to start from and the measurements to explain. Unknown base and tools are found first.
+/// Joints that lead to the positions leave less than the larger of these after identification: m rms, and share of how
+/// far the positions spread. A nominal robot is off by a few mm.
+inline constexpr double kNoModelError = 0.025;
+inline constexpr double kNoModelShare = 0.05;
+
+/// A model to start from, and the measurements to explain. An unknown base and unknown tools are found first.
 struct CalibrationProblem {
   PhysicalModel model;
   MeasurementBatch batch;  ///< checked against the cell
@@ -19,23 +24,23 @@ struct CalibrationProblem {
 
 struct CalibrateOptions {
   int max_iterations = 100;
-  std::vector<bool> held;  ///< parameters that stay as the model has them, one flag each; empty: none
-  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
+  std::vector<bool> held;  ///< a flag for each parameter that stays as it is; empty: none
+  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
 };
 
-/// A pose that the identified model misses by far more than its sigma.
+/// A pose whose residual is far above its sigma.
 struct SuspectPose {
   std::string pose_id;
   int row = 0;          ///< in its file
   double distance = 0;  ///< m, of the position
-  double sigmas = 0;    ///< the same over the expected deviation of one axis
+  double sigmas = 0;    ///< the distance over the expected standard deviation of one axis
 };
 
 struct IdentifiedParameter {
   Parameter parameter;
   double value = 0;         ///< SI
   double stddev = 0;        ///< SI, of the posterior
-  bool identified = false;  ///< false: more than half of the prior's standard deviation is left
+  bool identified = false;  ///< whether less than half of the prior standard deviation is left
 };
 
 struct CalibrationResult {
@@ -49,12 +54,12 @@ struct CalibrationResult {
   double condition_number = 0;      ///< of the identified directions, prior units
   double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
   double rms = 0;                   ///< m, Euclidean residual of the training positions
-  double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
+  double discrepancy = 0;           ///< m per axis: what the model leaves beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
-  double observability_index =
-      0;  ///< geometric mean of the identified singular values over sqrt(poses) (Borm and Menq)
+  /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
+  double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  std::vector<double> cost_record;  ///< half the weighted sum of squares, iteration by iteration, over all reweightings
+  std::vector<double> cost_record;    ///< half the weighted sum of squares, of all iterations in their order
   bool converged = false;
   int iterations = 0;
   std::string message;  ///< of the solver

@@ -9,12 +9,10 @@ namespace trammel {
 
 namespace {
 
-/// `compliance` has three forms; any of them will do.
+/// In any of its forms.
 bool has_source(const PhysicalModel& physics, const std::string& name) {
-  return std::any_of(physics.sources.begin(), physics.sources.end(), [&](const ErrorSourcePtr& source) {
-    const std::string cause = source->name().substr(0, source->name().find_first_of(":@"));
-    return cause == name || (name == "compliance" && cause.starts_with("compliance_"));
-  });
+  return std::any_of(physics.sources.begin(), physics.sources.end(),
+                     [&](const ErrorSourcePtr& source) { return &source->cause() == find_cause(name); });
 }
 
 ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
@@ -26,13 +24,13 @@ ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
 }
 
 PhysicalModel with_standard_sources(PhysicalModel physics) {
-  for (const std::string& name : with_unknown_tool({"base", "geometry", "compliance"}, *physics.cell)) {
+  for (const std::string& name : with_unknown_tool(standard_sources(), *physics.cell)) {
     if (has_source(physics, name)) continue;
     Result<ErrorSourcePtr> source = make_error_source(name, *physics.cell);
     TRAMMEL_CHECK(source.has_value());
     const auto count = static_cast<Eigen::Index>((*source)->parameters().size());
     const Eigen::Index first = add_source(physics, *std::move(source));
-    physics.values.segment(first, count).setZero();  // not at their priors: the residual was measured without them
+    physics.values.segment(first, count).setZero();  // not at the priors: the residual was taken without them
   }
   return physics;
 }
@@ -74,7 +72,7 @@ BiasPhysics BiasPhysics::with_tools_of(const PhysicalModel& now) const {
     const Pose X_FT_now = served_tool(now, name);
     const Pose X_FT_then = served_tool(whole_, name);
     if (X_FT_now.matrix() == X_FT_then.matrix()) continue;
-    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // a motion in F stands before the nominal tool
+    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // the errors of a tool come before its nominal frame
   }
   return BiasPhysics(std::move(moved), {});
 }

@@ -21,19 +21,29 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
   const auto not_finite = [](const std::optional<double>& value) { return value && !std::isfinite(*value); };
   const std::vector<int>& directions = context.direction;
   if (!directions.empty() && static_cast<Eigen::Index>(directions.size()) != joints)
-    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints);
+    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints)
+        .of("direction")
+        .beyond(directions.size(), joints);
   for (const int direction : directions) {
     if (direction < -1 || direction > 1)
-      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction);
+      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction)
+          .of("direction")
+          .beyond(direction, direction < 0 ? -1 : 1);
   }
   if (context.velocity && context.velocity->size() != joints)
-    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints);
+    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints)
+        .of("velocity")
+        .beyond(context.velocity->size(), joints);
   if (context.velocity && !context.velocity->allFinite())
-    return refused("model: pose {} of the bias has a velocity that is not finite", row);
-  if (not_finite(context.time)) return refused("model: pose {} of the bias has a time that is not finite", row);
+    return refused("model: pose {} of the bias has a velocity that is not finite", row).of("velocity");
+  if (not_finite(context.time))
+    return refused("model: pose {} of the bias has a time that is not finite", row).of("time");
   if (not_finite(context.temperature))
-    return refused("model: pose {} of the bias has a temperature that is not finite", row);
-  if (context.index < 0) return refused("model: pose {} of the bias has the index {}", row, context.index);
+    return refused("model: pose {} of the bias has a temperature that is not finite", row).of("temperature");
+  if (context.index < 0)
+    return refused("model: pose {} of the bias has the index {}", row, context.index)
+        .of("index")
+        .beyond(context.index, 0);
   return {};
 }
 
@@ -42,7 +52,9 @@ Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const Bia
   const BiasState& bias = *parts.bias;
   if (static_cast<Eigen::Index>(parts.bias_contexts.size()) != bias.q.rows()) {
     return refused("model: {} poses are described for {} observations of the bias", parts.bias_contexts.size(),
-                   bias.q.rows());
+                   bias.q.rows())
+        .of("bias")
+        .beyond(parts.bias_contexts.size(), bias.q.rows());
   }
   std::vector<BiasFeatures> features;
   for (std::size_t i = 0; i < parts.bias_contexts.size(); ++i) {
@@ -53,7 +65,9 @@ Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const Bia
     const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
     if (!parts.physics.tools.contains(context.tool) || !known_payload) {
       return refused("model: the bias learned at tool '{}' and payload '{}', which its cell does not have",
-                     context.tool, context.payload);
+                     context.tool, context.payload)
+          .of("bias")
+          .with_text(context.tool + " " + context.payload);
     }
     features.push_back(physics.at(context));
   }

@@ -23,18 +23,18 @@ struct ErrorPrediction {
   Pose X_BT_predicted;                 ///< where it will be
   Vector3 error_B = Vector3::Zero();   ///< predicted - nominal, m
   Vector3 stddev_B = Vector3::Zero();  ///< of one measurement of it, m
-  /// Of the true error: the same without what the tracker's own sigma adds, m.
+  /// Of the true error, m: the same without the tracker's own noise.
   Vector3 true_stddev_B = Vector3::Zero();
-  /// Of one measurement, m^2, the three axes together: stddev_B is the root of its diagonal.
+  /// Of one measurement, m²; stddev_B is the root of its diagonal.
   Matrix3 covariance_B = Matrix3::Zero();
-  /// Of one measurement of the orientation, rad, about the axes of B; where the model learned orientations.
+  /// Of one measured orientation, rad, about the axes of B; only where the model learned orientations.
   std::optional<Vector3> rotation_stddev_B;
-  bool in_domain = false;  ///< false: what the bias learned of poses nearby is not, or not fully, in error_B
-  double bias_weight = 0;  ///< how much of it is, in [0, 1]: 1 in domain, 0 well outside. Blocks of a bias stay
+  bool in_domain = false;  ///< false: the bias is not fully taken
+  double bias_weight = 0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside
 };
 
-/// nominal chain + error sources (identified) + bias (learned): what a cell is served with. An immutable value, cheap
-/// to copy, thread-safe.
+/// Nominal chain, identified error sources and learned bias: what a cell is served with. An immutable value, cheap to
+/// copy, thread-safe.
 class CompensatedModel {
  public:
   using Parts = ModelParts;
@@ -45,38 +45,36 @@ class CompensatedModel {
   [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
   [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
 
-  /// Refuses a tool with a payload that no training pose had: what was learned holds for no other, and a tool whose
-  /// pose the data had to tell is known by no other.
+  /// Refuses a tool with a payload that no training pose had: what was learned holds for the trained ones only.
   [[nodiscard]] Status check_trained_with(const std::string& tool, const std::string& payload) const;
-  /// q is checked by the caller for size; tool and payload as resolve_tool() gives them.
+  /// The error expected at `q`, whose size the caller has checked; tool and payload as resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
                                         const std::string& payload) const;
-  /// The same at many poses: in less time where the bias has blocks.
+  /// The same at many poses, faster for a bias with blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
-  /// What the bias was told of the arm while it was learned.
+  /// The physics with which the bias was learned.
   [[nodiscard]] BiasPhysics learned_physics() const;
-  /// The learned bias, if any, and what it is told of a pose where it asks for features.
+  /// The learned bias, if any, and the features of a pose for it.
   [[nodiscard]] const std::optional<BiasModel>& bias() const { return inside_->bias; }
   [[nodiscard]] BiasFeatures features(const PoseContext& context) const { return inside_->bias_physics.at(context); }
   /// Target correction, source section 3.4.1.
   [[nodiscard]] Correction correct(const Target& target, const std::string& tool, const std::string& payload,
                                    const CorrectOptions& options = {}) const;
-  /// Measured - predicted of every pose, 3 x N, m, in B, at the three levels.
+  /// Measured minus predicted of every pose at the three levels, 3 x N, m, in B.
   struct LevelErrors {
     Eigen::Matrix3Xd nominal, calibrated, compensated;
-    Eigen::Matrix3Xd stddev;  ///< expected of compensated
+    Eigen::Matrix3Xd stddev;  ///< as predicted, of compensated
     std::vector<bool> in_domain;
-    /// The same of the orientations of those poses that have one, rotation vectors, rad; stddev 3 x 0 where none was
-    /// learned.
+    /// The same of the measured orientations, rotation vectors, rad; `stddev` is 3 x 0 where none was learned.
     struct Rotations {
       Eigen::Matrix3Xd nominal, calibrated, compensated, stddev;
     };
     Rotations rotation = {};
   };
   [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
-  /// Measured against predicted, pose by pose; the batch is checked against the cell and not empty. Poses of another
-  /// batch than the model's own are met as served: what began at a pose has happened, what the tracker did does not
-  /// count.
+  /// Figures of the errors on `batch`, which is checked against the cell and not empty. Poses of another batch than the
+  /// model's own are predicted as in service: what began at a training pose has happened, and errors of the tracker do
+  /// not count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
@@ -98,9 +96,9 @@ class CompensatedModel {
     BiasPrediction position;
     std::optional<BiasPrediction> rotation;
   };
-  /// With the temperature to take where nobody says it.
+  /// With the mean temperature of the training where none is given.
   [[nodiscard]] PoseContext completed(PoseContext asked) const;
-  /// `bias_weight`: to take instead of what the pose's place in the domain says.
+  /// `bias_weight`: taken instead of the one that follows from the domain.
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
   [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned,
                                         std::optional<double> bias_weight) const;
@@ -123,28 +121,28 @@ class CompensatedModel {
                                           ErrorPrediction* prediction) const;
   void add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias, ErrorPrediction* prediction) const;
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
-  /// As it was learned, in B of today.
+  /// Turned from B of the training into B of today.
   [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
-  /// X_BT as predict() expects it, and nothing else.
+  /// X_BT as predict() has it, without the variances.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
-  /// Covariance of the position, in B, from what nobody said and a source wants to know: from which side a joint is
-  /// approached, how warm the arm is.
+  /// Covariance of the position, in B, from what a source needs and nobody gave: the side from which a joint is
+  /// approached, the temperature.
   [[nodiscard]] Matrix3 covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                              const Vector3& p_B) const;
-  /// The joints that the controller goes to for a target as it stands.
+  /// The joints that the controller takes for the target without correction.
   [[nodiscard]] Result<InverseResult> nominal_joints(const Target& target, const Pose& X_TF) const;
-  /// How far the iteration came from the nominal joints to those that bring the tool where it is wanted.
+  /// Where the iteration ended that looks for the joints which bring the tool to the wanted pose.
   struct Approach {
     Pose X_BT_commanded;
-    InverseResult joints;  ///< the last ones asked for; not kOk: it ended there
-    Vector6 missing;       ///< of the pose wanted: m, rad
+    InverseResult joints;  ///< the last ones; not kOk: the iteration ended there
+    Vector6 missing;       ///< to the wanted pose: m, rad
     int iterations = 0;
     bool settled = false;
   };
   /// From the joints in `context`, where the tool is predicted to be at `X_BT_predicted`.
   [[nodiscard]] Approach approach(const Pose& X_BT_wanted, PoseContext context, const Pose& X_BT_predicted,
                                   double bias_weight, const CorrectOptions& options) const;
-  /// The other branches (conf) on which the target can be corrected; none where the arm's have no numbers.
+  /// The other branches (conf) on which the target can be corrected; none for an arm whose branches have no numbers.
   [[nodiscard]] std::vector<int> branches_that_reach(const Target& asked, const Pose& X_BT_wanted, PoseContext context,
                                                      const CorrectOptions& options) const;
   void add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,

@@ -11,29 +11,29 @@
 namespace trammel {
 
 enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
-/// As files and the wire spell it: `ok`, `out_of_domain`, ...
+/// As it is written in files and on the wire: `ok`, `out_of_domain`, ...
 [[nodiscard]] std::string_view to_string(CorrectionStatus status);
 
-/// A tool pose that is wanted, or the joints that a program commands.
+/// A wanted pose of the tool, or the joints that a program commands.
 struct Target {
   Pose X_BT = Pose::Identity();
   std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
   std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
-  bool joint_target = false;        ///< X_BT is unset: the pose wanted is the nominal one of `seed`
+  bool joint_target = false;        ///< X_BT is not set: the nominal pose at `seed` is wanted
 };
 
-/// A target as corrected; one that is neither ok nor out of domain is left alone: commanded as it was wanted. What to
-/// expect are root mean squares of the true distance from the target, without the instrument's own noise; NaN where no
-/// joints bring the tool there, so that nothing can be said.
+/// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
+/// Expected errors are root mean squares of the true distance from the target, without the instrument's noise; NaN
+/// where no joints bring the tool there.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();
   Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
   JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
   double error_before = kNothingToSay;     ///< m, to expect without correction
-  double error_after = kNothingToSay;      ///< m, to expect with it; left alone, the same as before
-  double stddev = kNothingToSay;           ///< m, of the true position reached, per axis: root mean square of the three
-  double left = 0;                         ///< m, what the iteration left; part of error_after
+  double error_after = kNothingToSay;      ///< m, to expect with it; the same where the target is not corrected
+  double stddev = kNothingToSay;           ///< m, of the true position: root mean square of the three axes
+  double left = 0;                         ///< m, what the iteration left over; part of error_after
   int iterations = 0;
   std::string message;  ///< why not ok
 
@@ -41,7 +41,7 @@ struct Correction {
 };
 
 struct CorrectOptions {
-  double tolerance = 1e-7;  ///< m, last step (1e-4 mm)
+  double tolerance = 1e-7;  ///< m: a smaller step is the last
   int max_iterations = 10;
 };
 

@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 using model_file::kFormat;
 using Members = std::map<std::string, std::string_view>;
 
-/// For a message: short, and nothing that a terminal would obey.
+/// Text of a file as a message may show it: short, without control characters.
 std::string shown(std::string_view text) {
   std::string plain(text.substr(0, 120));
   std::replace_if(
@@ -30,14 +30,14 @@ std::string shown(std::string_view text) {
   return plain;
 }
 
-/// The outermost keys, and no others: a damaged key is not one that is missing.
+/// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing one.
 Status check_keys(const Members& members, const std::string& where) {
   static constexpr std::array<std::string_view, 5> kKeys = {"content", "hash", "stamp", "trammel_model", "stamp_hash"};
   for (const auto& [key, value] : members) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
       return refused("not a Trammel model: unknown key {}", shown(key)).in(where).of(shown(key));
   }
-  // Models of before the stamp was hashed have no stamp_hash.
+  // Models from before the stamp was hashed have no stamp_hash.
   for (const std::string_view key : kKeys) {
     if (key != "stamp_hash" && !members.contains(std::string(key)))
       return refused("not a Trammel model: no {}", key).in(where).of(std::string(key));
@@ -50,7 +50,7 @@ Status check_keys(const Members& members, const std::string& where) {
       .with_text(shown(format));
 }
 
-/// Of the bytes as they stand in the file.
+/// Whether `by` is the hash of `of`, both as their bytes stand in the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
   if (members.at(by) == '"' + hash + '"') return {};
@@ -81,7 +81,7 @@ std::string serialize(const CompensatedModel& model) {
                      {"stamp", stamp},
                      {"stamp_hash", sha256_hex(stamp.dump())},
                      {"content", model_file::content_of(model.parts())}};
-  // Its last byte closes the object: whatever is cut off is missed.
+  // The last byte closes the object, so a text that was cut off is no longer one.
   return file.dump();
 }
 

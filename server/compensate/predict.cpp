@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The same seen from axes that R turns it to; noise stays independent from axis to axis.
+/// The prediction turned by R; the noise of the axes stays independent.
 BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();
   BiasPrediction now = bias;
@@ -19,8 +19,8 @@ BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   return now;
 }
 
-/// How well the arm is known is asked as it was learned: a tool that is elsewhere now makes no pose a new one. Where
-/// its point goes is in the covariance.
+/// Sets the prior shares to those with the arm as it was learned: a tool that has moved since makes no pose an unknown
+/// one. The motion of the tool's point is in the covariance.
 void share_as_learned(const BiasModel& bias, const BiasPhysics& then, const std::vector<PoseContext>& poses,
                       const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& now,
                       std::vector<BiasPrediction>& predictions) {
@@ -100,7 +100,7 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
 
 namespace {
 
-/// What is taken of a bias: what it knows only of poses nearby fades, what its blocks say lasts.
+/// The part of a bias that is taken: its kernel fades with `weight`, its blocks do not.
 Vector3 taken(const Vector3& mean_B, const Vector3& nearby_B, double weight) {
   return (mean_B - nearby_B) + weight * nearby_B;
 }

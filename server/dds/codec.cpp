@@ -38,7 +38,9 @@ Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where) {
     return refused("the pose is not finite").in(where).of("pose");
   if (std::abs(rotation.norm() - 1) > kQuaternionTolerance) {
     return refused("the quaternion has length {:.4f}, must be 1 within {}", rotation.norm(), kQuaternionTolerance)
-        .in(where);
+        .in(where)
+        .of("pose")
+        .beyond(rotation.norm(), 1);
   }
   return make_pose(rotation.normalized().toRotationMatrix(), p_mm * from_mm(1));
 }

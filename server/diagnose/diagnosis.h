@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/error_sources/catalogue.h"
 
 /// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
 namespace trammel {
@@ -25,12 +26,17 @@ struct Cause {
 };
 /// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
-/// The cause that is spelled so; one that is not known has the spelling for its cause.
-[[nodiscard]] Cause cause_from(std::string_view spelling);
-/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved at pose p40`. No order.
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`. No order. A cause
+/// that only another version of the program knows comes as it is spelled.
 [[nodiscard]] std::string in_words(const Cause& cause);
 /// The same without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
+/// What is known of it, wherever on the arm it is.
+[[nodiscard]] const CauseRecord& record_of(const Cause& cause);
+/// The cause of that record, of `joint` (0-based; -1: of no single one).
+[[nodiscard]] Cause cause_at(const CauseRecord& record, int joint = -1);
+/// Something is there, of `joint` (-1: of any), and no known cause is it.
+[[nodiscard]] Cause unknown_cause(int joint = -1);
 
 /// A number found, in the unit people read it in.
 struct Estimate {
@@ -69,19 +75,19 @@ struct Finding {
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };
 [[nodiscard]] std::string_view to_string(Verdict verdict);
 
-/// What is left and is not noise.
+/// What is left and is more than noise.
 struct Unexplained {
   bool present = false;
   std::vector<std::string> depends_on;  ///< `q4`, `time`, `torque`
   double rms = 0;                       ///< m
   double p_value = 1;
-  std::string hint = {};  ///< for people: what it may be all the same, or what would show more; may be empty
+  std::string hint = {};  ///< for people: what it may be, or what would show more; may be empty
 };
 
-/// What is left after all that was found, against what is stated for one measurement; per axis, SI.
+/// What is left after all that was found, beside what is stated for one measurement.
 struct LeftOver {
-  double left = 0, stated = 0;
-  double freedom = 0;  ///< degrees of it; 0 where nothing was measured
+  double left = 0, stated = 0;  ///< standard deviation per axis, m or rad
+  double freedom = 0;           ///< degrees of freedom; 0 where nothing was measured
 };
 
 /// A cause that this batch could not have shown, or only from some size on.
@@ -131,7 +137,7 @@ struct NextPoses {
   double stddev_random = 0;      ///< with as many random ones
 };
 
-/// How large an effect must be to be found in these poses: measured by hiding it in simulated noise.
+/// How large an effect must be to be named at these poses: measured by hiding it in simulated noise.
 struct Recovery {
   Cause cause;
   Eigen::VectorXd effect_rms;  ///< m, sizes hidden
@@ -149,8 +155,8 @@ struct Diagnosis {
   Verdict verdict = Verdict::kNothing;
   std::string sentence;   ///< the verdict for people, graded by the evidence
   int poses = 0;          ///< repeats merged
-  double noise = 0;       ///< m per axis: of a pose, whatever its reason: what no cause explains
-  double instrument = 0;  ///< m per axis: what the measurement itself is said to be good for
+  double noise = 0;       ///< m per axis: standard deviation of a pose that no cause explains, whatever its reason
+  double instrument = 0;  ///< m per axis: standard deviation that is stated for a measurement
   std::string noise_from;
   LeftOver left_position, left_rotation;  ///< m; rad
   ErrorFigures before, after;             ///< of all poses used, before and after extension

@@ -111,6 +111,8 @@ CheckedBatch CheckedBatch::in_order_of_time() const {
 Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) {
   const std::string where = name_of(batch);
   if (batch.measurements.empty()) return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
+  // Of a batch that was never a file, too, parts are known by the text of the whole.
+  if (batch.source_text.empty()) batch.source_text = to_csv(batch);
   std::string hash = batch_hash(batch);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {

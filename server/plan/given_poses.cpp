@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The sides to try: the one recorded for all joints, or either.
+/// The sides to try: the recorded one where it is the same for all joints, else both.
 std::vector<int> sides_of(const PoseContext& context) {
   const std::vector<int>& recorded = context.direction;
   const bool one_side = !recorded.empty() && recorded.front() != 0 &&

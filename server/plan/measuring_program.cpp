@@ -12,10 +12,11 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kRapidName = 32;
-constexpr std::size_t kKrlName = 24;
-constexpr int kKrlTools = 16;
-constexpr std::size_t kLineLength = 80;
+// What the controllers take.
+constexpr std::size_t kRapidName = 32;   // letters of a RAPID identifier
+constexpr std::size_t kKrlName = 24;     // letters of the name of a KRL program
+constexpr int kKrlTools = 16;            // tools in $TOOL_DATA
+constexpr std::size_t kLineLength = 80;  // of a RAPID line
 
 bool is_name(const std::string& text, std::size_t longest) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
@@ -23,7 +24,7 @@ bool is_name(const std::string& text, std::size_t longest) {
          std::all_of(text.begin(), text.end(), allowed);
 }
 
-/// A prefix keeps it clear of reserved words and of the names inside.
+/// With a prefix, so that it is no reserved word and none of the names inside.
 std::string module_name(const std::string& name) {
   std::string text = "T_" + name;
   for (char& c : text) {
@@ -73,7 +74,7 @@ Result<Axes> axes_of(const Chain& robot, const ProgramOptions& options) {
   return axes;
 }
 
-/// Four decimals, and never a minus before nothing.
+/// Four decimals without trailing zeros; never `-0`.
 std::string number(double value) {
   std::string text = fmt::format("{:.4f}", value);
   if (text.find_first_not_of("-0.") == std::string::npos) return "0";
@@ -82,7 +83,7 @@ std::string number(double value) {
   return text;
 }
 
-/// What must be on the robot before this pose can be measured; empty where it is on it already.
+/// Which tool and payload must be mounted before this pose; empty where they are mounted already.
 std::string change_before(const Plan& plan, std::size_t i) {
   const PoseContext& now = plan.poses[i].context;
   if (i == 0) return "";

@@ -11,7 +11,7 @@
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
-#include "server/error_sources/error_source.h"
+#include "server/error_sources/spelling.h"
 #include "server/trainer/job_batches.h"
 
 namespace trammel {

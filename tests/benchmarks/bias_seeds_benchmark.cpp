@@ -8,6 +8,7 @@
 
 #include "server/base/check.h"
 #include "server/bias/bias_model.h"
+#include "server/calibrate/calibrate.h"
 #include "server/measurement/checked_batch.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/repeats.h"

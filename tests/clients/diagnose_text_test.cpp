@@ -28,10 +28,9 @@ TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
                              {{payload, {"compliance", -1, "C3", "", {}}}, 1}};
   diagnosis.could_not_have_seen.push_back({payload, 0.9, 1e-5, {}, "a second known payload"});
   const std::string text = diagnosis_text(diagnosis_json(diagnosis));
-  for (const char* part :
-       {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
-        "payload mass or centre of gravity from gearboxes that give way (C2), gearboxes that give way (C3) (needs a "
-        "second known payload)"}) {
+  for (const char* part : {"may have begun at any of 2 poses from p7 (120 s) to p8 (95 %)",
+                           "payload mass or centre of gravity from gearbox compliance (C2), gearbox compliance (C3) "
+                           "(needs a second known payload)"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 }

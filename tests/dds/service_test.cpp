@@ -10,9 +10,13 @@
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
 #include "tests/dds/raw_client.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 constexpr std::chrono::seconds kLimit{30};
 const std::vector<double> kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
@@ -106,7 +110,9 @@ TEST_F(ServiceTest, NobodyThereIsUnreachable) {
   const auto answer = session->predict_error(kCell7, {kJoints});
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().code, ErrorCode::kUnreachable);
-  EXPECT_NE(answer.error().message.find(std::to_string(server_.options().port)), std::string::npos);
+  EXPECT_EQ(answer.error().field, "server");
+  EXPECT_EQ(answer.error().text, fmt::format("300 ms, looking at 127.0.0.1:{} in domain {}", server_.options().port,
+                                             server_.options().domain));
   EXPECT_FALSE(session->servers());
 }
 
@@ -132,7 +138,7 @@ TEST_F(ServiceTest, ATextThatANulWouldCutShortIsNotSent) {
   const auto submitted = session->submit_measurements("cell-7", "lt-07", torn);
   ASSERT_FALSE(submitted) << "the rows before the NUL were taken for the batch";
   EXPECT_EQ(submitted.error().code, ErrorCode::kRefused);
-  EXPECT_NE(submitted.error().message.find("lt-07 row 42: a NUL"), std::string::npos) << submitted.error().message;
+  EXPECT_EQ(refusal_of(submitted), Refusal("batch lt-07", 42));
   EXPECT_FALSE(session->import_model("cell-7", torn));
 }
 

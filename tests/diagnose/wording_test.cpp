@@ -42,8 +42,8 @@ MeasurementBatch with_temperatures(bool have) {
 TEST(Wording, KeepsDoubtfulFindingsApart) {
   EXPECT_EQ(
       sentence_for(with({found(kDrift, {kWarm}), found(kWarm, {kDrift})})),
-      "Missing, but these poses do not tell which it is: the tracker drifts (20 um rms), or links that grow as they "
-      "warm up; and links that grow as they warm up (20 um rms), or the tracker drifts.");
+      "Missing, but these poses do not tell which it is: tracker drift (20 um rms), or thermal growth; and thermal "
+      "growth (20 um rms), or tracker drift.");
 }
 
 TEST(Wording, LeavesManyDoubtfulFindingsToTheTable) {

@@ -126,7 +126,7 @@ TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
   const auto charts = diagnosis_charts(diagnosis_, *cell_);
   const auto title = [&](std::size_t k) { return charts.at("periodograms").at(k).at("title").get<std::string>(); };
   EXPECT_EQ(title(1), "joint 2: no oscillation found");
-  EXPECT_EQ(title(2), "joint 3: 48.50, 97.00 a turn, joint map");
+  EXPECT_EQ(title(2), "joint 3: 48.50, 97.00 a turn, angle error map");
   EXPECT_EQ(title(4), "joint 5: 1 a turn");
   EXPECT_EQ(title(5), "joint 6: no oscillation found");
 }

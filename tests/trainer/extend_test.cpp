@@ -7,10 +7,14 @@
 #include "server/trainer/pipeline/lasting_sources.h"
 #include "tests/support/demand.h"
 #include "tests/support/from_rows.h"
+#include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 /// A cell that knows of its base only; the robot's joint 3 oscillates besides.
 class Extend : public testing::Test {
@@ -34,7 +38,7 @@ class Extend : public testing::Test {
 };
 
 TEST_F(Extend, ARefusalSaysHowManyRowsWereSetAside) {
-  const Error few = refused("batch b1: 10 poses to diagnose, at least 12").value();
+  const Error few = refused("10 poses to diagnose, at least 12").in("batch b1").value();
   EXPECT_EQ(with_rows_set_aside(few, checked(batch_)).message,
             few.message + " (30 of 120 rows are set aside to judge by)");
   for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kTrain;
@@ -145,7 +149,7 @@ TEST_F(Extend, IsRefusedWhereNothingWasNamed) {
   diagnosis_.sources_after = diagnosis_.sources_before;
   const auto extension = extend(cell_, batch_, diagnosis_, {});
   ASSERT_FALSE(extension);
-  EXPECT_NE(extension.error().message.find("unknown"), std::string::npos) << extension.error().message;
+  EXPECT_EQ(refusal_of(extension), Refusal("batch " + diagnosis_.batch.id));
 }
 
 TEST_F(Extend, IsRefusedWithoutPosesToJudgeItBy) {

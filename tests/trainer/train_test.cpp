@@ -12,10 +12,14 @@
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
+#include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 TrainOptions quick(const std::string& level, const std::string& bias) {
   TrainOptions options;
@@ -252,8 +256,8 @@ TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
 TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
   const auto cell = test::cell_7();
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 63);
-  EXPECT_EQ(train(cell, batch, quick("M1", "se * joint_map")).error().message,
-            "bias kernel `se * joint_map`: `joint_map` can only be added to a whole bias, as in `se + joint_map`");
+  EXPECT_EQ(refusal_of(train(cell, batch, quick("M1", "se * joint_map"))),
+            Refusal("", {}, "bias").text("se * joint_map"));
 }
 
 /// A real robot with base and tool unknown: ../shared/data, where it is at hand.

@@ -1,7 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <map>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
@@ -47,14 +46,12 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   const bool known = std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return knows(from, m); });
   if (!known) return {};  // its tools are others: nothing to compare
   const Triage seen = triage(from, batch, with_known_tools(cell, from, refit));
-  const std::map<std::string, std::string> same = {
-      {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
-  const auto named = [&](const std::string& source) {
-    return std::find(refit.begin(), refit.end(), source) != refit.end();
+  const auto is_refitted = [&](const Cause& cause) {
+    const causes::Rival* whole = whole_of(record_of(cause));
+    return whole != nullptr && std::find(refit.begin(), refit.end(), whole->cause) != refit.end();
   };
-  const auto source = same.find(seen.cause.cause);
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
-                        source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
+                        is_refitted(seen.cause) && (!seen.tracker_elsewhere || corrects(refit, causes::Part::kBase));
   if (seen.learn || refitted) return {};
   return refused("{}", seen.sentence)
       .in("batch " + batch.id())

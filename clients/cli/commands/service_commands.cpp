@@ -205,7 +205,7 @@ void add_cell(CLI::App& command, ServiceArguments& arguments) {
 
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
   command.add_flag("--watch", arguments.watch, "Wait until the training is done, and say how it ended");
-  command.add_option("--limit", arguments.limit_s, "With --watch: longest wait, s")
+  command.add_option("--limit", arguments.limit_s, "Longest wait with --watch, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
 }

@@ -9,9 +9,10 @@
 namespace trammel {
 namespace {
 
-constexpr int kMostDepth = 20;            // of parentheses; nobody means more, and the stack ends somewhere
-constexpr std::size_t kMostBytes = 1000;  // of a spelling
-constexpr std::size_t kMostWords = 32;  // each has hyperparameters to be searched for: the time grows faster than they
+constexpr int kMostParentheses = 20;              // inside one another: reading recurses, and nobody means more
+constexpr std::size_t kMostSpellingBytes = 1000;  // as long as 32 words with room to spare
+constexpr std::size_t kMostWords =
+    32;  // the search for their hyperparameters takes more than twice as long for twice as many
 
 const std::array<LinearBlockPtr, 2>& known_blocks() {
   static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
@@ -90,11 +91,11 @@ class Reader {
 
   Result<KernelPtr> factor() {
     if (!take('(')) return leaf();
-    if (++depth_ > kMostDepth)
-      return refused("bias kernel `{}`: more than {} parentheses deep", all_, kMostDepth)
+    if (++depth_ > kMostParentheses)
+      return refused("bias kernel `{}`: more than {} parentheses deep", all_, kMostParentheses)
           .of("bias")
           .with_text(all_)
-          .beyond(depth_, kMostDepth);
+          .beyond(depth_, kMostParentheses);
     auto inside = list(
         '+', [this] { return product(); }, sum_of);
     if (inside && !take(')')) return expected("`)`");
@@ -157,12 +158,12 @@ class Reader {
 
 namespace {
 
-/// Before anything is made of it.
+/// Asked first: nothing is built from a spelling that is too long.
 Status check_length(std::string_view spelling) {
-  if (spelling.size() > kMostBytes) {
-    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostBytes)
+  if (spelling.size() > kMostSpellingBytes) {
+    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostSpellingBytes)
         .of("bias")
-        .beyond(spelling.size(), kMostBytes);
+        .beyond(spelling.size(), kMostSpellingBytes);
   }
   const auto joins = std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
   if (const auto words = static_cast<std::size_t>(joins) + 1; words > kMostWords) {

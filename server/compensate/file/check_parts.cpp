@@ -7,18 +7,22 @@
 namespace trammel::model_file {
 namespace {
 
-constexpr double kRigid = 1e-6;              // |RᵀR - 1|
-constexpr double kMostMetres = 1e6;          // of a frame; no cell is larger
-constexpr double kRounding = 1e-6;           // of a correlation
-constexpr Eigen::Index kMostPoses = 20'000;  // that one training may have; a bias' memory grows with them
-constexpr double kMostLog = 200;             // of a hyperparameter, whose square is still a number
+constexpr double kRigid = 1e-6;                      // |RᵀR - 1|: rounding of what was rigid is far below
+constexpr double kMostMetres = 1e6;                  // of a frame: no cell is larger
+constexpr double kCorrelationRounding = 1e-6;        // of what was symmetric and positive semidefinite
+constexpr Eigen::Index kMostTrainingPoses = 20'000;  // of one training: the memory of a bias grows with them
+constexpr double kMostLog = 200;                     // of a hyperparameter: its square is still a number
 
 Status check_frame(const Pose& X, const std::string& name) {
   if (!X.matrix().allFinite() || X.translation().norm() > kMostMetres)
     return refused("model: {}: its place is no length, limit {:g} m", name, kMostMetres).of(name);
   const Matrix3 R = X.linear();
   const double off = (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
-  if (off > kRigid || R.determinant() < 0)
+  if (R.determinant() < 0)
+    return refused("model: {}: its rotation is a mirror image, determinant {:.3g}", name, R.determinant())
+        .of(name)
+        .beyond(R.determinant(), 0);
+  if (off > kRigid)
     return refused("model: {}: its rotation is not rigid, off by {:.3g}, limit {:g}", name, off, kRigid)
         .of(name)
         .beyond(off, kRigid);
@@ -41,7 +45,7 @@ double asymmetry(const Eigen::MatrixXd& m) {
   return most;
 }
 
-/// Scaled to correlations, because the parameters have units of their own.
+/// Checked as correlations, because each parameter has its own unit.
 Status check_covariance(const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd variance = covariance.diagonal();
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
@@ -53,16 +57,17 @@ Status check_covariance(const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd scale = variance.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
-    // A parameter that is known exactly goes with no other.
+    // A parameter that is known exactly cannot be correlated.
     if (variance(i) == 0 && (!covariance.row(i).isZero(0) || !covariance.col(i).isZero(0)))
       return refused("model: parameter {} has no variance but a covariance", i + 1).of("covariance");
   }
   const double skew = asymmetry(correlation);
-  if (!(skew <= kRounding))
+  if (!(skew <= kCorrelationRounding))
     return refused("model: its covariance is not symmetric, off by {:.3g}", skew)
         .of("covariance")
-        .beyond(skew, kRounding);
-  correlation.diagonal().array() += kRounding * static_cast<double>(std::max<Eigen::Index>(variance.size(), 1));
+        .beyond(skew, kCorrelationRounding);
+  correlation.diagonal().array() +=
+      kCorrelationRounding * static_cast<double>(std::max<Eigen::Index>(variance.size(), 1));
   for (Eigen::Index i = 0; i < variance.size(); ++i) {
     if (variance(i) == 0) correlation(i, i) = 1;
   }
@@ -93,24 +98,25 @@ Status check_parameters(const ModelParts& parts) {
 }
 
 Status check_bias(const BiasState& bias) {
-  if (bias.q.rows() > kMostPoses)
-    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(), kMostPoses)
+  if (bias.q.rows() > kMostTrainingPoses)
+    return failure(ErrorCode::kTooLarge, "model: its bias has {} poses, limit {}", bias.q.rows(), kMostTrainingPoses)
         .of("bias")
-        .beyond(bias.q.rows(), kMostPoses);
+        .beyond(bias.q.rows(), kMostTrainingPoses);
   const auto beyond = [](const Eigen::MatrixXd& m) { return m.size() > 0 && m.cwiseAbs().maxCoeff() > kMostLog; };
   if (beyond(bias.hyperparameters) || beyond(bias.block_hyperparameters))
     return refused("model: a hyperparameter of its bias is beyond {}, as a logarithm", kMostLog).of("bias");
   return {};
 }
 
-/// Where a bias was learned that was kept since: with all the standard sources, which it was told of.
+/// The physics that a kept bias was learned beside: it has all the standard sources.
 Status check_origin(const ModelParts::BiasOrigin& origin, Eigen::Index P) {
-  for (const std::string_view name : {"base", "geometry", "compliance"}) {
+  for (const std::string& name : standard_sources()) {
     const auto& sources = origin.physics.sources;
-    if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
+    if (std::none_of(sources.begin(), sources.end(),
+                     [&](const auto& one) { return &one->cause() == find_cause(name); }))
       return refused("model: the physics that its bias was learned beside has no {}", name).of("bias").with_text(name);
   }
-  Status fine = check_frames(origin.physics, "where its bias was learned, ");
+  Status fine = check_frames(origin.physics, "bias_origin: ");
   if (fine) fine = check_size(origin.covariance, P);
   if (fine) fine = check_covariance(origin.covariance);
   return fine;
@@ -124,7 +130,9 @@ Status check_ranges(const ModelParts& parts) {
   for (const auto& [tool, payload] : parts.trained_with) {
     const Cell& cell = *parts.physics.cell;
     if (!cell.tools.contains(tool) || (!payload.empty() && !cell.payloads.contains(payload)))
-      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload);
+      return refused("model: trained with tool '{}' and payload '{}', which its cell does not have", tool, payload)
+          .of("trained_with")
+          .with_text(tool);
   }
   return {};
 }

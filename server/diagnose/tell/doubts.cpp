@@ -22,25 +22,39 @@ bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }
 
-/// Whether a gear of `joint` is one of too many orders to be believed, or stands beside a map.
-bool has_no_single_order(const Cause& cause, const std::vector<Cause>& found) {
-  const auto at_joint = [&](const char* name) {
+/// What describes several of its kind better than one by one, where there are too many of them at its joint to be
+/// believed or where that stands beside them: a map of the joint's angle for the orders of a gear.
+std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Cause>& found) {
+  const auto at_joint = [&](std::string_view name) {
     return std::count_if(found.begin(), found.end(),
                          [&](const Cause& other) { return other.cause == name && other.joint == cause.joint; });
   };
-  return cause.cause == "gear_transmission" &&
-         (at_joint("joint_map") > 0 || at_joint("gear_transmission") > thresholds::kMostOrders);
+  const bool too_many = at_joint(cause.cause) > thresholds::kMostOrders;
+  std::vector<Cause> all;
+  for (const CauseRecord* record : all_causes()) {
+    const Cause general = cause_at(*record, cause.joint);
+    if (is_doubtful_case(general, cause) && (too_many || at_joint(general.cause) > 0)) all.push_back(general);
+  }
+  return all;
+}
+
+/// Adds what is told by the time alone.
+void add_going_with_time(std::vector<Cause>& rivals) {
+  for (const CauseRecord* record : all_causes()) {
+    if (record->goes_with_time && record->needs.time) add(rivals, cause_at(*record));
+  }
 }
 
 /// What a cause that was found by a surrogate may be instead. It is never sure.
 void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
-  if (cause.cause == "backlash") return add(rivals, {"unknown", cause.joint});
-  if (cause.cause == "thermal_growth") add(rivals, {"tracker_drift"});
-  if (rivals.empty()) rivals.push_back({"unknown"});
+  const ContextNeeds& needs = record_of(cause).needs;
+  if (needs.direction) return add(rivals, unknown_cause(cause.joint));
+  if (needs.temperature) add_going_with_time(rivals);
+  if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
 std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
-  if (cause.cause == "backlash")
+  if (record_of(cause).needs.direction)
     return "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
   return fmt::format(
       "record {} with every pose, and measure reference reflectors in between: what was not recorded was taken from "
@@ -53,19 +67,19 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 }  // namespace
 
 Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside) {
-  const Cause map{"joint_map", cause.joint};
   const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
   const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
-  const bool no_single_order = has_no_single_order(cause, beside.found) && !contains(rivals, map);
+  std::vector<Cause> many = descriptions_of_many(cause, beside.found);
+  std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
 
   std::vector<Cause> could_also_be = rivals;
   for (const Cause& rival : untestable_rivals(cause, beside.recorded)) add(could_also_be, rival);
   if (by_surrogate) add_rivals_of_surrogate(cause, could_also_be);
-  if (dwarfed) could_also_be.push_back({"unknown"});
-  if (no_single_order) could_also_be.push_back(map);
+  if (dwarfed) could_also_be.push_back(unknown_cause());
+  could_also_be.insert(could_also_be.end(), many.begin(), many.end());
 
   const auto action = [&]() -> std::string {
-    if (no_single_order)
+    if (!many.empty())
       return fmt::format("measure more poses over the range of joint {}: its error has no single order",
                          cause.joint + 1);
     if (dwarfed) return "find first what is unknown here: it is several times larger";

@@ -123,7 +123,9 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
     if (!measurement) return tl::make_unexpected(measurement.error());
     const auto [earlier, is_new] = line_of_pose.emplace(measurement->pose_id, measurement->row);
     if (!is_new) {
-      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second);
+      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+          .of("pose_id")
+          .with_text(measurement->pose_id);
     }
     batch.measurements.push_back(std::move(*measurement));
   }

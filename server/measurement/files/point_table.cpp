@@ -17,7 +17,7 @@ constexpr std::size_t kMostFields = 9;
 
 template <typename T>
 Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
-  if (known && *known != said) return refused("two different statements of {}", what).in(where).of(what);
+  if (known && *known != said) return refused("two different statements of the {}", what).in(where).of(what);
   known = said;
   return {};
 }
@@ -54,11 +54,11 @@ Status read_unit_statements(const std::string& comment, const std::string& where
     if ((*at)[1].matched) {
       const Result<bool> radians = is_radian((*at)[2], where, line);
       if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
     } else {
       const Result<LengthUnit> unit = length_unit((*at)[2], where, line);
       if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -72,7 +72,7 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
                            : contains(comment, "cartesian")          ? std::optional(Coordinates::kCartesian)
                                                                      : std::nullopt;
   if (coordinates) {
-    if (const Status s = state(statements.coordinates, *coordinates, where, "the coordinates"); !s) return s;
+    if (const Status s = state(statements.coordinates, *coordinates, where, "coordinates"); !s) return s;
   }
   const bool zyx = contains(comment, R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)");
   if (!zyx && contains(comment, R"(\beuler\b)")) {
@@ -88,7 +88,7 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
                       : contains(comment, "\\buncertaint") ? std::optional(BehindCoordinates::kUncertainties)
                                                            : std::nullopt;
   if (!behind) return {};
-  return state(statements.behind, *behind, where, "what follows the coordinates");
+  return state(statements.behind, *behind, where, "columns behind the coordinates");
 }
 
 /// Our name of a column, for what other programs call it; empty for one that is passed over.
@@ -145,11 +145,11 @@ Status read_header_units(const Header& header, const std::string& where, int lin
     if (is_angle(header.columns[k])) {
       const Result<bool> radians = is_radian(header.units[k], where, line);
       if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
     } else {
       const Result<LengthUnit> unit = length_unit(header.units[k], where, line);
       if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -181,7 +181,8 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
                "3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ or Euler "
                "ZYX angles")
         .in(where)
-        .at_row(row.line);
+        .at_row(row.line)
+        .of("columns behind the coordinates");
   }
   std::vector<std::string> columns = {"collection", "group", "name"};
   columns.erase(columns.begin(), columns.begin() + 2 - static_cast<std::ptrdiff_t>((count - kLeastFields) % 3));
@@ -260,8 +261,7 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
   } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
     return tl::make_unexpected(units.error());
   }
-  const Status coordinates =
-      state(parts.statements.coordinates, *coordinates_of(header.columns), where, "the coordinates");
+  const Status coordinates = state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates");
   if (!coordinates) return tl::make_unexpected(coordinates.error());
   Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows);
   if (!table) return tl::make_unexpected(table.error());

@@ -192,7 +192,10 @@ class NamedColumns {
 
   [[nodiscard]] Status set_orientation(Orientation kind) {
     if (found_.orientation != Orientation::kNone) {
-      return refused("two orientations; expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz").in(table_.where());
+      return refused("two orientations")
+          .in(table_.where())
+          .of("orientation")
+          .next("expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz");
     }
     found_.orientation = kind;
     return {};
@@ -358,7 +361,9 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
     if (!measurement) return tl::make_unexpected(measurement.error());
     const auto [earlier, is_new] = row_of_pose.emplace(measurement->pose_id, measurement->row);
     if (!is_new) {
-      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second);
+      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+          .of("pose_id")
+          .with_text(measurement->pose_id);
     }
     batch.measurements.push_back(std::move(*measurement));
   }

@@ -45,8 +45,8 @@ std::vector<std::string> added_sources(const std::vector<std::string>& own, cons
   std::vector<std::string> added;
   std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
                [&](const std::string& source) {
-                 // Another form of the compliance that the cell has already: training chooses it again.
-                 const bool form = source.starts_with("compliance_") && contains(own, "compliance");
+                 // Another form of what the cell has already, such as the compliance: training chooses it again.
+                 const bool form = as_listed(source, own) != source;
                  return !form && !contains(diagnosis.sources_before, source) && !contains(own, source);
                });
   return added;

@@ -14,8 +14,8 @@ namespace trammel {
 /// did meanwhile.
 [[nodiscard]] std::vector<std::string> lasting_sources(const std::vector<std::string>& sources);
 
-/// The sources that `model` was trained with, a compliance as `cell` spells it; those of one batch only where it is
-/// `batch` that the model was trained from.
+/// The sources that `model` was trained with, a cause of several forms as `cell` lists it; those of one batch only
+/// where it is `batch` that the model was trained from.
 [[nodiscard]] std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell,
                                                         const CheckedBatch& batch);
 

@@ -19,20 +19,19 @@ constexpr int kMostRounds = 5;         // of taking off the bias and finding the
 constexpr double kSettledTurn = 1e-9;  // rad
 constexpr double kBeyondChance = 3;    // standard deviations of chi^2
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 /// A frame that the cell knows, and that is not named, must be the model's.
 Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said, const Pose& kept,
                         const std::string& source) {
   if (!said) return {};
   const Vector6 difference = pose_difference(*said, kept);
   if (difference.cwiseAbs().maxCoeff() <= kSameFrame) return {};
+  const double shift_mm = to_mm(difference.head<3>().norm());
+  const double turn_deg = to_deg(difference.tail<3>().norm());
+  const bool shifted = shift_mm > to_mm(kSameFrame);
   return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from", cell.name, what,
-                 to_mm(difference.head<3>().norm()), to_deg(difference.tail<3>().norm()))
-      .of(source)
-      .with_value(to_mm(difference.head<3>().norm()))
+                 shift_mm, turn_deg)
+      .of(fmt::format("{}: {}", source, shifted ? "xyz_mm" : "q_wxyz"))
+      .with_value(shifted ? shift_mm : turn_deg)
       .next(fmt::format("name {} among what is refitted, or leave it in the cell file as the model has it", source));
 }
 
@@ -50,12 +49,12 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
   if (model.cell->robot_yaml != cell.robot_yaml) {
     return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);
   }
-  if (!contains(only, "base")) {
+  if (!corrects(only, causes::Part::kBase)) {
     if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
   }
   for (const auto& [name, kept] : model.tools) {
     const auto said = cell.tools.find(name);
-    if (said == cell.tools.end() || contains(only, "tool")) continue;
+    if (said == cell.tools.end() || corrects(only, causes::Part::kTool)) continue;
     const Status same = check_same_frame(cell, fmt::format("tool '{}'", name), said->second, kept, "tool");
     if (!same) return same;
   }
@@ -63,7 +62,7 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
     const std::string& tool = m.context.tool;
     const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
                                       [&](const auto& known) { return known.first == tool; });
-    if (of_model || cell.tools.at(tool) || contains(only, "tool")) continue;
+    if (of_model || cell.tools.at(tool) || corrects(only, causes::Part::kTool)) continue;
     return refused("where tool '{}' sits is known to neither cell {} nor the model to start from", tool, cell.name)
         .in("batch " + batch.id)
         .at_row(m.row)
@@ -247,7 +246,7 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
 }
 
 Cell with_known_tools(Cell cell, const CompensatedModel& from, const std::vector<std::string>& only) {
-  if (contains(only, "tool")) return cell;
+  if (corrects(only, causes::Part::kTool)) return cell;
   for (const auto& [name, payload] : from.parts().trained_with) {
     const auto tool = cell.tools.find(name);
     if (tool != cell.tools.end() && !tool->second) tool->second = served_tool(from.parts().physics, name);

@@ -1,6 +1,7 @@
 #include <cstdio>
 
 #include "server/compensate/compensated_model.h"
+#include "server/compensate/model_file.h"
 
 // Predicts where the robot of a model really goes when all joints are at zero: offline MODEL
 int main(int, char** arguments) {
