@@ -90,8 +90,8 @@ class ServerWatch {
   [[nodiscard]] static Result<std::unique_ptr<ServerWatch>> open(wire::dds::DomainParticipant& participant,
                                                                  wire::dds::Subscriber& subscriber);
 
-  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, that is not `avoid`, and
-  /// that published its status lately. Waits until `deadline` for the first server.
+  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
+  /// status lately, then one that is not `avoid`. Waits until `deadline` for the first server.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
                                                            Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);

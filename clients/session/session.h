@@ -22,8 +22,8 @@ struct SessionOptions {
 
 /// One DDS participant with its own reply partition. Thread-safe; calls from several threads overlap. Errors:
 /// kUnreachable when no server answered in time, else the error of the server. A request without an answer is sent once
-/// more with the same id, to another server. A request that changes something goes to the same server again, which
-/// recognises the repeat.
+/// more with the same id, preferably to another server. A request that changes something goes to the same server again,
+/// which recognises the repeat.
 class Session {
  public:
   /// Does not wait for a server. One session per process is enough.

@@ -23,7 +23,7 @@ class DdsService {
   ~DdsService();  ///< stops as stop()
 
   /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses a port that is
-  /// taken, an address that this host does not have, and a server or cell name that is too long for the wire.
+  /// taken, an address that this host does not have, and a server or cell name that the wire does not allow.
   [[nodiscard]] Status start();
   /// Lets running requests finish, publishes that the server stops, and leaves DDS. May be started again.
   void stop();

@@ -11,8 +11,8 @@
 namespace trammel {
 
 /// Receives the status that the server itself publishes: a test of the whole path. Each status leaves through its
-/// writer, crosses the network, is dropped once on purpose and sent again, and arrives in the thread that also receives
-/// requests.
+/// writer, crosses the network, is dropped once on purpose (at most twice a second) and sent again, and arrives in the
+/// thread that also receives requests.
 class StatusEcho final : private wire::dds::DataReaderListener {
  public:
   /// `writer` is the server's writer of ServiceStatus in `participant`. `heard` belongs to that participant; it is told
