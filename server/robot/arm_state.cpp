@@ -57,8 +57,8 @@ void StateJacobian::transform(int first_row, const Eigen::Ref<const Eigen::Matri
 }
 
 Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
-  // A passage multiplies d(state) by (I + E L). So going backwards, entries recorded before the passage are multiplied
-  // by by_state (I + E L) instead of `by_state`.
+  // A passage multiplies d(state) by (I + E L): L is the passage's own by_state, E puts its rows into the state. So,
+  // going backwards, `by_state` becomes by_state (I + E L) for the entries recorded before the passage.
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(6, parameters_);
   std::size_t end = entries_.size();
   const auto collect = [&](std::size_t begin) {
