@@ -15,8 +15,7 @@ struct DdsOptions {
   std::string server_id = "trammel";      ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
   int compute_workers = 2;  ///< threads for PredictError, and as many for CorrectTarget; other operations have one each
-  int max_clients =
-      128;  ///< reply channels at a time; one more drops the channel of the client that has been silent longest
+  int max_clients = 128;    ///< reply channels at a time; for one more, the longest silent client loses its own
 };
 
 }  // namespace trammel
