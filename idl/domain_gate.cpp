@@ -32,7 +32,7 @@ constexpr std::chrono::milliseconds kBetweenLosses{500};
 constexpr std::uint16_t kSentinel = 0x0001, kDomainId = 0x000f, kUserData = 0x002c;
 constexpr std::string_view kMark = "trammel.domain=";
 
-/// Reads on from the front; says nothing where there is too little left.
+/// Reads from the front. Empty when too few bytes are left.
 class Reader {
  public:
   Reader(Bytes bytes, bool little_endian) : rest_(bytes), little_endian_(little_endian) {}
@@ -68,7 +68,7 @@ struct Parameter {
   Bytes value;
 };
 
-/// The next of a list; none at its end.
+/// The next parameter of a list; empty at its end.
 std::optional<Parameter> next_parameter(Reader& list) {
   const auto id = list.u16();
   const auto length = list.u16();
@@ -91,7 +91,7 @@ std::optional<std::uint32_t> marked_domain(Bytes user_data) {
 struct Data {
   std::uint32_t writer = 0;  // entity id, its first octet the highest
   std::uint64_t sequence_number = 0;
-  Bytes payload;  // empty: a participant or an instance leaves
+  Bytes payload;  // empty when a participant or an instance leaves
 };
 
 std::optional<Data> data_of(Bytes body, unsigned char flags) {
@@ -133,7 +133,7 @@ bool says_another_domain(Bytes announcement, std::uint32_t domain) {
   return false;
 }
 
-/// Calls `found` with each DATA in the message; true as soon as it is.
+/// True if `found` is true for any DATA in the message.
 template <typename Found>
 bool any_data(Bytes message, const Found& found) {
   if (message.size() < kHeader) return false;

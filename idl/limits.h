@@ -11,25 +11,25 @@ namespace trammel::wire {
 /// UDP port of the first server on a host; replicas take every second one after it.
 inline constexpr std::uint16_t kFirstPort = 17500;
 
-/// Equal on both sides, because unequal leases delay discovery.
+/// Equal for servers and clients: unequal leases delay discovery.
 inline constexpr std::chrono::milliseconds kLease{2000};
 inline constexpr std::chrono::milliseconds kAnnouncement{200};
 /// A server whose status is older than this hangs.
 inline constexpr std::chrono::milliseconds kStatusPeriod{1000};
 inline constexpr std::chrono::milliseconds kStatusLost{3500};
 
-/// Largest serialized samples, bytes; larger ones are dropped unread. A hostile length field can make a reader reserve
-/// about a hundred times the sample for structures, hence the closer limit for them.
+/// Largest serialized samples, bytes; larger ones are dropped unread. A hostile length field in a sequence of
+/// structures can make a reader reserve a hundred times the size of the sample, so these samples have a lower limit.
 inline constexpr std::size_t kMaxComputeSample = 4u << 20;  ///< requests and replies of targets
 inline constexpr std::size_t kMaxTextSample = 32u << 20;    ///< batches and models
 inline constexpr std::size_t kMaxStateSample = 1u << 20;
 
-/// Requests that a server keeps waiting for each operation, and replies for each client and operation: a client has at
-/// most as many requests unanswered.
+/// kRequestDepth requests wait at a server for each operation. kReplyDepth replies are kept for each client and
+/// operation: a client may have at most as many requests unanswered.
 inline constexpr int kRequestDepth = 512;
 inline constexpr int kReplyDepth = 64;
 
-/// What a session puts into one request of those it may: so that other clients have their turn in between.
+/// A session puts fewer targets into one request than it may, so that the requests of other clients come in between.
 inline constexpr std::size_t kTargetsPerRequest = 2000;
 
 }  // namespace trammel::wire

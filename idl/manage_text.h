@@ -5,7 +5,8 @@
 
 #include "manage_models.h"
 
-/// ManageModelsRequest::text means another thing for each action: here each meaning has its name.
+/// ManageModelsRequest::text has a different meaning for each action. Each function here makes the request of one
+/// meaning.
 namespace trammel::wire {
 
 /// MANAGE_LIST, MANAGE_ACTIVATE, MANAGE_ROLLBACK, MANAGE_EXPORT: no text.

@@ -10,9 +10,9 @@
 
 namespace trammel::wire {
 
-/// A generated PubSubType that survives hostile bytes: one that throws while it reads would leave the sample in the
-/// reader and throw again at every take; one that does not look at sizes and enumerators lets them through. Here such a
-/// sample is dropped and the reader goes on. Also guards the key buffer that all writers of a type share.
+/// A generated PubSubType that survives hostile bytes. The generated code may throw while it reads: then the sample
+/// stays in the reader and every later take throws again. It also accepts wrong sizes and enumerators. Here such
+/// samples are dropped and the reader goes on. Also guards the key buffer that all writers of a type share.
 template <typename PubSubType>
 class SafeType : public PubSubType {
  public:
@@ -47,7 +47,7 @@ class SafeType : public PubSubType {
   }
 
  private:
-  /// What a history sets aside for a sample before it knows its size; the generated figure assumes full sequences.
+  /// Bytes that a history reserves for a sample of unknown size. The generated figure assumes full sequences.
   static constexpr std::uint32_t kReservedBytes = 4096;
 
   const std::size_t max_sample_;

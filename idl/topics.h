@@ -11,7 +11,7 @@
 #include "trainingPubSubTypes.h"
 
 /// Every topic: its name, its type, its largest sample (bytes). An operation has the topics `<name>_Request` and
-/// `<name>_Reply`; only the client's own partition of the latter is its business.
+/// `<name>_Reply`; a client reads the latter in its own partition only.
 namespace trammel::wire {
 
 struct PredictError {

@@ -33,7 +33,7 @@ struct ParticipantOptions {
   std::string address = "127.0.0.1";      ///< IPv4 of the only interface that is used
   std::uint16_t listen_port = 0;          ///< where others look for it; 0 = any
   std::vector<std::uint16_t> peer_ports;  ///< on `address`: where it looks for others
-  /// Where given, it is among its own peers, on `listen_port`, and its announcements are counted as they come back.
+  /// If set, the participant is its own peer on `listen_port`, and its announcements are counted when they come back.
   std::shared_ptr<HeardOfItself> heard_of_itself = {};
 };
 
@@ -42,26 +42,26 @@ struct ParticipantDeleter {
 };
 using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
 
-/// UDPv4 on one interface, unicast only, nothing taken from the environment; deaf to other domains. Refuses an address
-/// that this host does not have now: such a participant would stay deaf even when the interface comes up. One
-/// participant a process. `discovery` outlives it and hears of nothing but who is found.
+/// UDPv4 on one interface, unicast only. Ignores the environment and other domains. Refuses an address that this host
+/// does not have now: such a participant would receive nothing even after the interface comes up. One participant per
+/// process. `discovery` outlives it and gets discovery events only.
 [[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options,
                                                       dds::DomainParticipantListener* discovery = nullptr);
 
 [[nodiscard]] dds::PublisherQos publisher_qos(const std::string& partition);
 [[nodiscard]] dds::SubscriberQos subscriber_qos(const std::string& partition);
 
-/// Requests and replies: reliable, volatile, the last `depth` kept, so that a dead peer never stops anybody.
+/// Requests and replies: reliable, volatile, the last `depth` kept, so that a dead peer never blocks a writer.
 [[nodiscard]] dds::DataWriterQos call_writer_qos(int depth);
 [[nodiscard]] dds::DataReaderQos call_reader_qos(int depth);
 /// State topics: reliable, transient local, the last sample of each of any number of keys; a reader keeps a few,
 /// because replicas write the same keys.
 [[nodiscard]] dds::DataWriterQos state_writer_qos();
 [[nodiscard]] dds::DataReaderQos state_reader_qos();
-/// TrainingProgress besides is volatile: what is over is asked for.
+/// TrainingProgress is volatile instead: earlier progress is asked for with MANAGE_JOB.
 [[nodiscard]] dds::DataWriterQos progress_writer_qos();
 [[nodiscard]] dds::DataReaderQos progress_reader_qos();
-/// ServiceStatus besides promises to be written every kStatusPeriod: its liveliness is lost after kStatusLost.
+/// ServiceStatus is also written every kStatusPeriod, and its liveliness is lost after kStatusLost.
 [[nodiscard]] dds::DataWriterQos service_status_writer_qos();
 
 /// A topic of a type that survives hostile samples. Owned by the participant.

@@ -9,11 +9,11 @@
 #include "state.h"
 #include "training.h"
 
-/// What the generated code does not look at when it reads a sample: enumerators and bounds. A sample that is not valid
-/// is dropped. Too many targets or joints in a request are left to the server, which can say so.
+/// Checks what the generated code does not check when it reads a sample: enumerators and bounds. A sample that is not
+/// valid is dropped. Too many targets or joints in a request pass here: the server refuses them with a message.
 namespace trammel::wire {
 
-/// A name that a reply can be routed by: not empty, and without the wildcards of partition names.
+/// Whether the name can be a reply partition: not empty, and without the wildcards of partition names.
 [[nodiscard]] bool valid_partition(std::string_view name);
 
 [[nodiscard]] bool valid(const PredictErrorRequest& request);

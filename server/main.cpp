@@ -1,4 +1,4 @@
-// trammeld: composition root. Loads, wires, runs, stops in reverse.
+// trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
 #include <signal.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -48,20 +48,20 @@ int exit_code(const Error& error) {
   }
 }
 
-/// A line each of all that is wrong.
+/// Prints one line for each error.
 int refuse(const Error& error) {
   for (const Error& one : apart(error)) fmt::print(stderr, "trammeld: {}\n", sentence(one));
   return exit_code(error);
 }
 
-/// A start that would fail, of whatever kind its problems are.
+/// Prints the problems of a start that would fail.
 int refuse_start(std::vector<Error> problems) {
   Error all = together(std::move(problems));
   all.code = ErrorCode::kRefused;
   return refuse(all);
 }
 
-/// What a start would find.
+/// Prints what a start would meet on this host.
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
@@ -108,8 +108,8 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-/// The signals that end the service, blocked in every thread from here on and taken by one of its own: whoever hangs, a
-/// signal ends the process, at the latest kOrderlyStop after it.
+/// Takes the signals that end the service in a thread of its own; all other threads block them. A signal ends the
+/// process within kOrderlyStop, even if another thread hangs.
 class StopSignals {
  public:
   StopSignals() {
@@ -126,7 +126,7 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  /// Until the first comes.
+  /// Waits for the first signal.
   [[nodiscard]] const char* wait() {
     MutexLock lock(mutex_);
     came_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return number_ != 0; });
@@ -147,7 +147,7 @@ class StopSignals {
       number_ = number;
     }
     came_.notify_all();
-    // Counted in ticks that were lived through: a process that is stopped meanwhile does not hang.
+    // Counts ticks, not time: the process may be paused meanwhile, and that is no hang.
     const timespec tick{0, std::chrono::nanoseconds(kTick).count()};
     for (auto waited = kTick; waited <= kOrderlyStop; waited += kTick) {
       ::sigtimedwait(&signals_, nullptr, &tick);
@@ -163,7 +163,7 @@ class StopSignals {
   std::jthread thread_;
 };
 
-/// Serves until a signal says otherwise.
+/// Serves until a signal ends it.
 Status serve(const ServerConfig& config) {
   StopSignals signals;  // before any thread starts
   auto store = Store::open(config.store);

@@ -19,11 +19,11 @@
 
 namespace trammel::client {
 
-/// Where a call goes and how it is repeated.
+/// To which server a call goes, and how it is repeated.
 struct Route {
-  std::string cell;                ///< preferably to a server that has it
+  std::string cell;                ///< preferred: a server that serves this cell
   std::string server;              ///< only to this one; empty: any
-  bool changes_something = false;  ///< repeated rather at the same server, which recognises it, than elsewhere
+  bool changes_something = false;  ///< a repeat goes to the same server if it can: that one recognises it
 };
 
 /// One operation of a session: a request writer, a reply reader in the session's partition, and the calls that wait.
@@ -62,8 +62,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (reader_ != nullptr) subscriber_.delete_datareader(reader_);
   }
 
-  /// Sends the request to a server that is matched both ways and, when that one leaves or is silent for half of the
-  /// time, once more with the same id. kUnreachable when nobody answers by `deadline`.
+  /// Sends the request to a server whose reader and writer are matched. If that server leaves, or is silent for half of
+  /// the time, the request is sent once more with the same id. kUnreachable: no answer by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route, Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
     request.header().reply_partition(partition_);
@@ -86,7 +86,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
  private:
-  /// A call under way; one of waiting_, and guarded with it.
+  /// A call under way. An element of waiting_, guarded by the same mutex.
   struct Waiting {
     Condition changed;
     std::optional<Reply> reply;
@@ -100,7 +100,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     std::string asked;
     for (const bool again : {false, true}) {
       const auto until = again ? deadline : now + (deadline - now) / 2;
-      // The second time also to a server whose way back is not known yet: it may have had too many clients.
+      // The repeat may also go to a server whose reply writer is not matched yet: it may have had too many clients.
       const auto server = watch_.wait_for_server(
           route.cell, route.changes_something ? std::string() : asked, until, [&](const KnownServer& known) {
             return (route.server.empty() || route.server == known.id()) && reachable(known.participant, !again);
@@ -178,7 +178,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   wire::dds::DataReader* reader_ = nullptr;
   std::array<std::uint8_t, 16> guid_{};  // of writer_
   mutable Mutex mutex_;
-  Condition room_;                                                      // waiting_ has become smaller
+  Condition room_;                                                      // waiting_ has shrunk
   std::set<std::string> readers_ TRAMMEL_GUARDED_BY(mutex_);            // participants that read our requests
   std::set<std::string> writers_ TRAMMEL_GUARDED_BY(mutex_);            // participants that write replies to us
   std::map<std::int64_t, Waiting> waiting_ TRAMMEL_GUARDED_BY(mutex_);  // by sequence number

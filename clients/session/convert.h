@@ -6,7 +6,7 @@
 #include "idl/valid.h"
 #include "server/base/result.h"
 
-/// Between the session's types and the wire's.
+/// Converts between the types of the session and those of the wire.
 namespace trammel::client {
 
 [[nodiscard]] wire::Context to_wire(const CallContext& context);
@@ -17,14 +17,14 @@ namespace trammel::client {
 [[nodiscard]] CorrectedTarget from_wire(const wire::CorrectedTarget& correction);
 [[nodiscard]] JobStatus from_wire(const wire::Job& job);
 [[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
-/// The list that MANAGE_QUARANTINE answers. Refuses what is none.
+/// Parses the answer to MANAGE_QUARANTINE. Refuses a text that is no such list.
 [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json);
-/// What MANAGE_RELEASE_AND_TRAIN is told.
+/// The text of a MANAGE_RELEASE_AND_TRAIN request.
 [[nodiscard]] std::string release_text(const std::vector<std::string>& batch_ids, const std::string& level,
                                        const std::string& bias);
-/// The list that MANAGE_JOBS answers. Refuses what is none.
+/// Parses the answer to MANAGE_JOBS. Refuses a text that is no such list.
 [[nodiscard]] Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::string& server);
-/// Of a reply that is not RESULT_OK.
+/// The error in a reply that is not RESULT_OK.
 [[nodiscard]] Error error_of(const wire::ReplyHeader& header);
 
 }  // namespace trammel::client

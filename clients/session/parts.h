@@ -12,8 +12,8 @@
 /// Long calls, sent in parts.
 namespace trammel::client {
 
-/// How many items the next part has: as many as were answered in the wanted time, by what the parts before took. Begins
-/// with few and grows at most eightfold from one part to the next.
+/// The number of items in the next part: as many as are answered in the wanted time, judged by the part before. Starts
+/// small and grows at most eightfold from one part to the next.
 class PartSize {
  public:
   using Seconds = std::chrono::duration<double>;
@@ -40,8 +40,8 @@ class PartSize {
 template <typename Item>
 using AskPart = std::function<Result<Answer<Item>>(std::size_t first, std::size_t count)>;
 
-/// The answers to `items` items, all from one model: where it changes between two parts everything is asked again of
-/// the new one. kBusy: it changed again and again. `progress` may be empty; `now` is the clock.
+/// The answers to `items` items, all from one model. If the model changes between two parts, all items are asked again.
+/// kBusy: it changed again and again. `progress` may be empty; `now` is the clock.
 template <typename Item>
 [[nodiscard]] Result<Answer<Item>> ask_in_parts(std::size_t items, const std::string& cell, PartSize size,
                                                 const AskPart<Item>& ask, const std::function<void(double)>& progress,

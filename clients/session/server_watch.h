@@ -19,7 +19,7 @@ namespace trammel::client {
 
 using Clock = std::chrono::steady_clock;
 
-/// Reads a state topic; the function is called from DDS' threads and must neither block nor call DDS.
+/// Reads a state topic. The listener is called in threads of DDS and must neither block nor call DDS.
 template <typename State>
 class StateReader final : private wire::dds::DataReaderListener {
  public:
@@ -78,34 +78,35 @@ struct KnownServer {
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
 
-/// A model in force as it was described at a time.
+/// A model in force, and when a server described it so.
 struct KnownModel {
   wire::ModelInfo model;
   double written_unix_s = 0;
 };
 
-/// What servers say without being asked, and which of them are there. Thread-safe.
+/// The servers that are there, and what they published on the state topics. Thread-safe.
 class ServerWatch {
  public:
   [[nodiscard]] static Result<std::unique_ptr<ServerWatch>> open(wire::dds::DomainParticipant& participant,
                                                                  wire::dds::Subscriber& subscriber);
 
-  /// Of the servers that `reachable` lets through: one that serves `cell` if there is one, rather not
-  /// `avoid`, rather one heard of lately. Waits for the first until `deadline`.
+  /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
+  /// status lately, then one that is not `avoid`. Waits until `deadline` for the first server.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
                                                            Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
-  /// What is reachable may have changed.
+  /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 
-  /// Waits until `count` servers are known, or until `deadline`; after the first one only as long as a status takes.
+  /// Waits until `count` servers are known, or until `deadline`. After the first server it waits at most one status
+  /// period.
   [[nodiscard]] std::vector<KnownServer> wait_for_servers(std::size_t count, Clock::time_point deadline);
-  /// Waits for as many models as the servers say they have in force, one status period at most. Their data's age is
-  /// that of now, not that of when they were put in force.
+  /// Waits until the models in force are as many as the servers report, one status period at most. The age of their
+  /// data is brought up to the present.
   [[nodiscard]] std::vector<wire::ModelInfo> models_in_force();
 
-  /// Waits for a progress of the job that is later than the `seen`-th (which it updates); empty at `deadline`. An empty
-  /// server means any.
+  /// Waits for progress of the job that is newer than number `seen`, and updates `seen`. Empty at `deadline`. An empty
+  /// `server` means any.
   [[nodiscard]] std::optional<wire::Job> wait_for_progress(const std::string& server, std::int64_t job,
                                                            std::uint64_t& seen, Clock::time_point deadline);
 
@@ -117,7 +118,7 @@ class ServerWatch {
   [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
                                           const std::function<bool(const KnownServer&)>& reachable) const
       TRAMMEL_REQUIRES(mutex_);
-  /// As many of each server as it says it has.
+  /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
   Mutex mutex_;

@@ -14,19 +14,20 @@
 namespace trammel::client {
 namespace {
 
-/// That the answer to one part of a long call takes: far from half of it, when a request is sent once more.
+/// Share of the timeout that one part of a long call should take. At half of the timeout a request is sent again; this
+/// is far below.
 constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
 /// Room for everything but the text in the largest sample.
 constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
-/// A name that no other client has, on whatever host: 128 random bits.
+/// A unique name, also across hosts: 128 random bits.
 std::string make_partition() {
   std::random_device random;
   return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
 }
 
-/// Whether it can be sent: strings on the wire end at a NUL, and what comes after one would be lost unseen.
+/// Refuses a text with a NUL: strings on the wire end there, and the rest would be lost silently.
 Status check_text(const std::string& what, const std::string& text) {
   if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
@@ -52,7 +53,7 @@ Status open_caller(std::unique_ptr<Caller>& caller, wire::dds::DomainParticipant
 
 }  // namespace
 
-/// Members are closed from the last to the first.
+/// Members are destroyed from the last to the first.
 struct Session::Participant {
   SessionOptions options;
   wire::ParticipantPtr participant;
@@ -66,14 +67,14 @@ struct Session::Participant {
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
-  /// For a message: how long, on which ports, in which domain.
+  /// For error messages: how long it looked, on which ports, in which domain.
   [[nodiscard]] std::string where_it_looked() const {
     std::string ports;
     for (const std::uint16_t port : options.server_ports) ports += fmt::format(" 127.0.0.1:{}", port);
     return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), ports, options.domain);
   }
 
-  /// One request; an error also when the server says so.
+  /// Sends one request. An error reply of the server is an error here.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
                                                              typename Operation::Request::type request,

@@ -16,23 +16,24 @@ namespace trammel::client {
 
 struct SessionOptions {
   std::uint32_t domain = 0;
-  std::vector<std::uint16_t> server_ports = {17500};  ///< on 127.0.0.1, one a replica
-  std::chrono::milliseconds timeout{5000};            ///< of one request, discovery included; long calls are many
+  std::vector<std::uint16_t> server_ports = {17500};  ///< on 127.0.0.1, one per replica
+  std::chrono::milliseconds timeout{5000};  ///< of one request, discovery included; a long call is many requests
 };
 
-/// One participant, its own reply partition. Thread-safe; calls from several threads overlap. Errors: kUnreachable when
-/// no server answered in time, else what the server said, with its code. A request that is not answered is sent once
-/// more with the same id: elsewhere, or to the same server where a repeat could change something twice.
+/// One DDS participant with its own reply partition. Thread-safe; calls from several threads overlap. Errors:
+/// kUnreachable when no server answered in time, else the error of the server. A request without an answer is sent once
+/// more with the same id, preferably to another server. A request that changes something goes to the same server again,
+/// which recognises the repeat.
 class Session {
  public:
-  /// Does not wait for a server. One session a process is enough.
+  /// Does not wait for a server. One session per process is enough.
   [[nodiscard]] static Result<std::unique_ptr<Session>> open(const SessionOptions& options);
   ~Session();
 
   /// The share of a long call that is answered, [0, 1]; it falls where the call begins again.
   using ShareListener = std::function<void(double share)>;
-  /// Rows of joint vectors. Any number: long calls are sent in parts that are answered in a small share of the timeout.
-  /// One model answers all of them: where it changes in between, the call begins again with the new one.
+  /// Takes any number of joint vectors. A long call is sent in parts, each answered in a small share of the timeout.
+  /// One model answers all parts: if the model changes meanwhile, the call starts again with the new one.
   [[nodiscard]] Result<Answer<PredictedError>> predict_error(const CallContext& context,
                                                              const std::vector<std::vector<double>>& joints_rad,
                                                              const ShareListener& progress = {});
@@ -45,19 +46,20 @@ class Session {
                                                          const std::string& csv);
   [[nodiscard]] Result<std::int64_t> train(const std::string& cell, const std::vector<std::string>& batch_ids,
                                            const std::string& level, const std::string& bias);
-  /// Queues a diagnosis of a stored batch (empty: the newest) or of `csv`; with `apply` what is found is trained and
-  /// put in force if better. Returns the job; when that is done, diagnosis() is what it found.
+  /// Queues a diagnosis of a stored batch (empty: the newest) or of `csv`. With `apply` a model with the causes found
+  /// is trained, and put in force if better. Returns the job; when that is done, diagnosis() returns the findings.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply);
   [[nodiscard]] Result<DiagnosisAnswer> diagnosis(const std::string& cell, std::int64_t job, bool page);
-  /// Of every server, of one cell or (empty) of all.
+  /// From every server, for one cell or (empty) for all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
-  /// As train(), from batches that leave quarantine with it: only if the training is accepted.
+  /// As train(), from batches in quarantine. They are released only if the training is accepted.
   [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
                                                        const std::vector<std::string>& batch_ids,
                                                        const std::string& level, const std::string& bias);
-  /// Of every server, of one cell or (empty) of all, oldest first: what waits or runs and what ended lately.
+  /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
+  /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
@@ -67,12 +69,12 @@ class Session {
   [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version);
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
 
-  /// Those that are there, by their last status, waiting up to the timeout for the first to appear.
+  /// The servers that are there, by their last status. Waits up to the timeout for the first.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers();
   /// Models in force, of every cell, from ModelStatus.
   [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
-  /// Calls `listener` for the job's progress until it is done or failed (its last state is returned) or `limit` is over
-  /// (kUnreachable). A server that restarts meanwhile is waited for. kNotFound: no server knows the job.
+  /// Calls `listener` with the job's progress until it is done or failed, and returns its last state. kUnreachable:
+  /// `limit` is over. kNotFound: no server knows the job. If the server restarts meanwhile, the call waits for it.
   [[nodiscard]] Result<JobStatus> wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
                                                const std::function<void(const JobStatus&)>& listener);
 

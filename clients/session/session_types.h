@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-/// What a session is asked and answers. Units as on the wire: mm, rad; a prismatic joint in mm.
+/// The arguments and results of a session. Units as on the wire: mm, rad; a prismatic joint in mm.
 namespace trammel::client {
 
 /// What a call is about; must fit what the model was trained on.
@@ -82,11 +82,11 @@ struct DatedJob {
 /// What a diagnosis found.
 struct DiagnosisAnswer {
   std::string findings_json;  ///< as `trammel diagnose --json` prints them
-  std::string page_html;      ///< opens by itself; empty where it was not asked for, or is too old
+  std::string page_html;      ///< self-contained; empty if not asked for, or no longer kept
   ModelInfo in_force;         ///< now; empty id: none
 };
 
-/// A batch that no training takes, and why.
+/// A batch in quarantine, and why.
 struct QuarantinedBatch {
   std::string cell, batch, reason;
   int poses = 0;

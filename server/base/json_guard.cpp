@@ -17,7 +17,7 @@ struct Token {
   std::size_t begin = 0, end = 0;
 };
 
-/// Takes one piece after the other off the text and counts; keeps nothing but the counts.
+/// Reads the text token by token and counts. Keeps nothing but the counts.
 class Scanner {
  public:
   Scanner(std::string_view json, const std::string& where, const JsonLimits& limits)
@@ -56,7 +56,7 @@ class Scanner {
     }
   }
 
-  /// Behind the closing quote; the text's end where there is none.
+  /// The position behind the closing quote; the end of the text if there is none.
   [[nodiscard]] std::size_t end_of_text(std::size_t begin) const {
     for (std::size_t i = begin + 1; i < json_.size(); ++i) {
       if (json_[i] == '"') return i + 1;
@@ -111,12 +111,12 @@ Status check_size(std::string_view json, const std::string& where, const JsonLim
       .beyond(json.size(), limits.bytes);
 }
 
-/// Collects the members of the outermost object while the pieces go by.
+/// Collects the members of the outermost object, token by token.
 class Members {
  public:
   Members(std::string_view json, const std::string& where) : json_(json), where_(where) {}
 
-  /// `depth`: after the token.
+  /// `depth` is the nesting depth after the token.
   Status take(const Token& token, std::size_t depth) {
     if (!opened_) {
       opened_ = true;
@@ -169,7 +169,7 @@ class Members {
   const std::string& where_;
   std::map<std::string, std::string_view> found_;
   std::optional<std::string> key_;
-  std::optional<std::size_t> begin_;  // of the key or the value that goes by
+  std::optional<std::size_t> begin_;  // of the current key or value
   std::size_t end_ = 0;
   bool opened_ = false, closed_ = false;
 };
@@ -188,7 +188,7 @@ Status check_json_limits(std::string_view json, const std::string& where, const 
 
 Result<std::map<std::string, std::string_view>> json_members(std::string_view json, const std::string& where,
                                                              const JsonLimits& limits) {
-  // All of it is counted before anything is kept.
+  // The limits are checked before anything is stored.
   if (const Status fine = check_json_limits(json, where, limits); !fine) return tl::make_unexpected(fine.error());
   Scanner scanner(json, where, limits);
   Members members(json, where);

@@ -6,24 +6,24 @@
 #include <stop_token>
 #include <utility>
 
-/// Locks that the compiler checks: `deploy/check threads` has clang refuse a member that is touched without the lock it
-/// is guarded by. To other compilers the annotations are nothing.
+/// Locks that the compiler checks. In `deploy/check threads` clang refuses code that uses a member without the lock
+/// that guards it. Other compilers ignore the annotations.
 #if defined(__clang__)
 #define TRAMMEL_THREAD_SAFETY(annotation) __attribute__((annotation))
 #else
 #define TRAMMEL_THREAD_SAFETY(annotation)
 #endif
 
-/// Of a member: read and written under this mutex only.
+/// On a member: read and written under this mutex only.
 #define TRAMMEL_GUARDED_BY(mutex) TRAMMEL_THREAD_SAFETY(guarded_by(mutex))
-/// Of a function or of a lambda: whoever calls it holds this mutex.
+/// On a function or a lambda: the caller holds this mutex.
 #define TRAMMEL_REQUIRES(mutex) TRAMMEL_THREAD_SAFETY(requires_capability(mutex))
-/// Of a function: whoever calls it does not hold this mutex; the function takes it.
+/// On a function: the caller does not hold this mutex. The function locks it.
 #define TRAMMEL_EXCLUDES(mutex) TRAMMEL_THREAD_SAFETY(locks_excluded(mutex))
 
 namespace trammel {
 
-/// A std::mutex that clang knows by name. Lock it by MutexLock.
+/// A std::mutex with annotations. Lock it with MutexLock.
 class TRAMMEL_THREAD_SAFETY(capability("mutex")) Mutex {
  public:
   void lock() TRAMMEL_THREAD_SAFETY(acquire_capability()) { mutex_.lock(); }
@@ -33,7 +33,7 @@ class TRAMMEL_THREAD_SAFETY(capability("mutex")) Mutex {
   std::mutex mutex_;
 };
 
-/// Holds a mutex as long as it lives, but for where it is let go in between by unlock().
+/// Holds a mutex until it is destroyed or unlock() is called.
 class TRAMMEL_THREAD_SAFETY(scoped_lockable) MutexLock {
  public:
   explicit MutexLock(Mutex& mutex) TRAMMEL_THREAD_SAFETY(acquire_capability(mutex)) : lock_(mutex) {}
@@ -48,9 +48,9 @@ class TRAMMEL_THREAD_SAFETY(scoped_lockable) MutexLock {
   std::unique_lock<Mutex> lock_;
 };
 
-/// What one thread waits for and another brings about. Every wait begins and ends with the lock held, and lets it go in
-/// between; `ready` is called under it: `[this]() TRAMMEL_REQUIRES(mutex_) { return ...; }`. Waits with a limit, or
-/// with a stop token, return what `ready` said last.
+/// A condition variable for Mutex. The lock is held before and after every wait, and released during it. `ready` is
+/// called with the lock held: `[this]() TRAMMEL_REQUIRES(mutex_) { return ...; }`. A wait with a limit or a stop token
+/// returns the last result of `ready`.
 class Condition {
  public:
   void notify_one() noexcept { condition_.notify_one(); }

@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// What kind of thing went wrong; decides exit codes and reply codes, never the wording.
+/// The kind of an error. It decides exit codes and reply codes, never the wording.
 enum class ErrorCode {
   kUsage,        ///< the caller asked for something that does not exist (exit 2)
   kRefused,      ///< data that must not be used: bad row, unknown tool, ill-conditioned fit (exit 3)
@@ -23,11 +23,11 @@ enum class ErrorCode {
   kInternal      ///< the disk, the database, a corrupt file of our own (exit 3)
 };
 
-/// As programs read it: `refused`, `not_found`.
+/// The spelling for programs: `refused`, `not_found`.
 [[nodiscard]] const char* to_text(ErrorCode code);
 
-/// An expected failure, as data: programs and tests ask the members, people read `sentence()`. What is not known is
-/// left empty.
+/// An expected failure, as data. Programs and tests read the members, people read `sentence()`. Members that are not
+/// known are empty.
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
   std::string message;          ///< one clause that says what, with value and limit: `joint 3 is 241.2 deg, limit 70.0`
@@ -35,32 +35,32 @@ struct Error {
   std::optional<long> row;      ///< line of the file, counted from 1 with its header
   std::string field;            ///< column, key (`tools: spindle: xyz_mm`) or option
   std::optional<double> value;  ///< as read, in the unit of the field
-  std::optional<double> limit;  ///< that the value should have kept, in the same unit
+  std::optional<double> limit;  ///< the limit that was broken, in the same unit
   std::string text;             ///< the value as read, where it is a word
   std::string next;             ///< what to do about it, as one clause
   std::vector<Error> also;      ///< what else is wrong, found in the same reading
 };
 
-/// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0; teach it again`.
-/// A line each of what else is wrong.
+/// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0; teach it again`. One
+/// more line for each error in `also`.
 [[nodiscard]] std::string sentence(const Error& error);
 
-/// All of them as one: the first, and the others as what else is wrong. `problems` is not empty.
+/// One error that holds all: the first, with the others in `also`. `problems` is not empty.
 [[nodiscard]] Error together(std::vector<Error> problems);
-/// Each by itself, none with what else is wrong.
+/// The reverse: every error by itself, with an empty `also`.
 [[nodiscard]] std::vector<Error> apart(const Error& error);
 
 template <typename T>
 using Result = tl::expected<T, Error>;
 using Status = Result<void>;
 
-/// A failure on its way to the caller. What is known of it is added where it is known, inner layers first: what is
-/// there already stays.
+/// A failure on its way to the caller. Each layer adds what it knows, inner layers first. Members that are already set
+/// stay as they are.
 class Failure : public tl::unexpected<Error> {
  public:
   explicit Failure(Error error) : tl::unexpected<Error>(std::move(error)) {}
 
-  /// Of another kind to whoever asked: a word in a file is no wrong usage of a command.
+  /// Changes the kind of the error. Example: an unknown word in a file is no wrong usage of a command.
   Failure&& as(ErrorCode code) && {
     value().code = code;
     return std::move(*this);
@@ -77,7 +77,7 @@ class Failure : public tl::unexpected<Error> {
     if (value().field.empty()) value().field = std::move(field);
     return std::move(*this);
   }
-  /// The key, column or option that all this is of: stands before the clause and before an inner field.
+  /// Adds the key, column or option that the error is about. It stands before the message and before an inner field.
   Failure&& under(const std::string& key) && {
     value().message = key + ": " + value().message;
     value().field = value().field.empty() ? key : key + ": " + value().field;

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A pipe or a device does not say how much will come of it.
+/// Reads without knowing the size: a pipe or a device has none.
 Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes) {
   std::ifstream in(path, std::ios::binary);
   std::string text;
@@ -56,7 +56,7 @@ std::int64_t written_at(const std::string& path) {
 
 namespace {
 
-/// Empty when all of it was written, else why not.
+/// Empty if all of it was written, else the reason.
 std::string write_all(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out << text;
@@ -64,7 +64,7 @@ std::string write_all(const fs::path& path, const std::string& text) {
   return out ? "" : std::strerror(errno);
 }
 
-/// Renaming onto a device, a pipe or a link would put a file in its place.
+/// Devices, pipes and links are written in place: a rename would replace them by a file.
 bool is_written_in_place(const std::string& path) {
   std::error_code error;
   return fs::exists(path, error) && !fs::is_regular_file(path, error);

@@ -2,7 +2,8 @@
 
 #include <numbers>
 
-/// Inside: m, rad, kg, N, s, unsuffixed. These convert at the boundary, and only there.
+/// Inside, quantities are in m, rad, kg, N and s, and names carry no unit. These functions convert at the boundary, and
+/// only there.
 namespace trammel {
 
 constexpr double kPi = std::numbers::pi;

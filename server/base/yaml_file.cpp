@@ -17,7 +17,7 @@ constexpr int kMostDepth = 20;
 constexpr int kMostEntries = 20'000;
 constexpr int kMostAliases = 100;
 
-/// Counts what the parser meets, and ends it where there is too much.
+/// Counts what the parser meets and stops it at the limits.
 class Counter final : public YAML::EventHandler {
  public:
   explicit Counter(const std::string& where) : where_(where) {}
@@ -54,7 +54,7 @@ class Counter final : public YAML::EventHandler {
 
 std::string below(const std::string& path, const std::string& key) { return path.empty() ? key : path + ": " + key; }
 
-/// `expected a number`, with what stands there instead.
+/// The error `expected a number`, with what was found instead.
 Failure expected(const char* what, const YAML::Node& found) {
   if (!found.IsScalar() || found.Scalar().empty()) return refused("expected {}", what);
   return refused("'{}', expected {}", found.Scalar(), what).with_text(found.Scalar());

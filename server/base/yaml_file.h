@@ -10,8 +10,8 @@
 
 #include "server/base/result.h"
 
-/// Reading YAML that people write: strict about keys, and every refusal says file, key and what was expected.
-/// Included only by readers (`*_file.cpp`) and config/.
+/// Reads YAML that people write. Unknown keys are refused. Every error says file, key and what was expected. Included
+/// only by readers (`*_file.cpp`) and config/.
 namespace trammel {
 
 /// Thrown by YamlMap, caught by read_yaml(); never leaves a reader.
@@ -24,9 +24,9 @@ class YamlMap {
  public:
   YamlMap(YAML::Node node, std::string file);
 
-  /// Refuses keys that are not in `known`, all of them, and goes on.
+  /// Notes every key that is not in `known` as an error, and goes on.
   void only(std::initializer_list<const char*> known) const;
-  /// What `read` refuses is noted for the end of read_yaml(), which says all that is wrong at once; goes on.
+  /// Calls `read`. An error in it is noted, and reading goes on: read_yaml() reports all errors at its end.
   template <typename Read>
   void attempt(const Read& read) const {
     try {
@@ -35,10 +35,10 @@ class YamlMap {
       problems_->push_back(refusal.error);
     }
   }
-  /// Noted so far, of the whole file.
+  /// The errors noted so far, of the whole file.
   [[nodiscard]] const std::vector<Error>& problems() const { return *problems_; }
   [[nodiscard]] bool has(const std::string& key) const;
-  /// Present and `null` (or absent).
+  /// Whether the key is `null` or absent.
   [[nodiscard]] bool is_null(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key, double otherwise) const;
@@ -52,7 +52,7 @@ class YamlMap {
   [[nodiscard]] std::vector<YamlMap> maps(const std::string& key) const;
   [[nodiscard]] std::vector<std::string> keys() const;
   [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
-  /// With what is known of it beside the words; its file, its line and the way to `key` are added here.
+  /// Refuses with the error `why`. File, line and the path of keys to `key` are added here.
   [[noreturn]] void refuse(const std::string& key, Failure why) const;
 
  private:
@@ -68,11 +68,11 @@ class YamlMap {
   std::shared_ptr<std::vector<Error>> problems_;
 };
 
-/// Refuses a text that nobody wrote by hand (kTooLarge): over a megabyte, 20 lists and mappings inside one another,
-/// 20,000 entries or 100 aliases. Goes through it once and keeps nothing. Throws what the parser throws.
+/// Refuses a text that is too large to be written by hand (kTooLarge): over a megabyte, 20 levels of nesting, 20,000
+/// entries or 100 aliases. Reads it once and keeps nothing. Throws what the parser throws.
 [[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
 
-/// Line of the text, counted from 1; none where the parser does not know it.
+/// Line of the text, counted from 1; empty if the parser does not know it.
 [[nodiscard]] std::optional<long> line_of(const YAML::Mark& mark);
 
 /// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one Error that holds all.

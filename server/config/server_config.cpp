@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
 constexpr std::size_t kMaxName = 64;     // likewise, bytes
-constexpr int kMaxDomain = 232;          // beyond it DDS' port numbers overflow
+constexpr int kMaxDomain = 232;          // above it the port numbers of DDS overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
   const int value = map.integer(key, otherwise);
@@ -47,7 +47,7 @@ std::string server_id(const YamlMap& map, const std::string& key) {
   return id;
 }
 
-/// IPv4; loopback unless the network is allowed.
+/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed.
 std::string address(const YamlMap& map, const std::string& otherwise) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
@@ -163,7 +163,7 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
 }
 
-/// What its first training would refuse.
+/// Notes what the first training of the cell would refuse.
 void check_training(const Cell& cell, const std::string& file, std::vector<Error>& problems) {
   const auto note = [&](const char* key, Error why) {
     why.field.clear();

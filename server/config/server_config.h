@@ -17,7 +17,7 @@ struct LogOptions {
   std::string file;            ///< empty: standard error
 };
 
-/// All that a server is told at its start.
+/// The configuration of a server.
 struct ServerConfig {
   std::map<std::string, std::shared_ptr<const Cell>> cells;  ///< by name
   std::string store;                                         ///< path of the database
@@ -27,12 +27,12 @@ struct ServerConfig {
 };
 
 /// Reads a server file (`config/server.yaml` has every key) and the cell files that it names. Paths in it are relative
-/// to it. Refuses, with file, key and limit, all of them at once, a line each: an unknown, doubled or missing key, a
-/// wrong type, a value out of range, two cells of one name, an address that leaves this host without `allow_network`, a
-/// bias or an error source that the first training would refuse.
+/// to it. Reports all errors at once, with file, key and limit, a line each. Refuses an unknown, doubled or missing
+/// key, a wrong type, a value out of range, two cells of one name, an address that leaves this host without
+/// `allow_network`, a bias or an error source that the first training would refuse.
 [[nodiscard]] Result<ServerConfig> read_server_config(const std::string& path);
 
-/// The same for those who want to know more: what could be read, and all that is wrong with the rest.
+/// What could be read of a server file, and all errors in the rest.
 struct ServerReading {
   ServerConfig config;
   std::vector<Error> problems;  ///< each by itself

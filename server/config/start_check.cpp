@@ -11,13 +11,13 @@ namespace trammel {
 
 namespace {
 
-/// A value that was refused is not looked for.
+/// Whether the section was read without errors. A value that was refused is not checked further.
 bool was_read(const ServerReading& server, const std::string& section) {
   return std::none_of(server.problems.begin(), server.problems.end(),
                       [&](const Error& problem) { return problem.field.starts_with(section + ":"); });
 }
 
-/// What is wrong with the path or address that stands at `key` of the server file.
+/// The error `found` in the path or address at `key`, told as an error of the server file.
 Error at_key(const std::string& key, const std::string& path, Error found) {
   const std::string named = std::exchange(found.file, "");
   if (!named.empty()) found.message = named + ": " + found.message;

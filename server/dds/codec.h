@@ -7,15 +7,16 @@
 #include "server/registry/model_registry.h"
 #include "server/trainer/trainer.h"
 
-/// Between the wire (mm, rad; prismatic joints mm) and the inside (m, rad).
+/// Converts between the wire (mm, rad; prismatic joints mm) and the inside (m, rad).
 namespace trammel {
 
 [[nodiscard]] wire::PoseMm to_wire(const Pose& X);
-/// Refuses non-finite numbers and a quaternion whose length is not 1 within 1e-3; `where` names it.
+/// Refuses non-finite numbers and a quaternion whose length differs from 1 by more than 1e-3. `where` names the pose in
+/// the error.
 [[nodiscard]] Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where);
 
 [[nodiscard]] wire::Joints to_wire(const JointVector& q, const Chain& chain);
-/// Refuses a count that is not the robot's, and non-finite numbers; `where` names it.
+/// Refuses non-finite numbers and a number of joints that is not the robot's. `where` names the vector in the error.
 [[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where);
 
 [[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s);

@@ -51,7 +51,8 @@ Status check_names(const DdsOptions& options, const Trainer& trainer) {
   return {};
 }
 
-/// What threads begun meanwhile are called, for those who look at the process: the library does not name its own.
+/// Threads that start while this lives get its name. The library does not name its threads, and `top` and debuggers
+/// show names.
 class ThreadName {
  public:
   explicit ThreadName(const char* name) {
@@ -119,7 +120,7 @@ class DdsService::Running {
 
   void publish_model(const std::string& cell) {
     {
-      const MutexLock lock(publishing_.at(cell));  // so that the last one published is the one in force
+      const MutexLock lock(publishing_.at(cell));  // the last model published must be the one in force
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
@@ -172,7 +173,7 @@ class DdsService::Running {
     }
   }
 
-  /// What proves that this service and the library below it still move, each counted by the thread that does it.
+  /// The threads of this service and of the library that the watchdog watches. Each counts its own work.
   [[nodiscard]] std::vector<MovingPart> moving_parts(const std::shared_ptr<wire::HeardOfItself>& heard) const {
     using Mark = std::optional<std::uint64_t>;
     std::vector<MovingPart> parts = {{"discovery", [heard]() -> Mark { return heard->announcements.load(); }},
@@ -213,7 +214,7 @@ class DdsService::Running {
   std::unique_ptr<StatusEcho> echo_;
   ReplyChannels channels_;
   ServiceCore core_;
-  std::map<std::string, Mutex> publishing_;  // the map never changes; one model of a cell published at a time
+  std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::jthread status_thread_;
@@ -260,7 +261,7 @@ template <typename Publish>
 void DdsService::publish(const Publish& publish) {
   MutexLock lock(mutex_);
   if (!running_) return;
-  Running& running = *running_;  // stop() lets it be until nobody publishes
+  Running& running = *running_;  // stays alive: stop() waits until publishing_ is 0
   ++publishing_;
   lock.unlock();
   publish(running);

@@ -12,22 +12,23 @@
 
 namespace trammel {
 
-/// What a request is about, looked up once: all of its answer comes from this one model.
+/// What a request is about, looked up once. The whole answer comes from this one model.
 struct Subject {
   std::shared_ptr<const ServedModel> served;
   bool in_force = false;
   std::string tool, payload;  ///< resolved
 };
 
-/// Finds what a request's context means. Keeps the few stored versions last asked for in memory. Thread-safe.
+/// Looks up the cell, tool, payload and model that a request's context names. Keeps the stored versions that were asked
+/// for last in memory. Thread-safe.
 class SubjectFinder {
  public:
   SubjectFinder(const Trainer& trainer, const ModelRegistry& registry) : trainer_(trainer), registry_(registry) {}
 
-  /// The cell's description. Refuses an unknown cell, tool or payload, and a controller that compensates: models are
-  /// trained with one that does not.
+  /// The cell's description. Refuses an unknown cell, tool or payload. Refuses a controller that compensates: models
+  /// are trained on data from one that does not.
   [[nodiscard]] Result<std::shared_ptr<const Cell>> cell(const wire::Context& context) const;
-  /// As cell(); refuses besides a cell without a model in force, an unknown version, a model id that is not in force.
+  /// As cell(). Also refuses a cell without a model in force, an unknown version, and a model id that is not in force.
   [[nodiscard]] Result<Subject> find(const wire::Context& context);
 
  private:
@@ -39,7 +40,7 @@ class SubjectFinder {
   std::deque<std::shared_ptr<const ServedModel>> loaded_ TRAMMEL_GUARDED_BY(mutex_);  // newest first
 };
 
-/// The answers to requests: a decoded request in, a reply or an error out. No DDS. Headers are the caller's business.
+/// Answers requests: a decoded request in, a reply or an error out. No DDS. The caller fills in the headers.
 /// Thread-safe.
 class Handlers {
  public:
@@ -51,7 +52,7 @@ class Handlers {
   /// Accepted means stored: see Trainer::submit.
   [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
   [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
-  /// Queues a diagnosis, or answers what one found: see Trainer::diagnose.
+  /// Queues a diagnosis, or returns the findings of one: see Trainer::diagnose.
   [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
 
@@ -60,7 +61,7 @@ class Handlers {
                                                                const wire::ManageModelsRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> job_of(std::int64_t job) const;
   [[nodiscard]] Result<wire::ManageModelsReply> models_of(const std::string& cell) const;
-  /// The text of a version's model file; of the one in force for version 0.
+  /// The text of the model file of `version`; version 0 is the one in force.
   [[nodiscard]] Result<wire::ManageModelsReply> exported(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
@@ -72,7 +73,7 @@ class Handlers {
   SubjectFinder subjects_;
 };
 
-/// Whether a repeat of the request must not be carried out again: it changes something.
+/// Whether the request changes something. A repeat of such a request must not be carried out again.
 [[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);
 [[nodiscard]] bool happens_once(const wire::CorrectTargetRequest& request);
 [[nodiscard]] bool happens_once(const wire::SubmitMeasurementsRequest& request);

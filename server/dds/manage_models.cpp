@@ -77,7 +77,7 @@ Result<ReleasedTraining> released_training(const std::string& text) {
   }
 }
 
-/// A reply that says a version, or why there is none.
+/// A reply with the version, or the error.
 Result<wire::ManageModelsReply> with_version(const Result<int>& version) {
   if (!version) return tl::make_unexpected(version.error());
   wire::ManageModelsReply reply;
@@ -118,7 +118,7 @@ Result<wire::ManageModelsReply> Handlers::answer_of_cell(const std::string& cell
     case wire::MANAGE_JOBS:
       return jobs_of(cell);
     case wire::MANAGE_JOB:
-      break;  // answered before: a job is of no cell
+      break;  // answered above: a job number needs no cell
   }
   TRAMMEL_CHECK(false);
 }

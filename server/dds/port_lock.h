@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// Keeps a UDP port of this host for one server: DDS itself would silently give a second one another port, where no
-/// client looks. Ends with the process, however that ends; leaves no file.
+/// Reserves a UDP port of this host for one server. DDS itself would silently give a second server another port, where
+/// no client looks. The reservation ends with the process, even after a crash, and leaves no file.
 class PortLock {
  public:
   /// Refuses (kConflict) a port that another server, or any program, uses on `address`; (kUsage) an address that this

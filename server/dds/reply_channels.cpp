@@ -9,9 +9,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A client's reader is matched within a few announcements, or never.
+/// How long to wait for a client's reader: DDS matches it within a few announcements, or never.
 constexpr auto kPatience = 5 * wire::kAnnouncement;
-constexpr std::size_t kSweptAtOnce = 16;  // clients; each is up to six endpoints to delete
+constexpr std::size_t kSweptAtOnce = 16;  // clients per sweep; each has up to six endpoints to delete
 
 }  // namespace
 

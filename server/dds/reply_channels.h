@@ -24,7 +24,7 @@ class ReplyWriter final : private wire::dds::DataWriterListener {
 
   /// Waits a bounded time until the client's reader is matched: a reply written before would be lost.
   [[nodiscard]] bool send(void* reply, const std::stop_token& stop);
-  /// No reader, and not waiting for the first one any more.
+  /// There is no reader, and the time to wait for the first one is over.
   [[nodiscard]] bool abandoned() const;
 
  private:
@@ -38,25 +38,26 @@ class ReplyWriter final : private wire::dds::DataWriterListener {
   Condition matched_;
   int readers_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::chrono::steady_clock::time_point patient_until_
-      TRAMMEL_GUARDED_BY(mutex_);  // when there is no reader, wait until then
+      TRAMMEL_GUARDED_BY(mutex_);  // without a reader: how long to wait for one
 };
 
-/// The way back to each client: a publisher in its partition and a writer for each operation it uses. Made on demand,
-/// in worker threads only; dropped when the client has left, or when more clients than `capacity` are there.
-/// Thread-safe.
+/// The reply channels, one per client: a publisher in the partition of the client, and a writer for each operation that
+/// it uses. Worker threads make them on demand. A channel is dropped when its client has left, or when there are more
+/// than `capacity` clients. Thread-safe.
 class ReplyChannels {
  public:
   ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity)
       : participant_(participant), capacity_(capacity) {}
 
-  /// A topic that replies go to; before anything else.
+  /// Adds a topic of replies. Call it before any other function.
   void add_topic(wire::dds::Topic* topic);
-  /// A client listens on the topic. Does nothing for an unknown topic, or when there are `capacity` clients already.
+  /// Prepares the channel of a client that listens on `topic`. Does nothing for an unknown topic, or when there are
+  /// `capacity` clients already.
   void expect(const std::string& partition, const std::string& topic);
   /// `reply` is a sample of the topic's type. False when the client did not listen.
   [[nodiscard]] bool send(const std::string& partition, wire::dds::Topic* topic, void* reply,
                           const std::stop_token& stop);
-  /// Forgets some of the clients that have left; whether there may be more of them.
+  /// Drops some of the clients that have left. True if there may be more of them.
   bool sweep();
   [[nodiscard]] std::size_t clients() const;
 

@@ -12,8 +12,7 @@
 
 namespace trammel {
 
-/// The last answers by request id, so that a repeat of a request is answered without being carried out again.
-/// Thread-safe.
+/// The last replies by request id. A repeat of a request gets the same reply and is not carried out again. Thread-safe.
 template <typename Reply>
 class ReplyMemory {
  public:
@@ -43,7 +42,7 @@ class ReplyMemory {
   std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// The requests that are being answered, so that a repeat is not answered beside them. Thread-safe.
+/// The requests that are being answered now. A repeat that arrives meanwhile is recognised here. Thread-safe.
 class UnderWay {
  public:
   /// One request while it is being answered.

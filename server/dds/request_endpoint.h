@@ -27,7 +27,7 @@
 
 namespace trammel {
 
-/// What all operations of a service share. Outlives them.
+/// What all operations of a service share. Must outlive them.
 struct ServiceCore {
   std::string server_id;
   wire::dds::DomainParticipant& participant;
@@ -35,23 +35,24 @@ struct ServiceCore {
   Handlers& handlers;
   ReplyChannels& channels;
   std::atomic<std::uint64_t> requests{0};  ///< answered
-  std::atomic<std::uint64_t> refused{0};   ///< of them, not with RESULT_OK
-  std::atomic<std::uint64_t> unheard{0};   ///< of them, whose client had left
-  WorkUnderWay taking{};                   ///< of requests from their readers
+  std::atomic<std::uint64_t> refused{0};   ///< answered with another code than RESULT_OK
+  std::atomic<std::uint64_t> unheard{0};   ///< answered after the client had left
+  WorkUnderWay taking{};                   ///< takes of requests from DDS readers
   WorkUnderWay replying{};
 };
 
 class RequestEndpointBase {
  public:
   virtual ~RequestEndpointBase() = default;
-  /// Of its operation.
+  /// Name of the operation.
   [[nodiscard]] virtual const char* name() const = 0;
-  /// While requests have come that nobody looked for though somebody is free to: how many came before. Takes no lock.
+  /// For the watchdog: a number while requests are waiting and an idle worker has not looked for them; else empty. The
+  /// number is how many requests had come when a worker last looked. Takes no lock.
   [[nodiscard]] virtual std::optional<std::uint64_t> unseen() const = 0;
 };
 
-/// The reply to a request: the handler's, with its header; a remembered one for a repeat; an error for a wrong
-/// contract.
+/// The reply to a request, with its header: from the handler, or from `memory` for a repeat. Another contract version
+/// gets an error.
 template <typename Request, typename Reply>
 [[nodiscard]] Reply reply_to(const Request& request, Handlers& handlers, ReplyMemory<Reply>& memory,
                              const std::string& server_id) {
@@ -90,8 +91,8 @@ template <typename Request, typename Reply>
   return reply;
 }
 
-/// One operation: its reader, and the worker threads that take requests, answer and reply. The listener only wakes
-/// them.
+/// One operation: its DDS reader, and the worker threads that take requests, answer them and send the replies. The DDS
+/// listener only wakes the workers.
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:
@@ -132,8 +133,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   static constexpr std::size_t kRepliesRemembered = 1024;
-  static constexpr std::size_t kLately = 32;  // replies of targets may be large
-  /// Whether an answer takes long: a repeat is answered from memory.
+  static constexpr std::size_t kLately = 32;  // kept replies; those with many targets are large
+  /// Whether an answer takes long to compute. Then a repeat gets the kept reply.
   static constexpr bool kComputes =
       std::is_same_v<Operation, wire::PredictError> || std::is_same_v<Operation, wire::CorrectTarget>;
 
@@ -174,7 +175,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   void serve(const Request& request, const eprosima::fastrtps::rtps::GUID_t& writer, const std::stop_token& stop) {
     const std::string wanted = request.header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
-    // By who wrote it, not by who the request says it is of: a client may be careless with its ids.
+    // Keyed by the DDS writer of the sample, not by the id in the request: clients may reuse their ids.
     const std::string sent = wire::participant_of(writer) +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request.header().request_id());
@@ -195,13 +196,13 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   ServiceCore& core_;
   wire::dds::Topic* reply_topic_ = nullptr;
   wire::dds::DataReader* reader_ = nullptr;
-  ReplyMemory<Reply> memory_;  // of what must not be carried out again
-  ReplyMemory<Reply> lately_;  // of what was computed
+  ReplyMemory<Reply> memory_;  // replies of operations that change something
+  ReplyMemory<Reply> lately_;  // replies of long computations
   UnderWay under_way_;
-  Mutex mutex_;  // so that no arrival falls between the look at arrivals_ and the waiting
+  Mutex mutex_;  // no arrival may fall between the check of arrivals_ and the wait
   Condition arrived_;
   std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_
-  std::atomic<std::uint64_t> looked_{0};    // arrivals when a worker last began to take
+  std::atomic<std::uint64_t> looked_{0};    // value of arrivals_ when a worker last began to take
   std::atomic<int> idle_{0};                // workers that wait for arrivals
   std::vector<std::jthread> workers_;
 };

@@ -5,7 +5,7 @@
 namespace trammel {
 namespace {
 
-/// More at once are greeted with their first request.
+/// Limit of readers noted between two calls of wait(). Clients beyond it get their channel with their first request.
 constexpr std::size_t kMaxReaders = 4096;
 
 }  // namespace

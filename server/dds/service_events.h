@@ -22,7 +22,8 @@ struct ReplyReader {
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
   void status_changed();
-  /// Until the status has changed or readers have been found, at most `limit`; the readers found since the last call.
+  /// Waits until the status has changed or readers have been found, at most `limit`. Returns the readers found since
+  /// the last call.
   [[nodiscard]] std::vector<ReplyReader> wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
  private:

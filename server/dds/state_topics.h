@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// The writers of what a server says without being asked. Thread-safe.
+/// The writers of the state topics. Thread-safe.
 class StateTopics {
  public:
   [[nodiscard]] static Result<StateTopics> open(wire::dds::DomainParticipant& participant);
@@ -16,7 +16,7 @@ class StateTopics {
 
   void publish(wire::ServiceStatus status);
   void publish(wire::TrainingProgress progress);
-  /// ModelStatus and ModelSnapshot; a model too large for a sample has only the former.
+  /// Writes ModelStatus and ModelSnapshot. A model that is too large for a sample has no ModelSnapshot.
   void publish(const ServedModel& model, const std::string& server_id);
 
  private:

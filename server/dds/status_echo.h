@@ -10,12 +10,13 @@
 
 namespace trammel {
 
-/// Hears what a server publishes of itself: each status went out through its writer, over the network, lost there and
-/// sent again, and in through the thread that receives requests too.
+/// Receives the status that the server itself publishes: a test of the whole path. Each status leaves through its
+/// writer, crosses the network, is dropped once on purpose (at most twice a second) and sent again, and arrives in the
+/// thread that also receives requests.
 class StatusEcho final : private wire::dds::DataReaderListener {
  public:
-  /// `writer` is the server's own, of ServiceStatus, in `participant`; `heard` of that participant loses what it writes
-  /// once.
+  /// `writer` is the server's writer of ServiceStatus in `participant`. `heard` belongs to that participant; it is told
+  /// to drop the first copy of each sample of `writer`.
   [[nodiscard]] static Result<std::unique_ptr<StatusEcho>> open(wire::dds::DomainParticipant& participant,
                                                                 wire::dds::Subscriber& subscriber,
                                                                 const wire::dds::DataWriter& writer,
@@ -24,7 +25,7 @@ class StatusEcho final : private wire::dds::DataReaderListener {
   StatusEcho(const StatusEcho&) = delete;
   StatusEcho& operator=(const StatusEcho&) = delete;
 
-  /// Own ones.
+  /// How many of the server's own samples have arrived.
   [[nodiscard]] std::uint64_t heard() const { return heard_; }
 
  private:
@@ -32,7 +33,7 @@ class StatusEcho final : private wire::dds::DataReaderListener {
   void on_data_available(wire::dds::DataReader* reader) override;
 
   wire::dds::Subscriber& subscriber_;
-  const std::string self_;  // of all its endpoints, see participant_of()
+  const std::string self_;  // id of the participant, see participant_of()
   wire::dds::DataReader* reader_ = nullptr;
   std::atomic<std::uint64_t> heard_{0};
 };

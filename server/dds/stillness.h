@@ -14,20 +14,20 @@ namespace trammel {
 /// A part of the service that must keep moving.
 struct MovingPart {
   const char* name;
-  /// Another number whenever the part has done something more; empty while it has nothing to do. Never waits.
+  /// A number that changes with every piece of work done; empty while there is no work. Never waits.
   std::function<std::optional<std::uint64_t>()> mark;
 };
 
-/// Tells which parts have stopped. Time is what the watcher itself lived through: a look that comes late, because the
-/// process was stopped or the machine was busy, counts as one that came in time. Not thread-safe.
+/// Tells which parts have stopped. A look may come late because the process was stopped or the machine was busy. A late
+/// look counts as one tick only, so that such pauses do not look like a hang. Not thread-safe.
 class Stillness {
  public:
   using Duration = std::chrono::milliseconds;
 
-  /// Looks come every `tick`; a part that has not moved for `limit` has stopped.
+  /// look() is called every `tick`. A part that has not moved for `limit` has stopped.
   Stillness(std::vector<MovingPart> parts, Duration tick, Duration limit);
 
-  /// `since_last`: since the look before, by a clock that never jumps. Names of the parts that have stopped.
+  /// Returns the names of the parts that have stopped. `since_last` is the time since the last look, by a steady clock.
   [[nodiscard]] std::vector<const char*> look(Duration since_last);
 
  private:
@@ -40,7 +40,7 @@ class Stillness {
   Duration tick_, limit_;
 };
 
-/// Which pieces of work are under way, each of which ends soon or never. Thread-safe, without a lock.
+/// The pieces of work that are under way. Each is short: one that stays long hangs. Thread-safe, without a lock.
 class WorkUnderWay {
  public:
   /// One piece, from its making to its end.
@@ -59,7 +59,7 @@ class WorkUnderWay {
 
   /// Not watched when there are more than kPlaces at once.
   [[nodiscard]] Piece begin();
-  /// The number of the one that has been under way longest; empty when there is none.
+  /// The number of the piece that has been under way longest; empty when there is none.
   [[nodiscard]] std::optional<std::uint64_t> oldest() const;
 
  private:

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kVersionsInMemory = 4;
 
-/// The number of `@3`.
+/// The version in `@3`.
 std::optional<int> version_number(const std::string& model) {
   if (model.size() < 2 || model.front() != '@') return std::nullopt;
   int version = 0;

@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Formatted without memory from the heap.
+/// Formats without the heap: its lock may be held by the thread that hangs.
 [[noreturn]] void end_hung(const std::vector<const char*>& stopped) {
   std::array<char, 256> names{};
   for (const char* name : stopped) {
@@ -46,7 +46,7 @@ Watchdog::Watchdog(std::vector<MovingPart> parts)
 
 void Watchdog::watch(const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "watchdog");
-  Mutex mutex;  // nobody else's: it waits for time to pass
+  Mutex mutex;  // local: used only to wait for the next look
   Condition never;
   MutexLock lock(mutex);
   Clock::time_point last = Clock::now();

@@ -9,15 +9,15 @@
 
 namespace trammel {
 
-/// Exit code of a process that ends because it hangs: another start may go well.
+/// Exit code of a process that ends because it hangs. A restart may help.
 inline constexpr int kExitHung = 70;
 
-/// Writes `line` to standard error if that can be done without waiting, and ends the process at once: no destructor
-/// runs and no lock is taken, because what hangs may hold any of them.
+/// Writes `line` to standard error if that needs no waiting, and ends the process at once. Runs no destructor and takes
+/// no lock: the thread that hangs may hold any lock.
 [[noreturn]] void end_at_once(const char* line);
 
-/// Ends the process when one of `parts` stops moving: a daemon that hangs is mute for ever, one that ends is started
-/// again. Looks from a thread of its own until it is destroyed.
+/// Ends the process when one of `parts` stops moving. A daemon that has ended is started again by its supervisor; one
+/// that hangs is not. Checks from its own thread until it is destroyed.
 class Watchdog {
  public:
   static constexpr std::chrono::milliseconds kTick{250};

@@ -7,8 +7,8 @@ namespace trammel {
 
 namespace {
 
-/// Play in a gear: the joint hangs back from where its motor is, by half the play and by more the harder the load
-/// presses: delta q = -dir (b + k |tau|), dir the sense of the approach. Approached from one side only it is a joint
+/// Play in a gear: the joint lags behind its motor by half the play, and more under load: delta q = -dir (b + k |tau|),
+/// where dir is the direction of approach. If all poses are approached from one side, it cannot be told from a joint
 /// zero.
 class Backlash final : public ErrorSource {
  public:
@@ -30,7 +30,7 @@ class Backlash final : public ErrorSource {
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
     if (context.direction.empty()) return;
-    // Moving up, the joint hangs back, and so below what its motor says.
+    // Approached upwards, the joint lags and stands below the angle of its motor.
     const double direction = -context.direction[static_cast<std::size_t>(joint_)];
     const ArmKinematics kinematics(state);
     const double torque = kinematics.gravity_torque()(joint_);

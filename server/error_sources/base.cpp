@@ -5,8 +5,8 @@ namespace trammel {
 
 namespace {
 
-/// The base stands elsewhere than believed: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0) Rx(alpha0), eq. (3.5).
-/// Calibration centres the prior on the localised base: where a robot stands is measured, not believed.
+/// The base is not at its nominal pose: X_WB = X_WB_nominal Tx Ty Tz Rz(gamma0) Ry(beta0) Rx(alpha0), eq. (3.5).
+/// Calibration centres the prior on the localised base, because the base is measured and not known from drawings.
 class Base final : public ErrorSource {
  public:
   const CauseRecord& cause() const override { return causes::base(); }

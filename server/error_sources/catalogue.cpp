@@ -19,7 +19,7 @@ Records shipped() {
 #undef TRAMMEL_LIST_CAUSE
 }
 
-/// Whoever reads takes the list as it stands; whoever adds puts another in its place.
+/// Readers take the present list; adding a cause replaces it by a new list.
 class Catalogue {
  public:
   std::shared_ptr<const Records> records() const {
@@ -39,7 +39,7 @@ class Catalogue {
   std::shared_ptr<const Records> records_ TRAMMEL_GUARDED_BY(mutex_) = std::make_shared<Records>(shipped());
 };
 
-/// Made at its first use, whichever comes first of the program's own.
+/// Made at its first use: static initialisers of a program may come first.
 Catalogue& catalogue() {
   static Catalogue all;
   return all;
@@ -80,7 +80,7 @@ const CauseRecord& first_searched_by(causes::SearchFamily family) {
 
 namespace {
 
-/// Notes what is missing of one record.
+/// Collects what is missing in one record.
 class Missing {
  public:
   explicit Missing(const CauseRecord& record) : record_(record) {}

@@ -6,28 +6,27 @@
 
 #include "server/error_sources/cause.h"
 
-/// The causes that are known: those that ship (shipped_causes.h) and whatever a program adds. Thread-safe.
+/// The known causes: the shipped ones (shipped_causes.h) and those that a program adds. Thread-safe.
 namespace trammel {
 
 /// All of them, in the order in which diagnosis looks for them.
 [[nodiscard]] std::vector<const CauseRecord*> all_causes();
 
-/// The cause of a spelling: of the cause, of one of its forms, or of a source in a list (`joint_slip:2@40`). Null where
-/// none is known by it.
+/// The cause that `spelling` names. It may be the spelling of the cause, of one of its forms, or of a source in a list
+/// (`joint_slip:2@40`). Null if it is unknown.
 [[nodiscard]] const CauseRecord* find_cause(std::string_view spelling);
 
-/// The same where it must be known: anything else is a bug.
+/// The same for a spelling that must be known: an unknown one is a bug.
 [[nodiscard]] const CauseRecord& cause_spelled(std::string_view spelling);
 
-/// The first that is looked for like this. A bug where there is none.
+/// The first cause of that search family. It is a bug if there is none.
 [[nodiscard]] const CauseRecord& first_searched_by(causes::SearchFamily family);
 
-/// What a record does not say and ought to, in words for its author; empty where it is complete. Its rivals are held
-/// against the causes that are known.
+/// What is missing in a record, in words for its author; empty if it is complete. Its rivals must be known causes.
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);
 
-/// A cause that is known besides those that ship, after them, for as long as this lives. `record` must outlive
-/// everything that is made meanwhile; no other cause may be spelled like it or like one of its forms.
+/// Registers a cause after the shipped ones, until this object is destroyed. `record` must outlive everything that is
+/// made in that time. No other cause may have its spelling or that of one of its forms.
 class AddedCause {
  public:
   explicit AddedCause(const CauseRecord& record);

@@ -8,8 +8,9 @@
 
 #include "server/base/result.h"
 
-/// What a physical cause of error is, apart from what it does to the arm: everything that calibration, diagnosis,
-/// planning, training and the pages want to know of it. The record stands beside the physics, in the cause's own file.
+/// The description of a physical cause of error: everything that calibration, diagnosis, planning, training and the
+/// pages need to know of it, except its effect on the arm. Each record stands beside its physics, in the file of the
+/// cause.
 namespace trammel {
 
 class ErrorSource;
@@ -19,12 +20,12 @@ struct Cell;
 struct ContextNeeds {
   bool time = false;
   bool temperature = false;
-  bool direction = false;  ///< of the source's joint, from both sides
+  bool direction = false;  ///< of the source's joint, approached from both sides
   bool velocity = false;
   bool payload = false;  ///< something must hang on the flange
 };
 
-/// `gear_transmission:3@48.5+97`: a cause, the joint it concerns, and what else says which one is meant.
+/// `gear_transmission:3@48.5+97`: a cause, its joint, and further numbers.
 struct SourceSpec {
   std::string text;        ///< as spelled
   std::string name;        ///< the cause, or its form
@@ -33,19 +34,19 @@ struct SourceSpec {
 };
 using SourceMaker = Result<std::shared_ptr<const ErrorSource>> (*)(const SourceSpec& spec, const Cell& cell);
 
-/// What a record is made of.
+/// The members of a record.
 namespace causes {
 
-/// Whose cause it is.
+/// What the cause belongs to.
 enum class Scope {
   kArm,      ///< of the whole arm
   kJoint,    ///< of one joint, or of the link that follows it: its spelling ends in `:joint`
-  kCell,     ///< of what the cell file says besides: where the robot stands and what it carries
+  kCell,     ///< of the rest of the cell file: base, tools and payloads
   kPose,     ///< of single poses
-  kSession,  ///< of measuring: where the instrument stands, and its clock
+  kSession,  ///< of the measurement: position and clock of the instrument
 };
 
-/// How long it goes on.
+/// How long the cause lasts.
 enum class Lasting {
   kAlways,        ///< belongs into the cell file
   kFromAPose,     ///< begins at a pose of a batch: its spelling ends in `@row`
@@ -55,11 +56,11 @@ enum class Lasting {
 /// Which part of the nominal cell its parameters correct.
 enum class Part { kNone, kBase, kLinks, kTool, kPayload };
 
-/// How diagnosis looks for it.
+/// How diagnosis searches for the cause.
 enum class SearchFamily {
   kNone,      ///< not at all
   kColumns,   ///< its parameters, all at once
-  kPlay,      ///< the same, with a sign that it cannot have
+  kPlay,      ///< the same, and its parameter has only one possible sign
   kStep,      ///< its parameters from a pose on, at every pose
   kZeroStep,  ///< the same of a joint's own zero
   kOrder,     ///< a sine and a cosine of a joint's angle, at every order
@@ -67,35 +68,35 @@ enum class SearchFamily {
   kPose,      ///< every pose by itself
 };
 
-/// Whether single numbers of a cause may be lacking, the others being right.
+/// Whether a cause may be wrong in single parameters only.
 enum class Numbers {
-  kTogether,   ///< they stand and fall together
-  kSingly,     ///< one by one; whichever it is, it is this cause
+  kTogether,   ///< all parameters together
+  kSingly,     ///< one by one, and each is this same cause
   kApart,      ///< one by one, and two of them are two causes
   kOneAJoint,  ///< the same, and each is a joint's
 };
 
-/// What people are told of its parameters before the parameters themselves.
+/// The summary that reports print before the parameters.
 enum class Summary { kNone, kOrderAndAmplitude, kAmplitude, kPeakToPeak };
 
-/// How another cause is like this one.
+/// How another cause resembles this one.
 enum class Likeness {
-  kFromTheFirstPose,  ///< it is what this one would be if it had begun before the first pose
-  kSpecialCase,       ///< this one describes it as well, more generally
-  kSimplerCase,       ///< the same; and it is preferred where it explains nearly as much
-  kDoubtfulCase,      ///< the same; but where neither is clearly better neither is sure
-  kWhereConstant,     ///< it takes this one over where what this one depends on never changes
-  kImitator,          ///< another thing altogether, that looks like this one at some poses
+  kFromTheFirstPose,  ///< the other is this one, begun before the first pose
+  kSpecialCase,       ///< the other is a special case of this one
+  kSimplerCase,       ///< a special case; preferred if it explains nearly as much
+  kDoubtfulCase,      ///< a special case; if neither is clearly better, neither is certain
+  kWhereConstant,     ///< the other has the same effect if the quantity that this one depends on never changes
+  kImitator,          ///< an unrelated cause that looks like this one at some poses
 };
 struct Rival {
   std::string_view cause;
   Likeness likeness = Likeness::kImitator;
-  std::string_view parameter =
-      {};               ///< the one of its numbers that is meant, `{}` for the joint; empty: the whole cause
-  double surprise = 0;  ///< nat: how much less this cause is to be expected while the model has no source of that one
+  std::string_view parameter = {};  ///< one of its parameters, `{}` for the joint; empty: the whole cause
+  double surprise = 0;              ///< nat: penalty on this cause while the model has no source of the rival
 };
 
-/// What tells a cause from whatever looks like it. Of two causes the remedy with the lower rank speaks.
+/// What to measure so that a cause can be told from its rivals. Of the remedies of two causes, the one with the lower
+/// rank is named.
 struct Remedy {
   int rank = 0;
   std::string_view text;
@@ -112,33 +113,34 @@ inline constexpr Remedy kFixedBase{70, "reference reflectors that fix where the 
 inline constexpr Remedy kWiderRange{80, "a wider range of joints, or another tool"};
 }  // namespace remedies
 
-/// A number that is reported of a cause, in the order of reporting.
+/// A number that is reported with a cause.
 struct Figure {
   std::string_view name;  ///< how its name begins
   std::string_view unit;  ///< as people read it; may be empty
   std::string_view meaning;
 };
 
-/// What a new batch shows when a step happened before its first pose.
+/// What is reported if a step happened before the first pose of a new batch.
 struct WholeBatch {
   std::string_view sentence;  ///< for people; `{}` for the joint
-  bool harmful = false;       ///< a model must not learn from it: what it would learn is of something else
+  bool harmful = false;  ///< a model must not learn from such a batch: it would learn an error that is not the robot's
 };
 
-/// A size of effect that people are shown as an example.
+/// Marks a cause whose effect is shown as an example.
 struct Example {
   int rank = 0;    ///< the lower, the sooner
   int joint = -1;  ///< 0-based; -1: any
 };
 
-/// When it acts on the arm: in the order given here, then by `turn`, then in the order of registration.
+/// The order in which causes act on the arm: in the order given here, then by `turn`, then in the order of
+/// registration.
 enum class ActsOn { kNothing, kBase, kLinks, kTool, kJoints, kLoad, kLoadedArm };
 struct Acting {
   ActsOn on = ActsOn::kNothing;
   int turn = 0;
 };
 
-/// A way of computing a cause. Most have one, of the cause's own spelling.
+/// A way to compute a cause. Most causes have one form, with the spelling of the cause.
 struct Form {
   std::string_view spelling;
   SourceMaker make;
@@ -150,7 +152,7 @@ struct CauseRecord {
   std::string_view spelling;    ///< in files and programs: `gear_transmission`
   std::string_view plain_name;  ///< for people: `gear ripple`
   std::string_view
-      plain_name_of_joint;  ///< the same of one joint: `gear ripple in joint {}`; empty where it is of none
+      plain_name_of_joint;  ///< the same for one joint: `gear ripple in joint {}`; empty if it has no joint
   causes::Scope scope;
   causes::Lasting lasting;
   ContextNeeds needs;
@@ -159,26 +161,26 @@ struct CauseRecord {
   std::vector<causes::Form> forms;  ///< the usual one first; none: no error source describes it
   std::vector<causes::Rival> rivals;
   causes::Remedy told_apart_by;
-  std::string_view shown_by;            ///< what a batch that cannot show it would need
+  std::string_view shown_by;            ///< what must be recorded to show it
   std::string_view action;              ///< for the shop floor
   std::vector<causes::Figure> figures;  ///< of its findings: those of the summary, then its parameters
 
-  // What only some causes have.
+  // Members that only some causes set.
   causes::Part part = causes::Part::kNone;
   causes::Numbers numbers = causes::Numbers::kTogether;
   causes::Summary summary = causes::Summary::kNone;
   bool takes_numbers = false;        ///< its spelling may end in `@number+number`
   bool of_turning_joint = false;     ///< of revolute joints only
-  bool gives_way = false;            ///< bends under a load: a payload shows through it
-  bool goes_with_time = false;       ///< looks like whatever else goes on with time
-  std::optional<double> order = {};  ///< cycles a joint turn, where it always has the same
+  bool gives_way = false;            ///< deforms under load: an error of the payload shows through it
+  bool goes_with_time = false;       ///< looks like other effects that grow with time
+  std::optional<double> order = {};  ///< cycles per joint turn, if always the same
   std::optional<causes::WholeBatch> whole_batch = {};
   std::optional<causes::Example> example = {};
-  /// Whether the forms differ in a cell; else the usual one is the only one.
+  /// Whether the forms give different results in a cell. If not, only the usual one is used.
   bool (*forms_differ)(const Cell& cell) = nullptr;
 };
 
-/// What a step would be if it had begun before the first pose; null for what does not begin at a pose.
+/// The rival that a step equals if it began before the first pose; null if the cause does not begin at a pose.
 [[nodiscard]] const causes::Rival* whole_of(const CauseRecord& record);
 
 /// The parameter that a rival of a cause of `joint` (0-based) means: `q3`.

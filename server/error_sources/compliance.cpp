@@ -11,9 +11,9 @@ namespace {
 constexpr int kMaxEquilibriumSteps = 50;
 constexpr double kEquilibriumStep = 1e-13;  // rad
 
-/// Every gearbox gives way in proportion to the torque that the payload's weight puts on it. The weight acts at the
-/// payload's centre of gravity (the physical wrench). Three readings of eq. (3.6), dx = J C Jᵀ F, which differ by the
-/// square of the deflection: 50 um where a joint gives way by 6 mrad.
+/// Every gearbox deflects in proportion to the gravity torque on it. A weight acts at its centre of gravity (the
+/// physical wrench). There are three forms of eq. (3.6), dx = J C Jᵀ F. They differ by the square of the deflection: 50
+/// um at a deflection of 6 mrad.
 class Compliance : public ErrorSource {
  public:
   explicit Compliance(const Chain& chain) {
@@ -105,7 +105,7 @@ class ComplianceEquilibrium final : public Compliance {
   }
 };
 
-/// dx = J C Jᵀ F to the letter: added to the tool's pose, joints and links where they were.
+/// dx = J C Jᵀ F literally: added to the pose of the tool; joints and links do not move.
 class ComplianceLinear final : public Compliance {
  public:
   using Compliance::Compliance;

@@ -16,11 +16,11 @@ namespace trammel {
 
 /// One number that calibration may identify. Values are in SI; `unit` and `scale` say how people read it.
 struct Parameter {
-  std::string name;        ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
-  std::string unit;        ///< for people: `mm`, `rad`, `rad/Nmm`
-  double scale = 1;        ///< value for people = scale * SI value
-  double prior = 0;        ///< what it is believed to be before any data, SI
-  double prior_scale = 1;  ///< how far from there it may reasonably be (one standard deviation), SI
+  std::string name;                                         ///< as in the source: `d4`, `alpha2`, `C3`, `x0`
+  std::string unit;                                         ///< for people: `mm`, `rad`, `rad/Nmm`
+  double scale = 1;                                         ///< value for people = scale * SI value
+  double prior = 0;                                         ///< mean of the prior, SI
+  double prior_scale = 1;                                   ///< standard deviation of the prior, SI
   double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
   bool is_place = false;  ///< says where an effect is (the order of an oscillation), not how large
 };
@@ -29,7 +29,7 @@ struct Parameter {
 class ErrorSource {
  public:
   virtual ~ErrorSource() = default;
-  /// What it is, apart from what it does to the arm.
+  /// The record of its cause.
   [[nodiscard]] virtual const CauseRecord& cause() const = 0;
   /// As spelled in a cell file: the cause, then `:joint` where it concerns one.
   [[nodiscard]] virtual std::string name() const = 0;
@@ -37,13 +37,13 @@ class ErrorSource {
   [[nodiscard]] const ContextNeeds& needs() const { return cause().needs; }
   /// 0-based joint it concerns; -1 where it concerns the whole arm.
   [[nodiscard]] virtual int joint() const { return -1; }
-  /// A source that needs a search over its first parameter before anything can be refined (the order of a gear's error)
-  /// says so: range and step of the search.
+  /// Range and step of a search over its first parameter, for a source that needs one before refinement (the order of a
+  /// gear's ripple).
   struct Search {
     double from = 0, to = 0, step = 0;
   };
   [[nodiscard]] virtual std::optional<Search> search() const { return std::nullopt; }
-  /// What a report says of it in one sentence.
+  /// One sentence about it for reports.
   [[nodiscard]] virtual std::string explanation() const = 0;
   /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given,
   /// its columns first_column... receive the exact derivative, and sources that depend on the state pass the

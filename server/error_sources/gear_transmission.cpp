@@ -18,7 +18,7 @@ class GearTransmission final : public ErrorSource {
   GearTransmission(const SourceSpec& spec, double range) : name_(spec.text), joint_(spec.joint), range_(range) {
     searched_ = spec.at.empty();
     const std::vector<double> orders = searched_ ? std::vector<double>{kLowestOrder} : spec.at;
-    // What a sine over this range can tell two orders apart by is 2 pi / range; the prior stays well within.
+    // Over this range of angles, orders can be resolved to 2 pi / range. The prior stays well within that.
     const double spread = 0.25 * 2 * kPi / range_;
     for (std::size_t k = 0; k < orders.size(); ++k) {
       const std::string which = fmt::format("{}{}", joint_ + 1, orders.size() > 1 ? fmt::format("_{}", k + 1) : "");

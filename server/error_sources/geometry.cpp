@@ -5,8 +5,8 @@ namespace trammel {
 
 namespace {
 
-/// The links are not quite what the drawing says: q, d (or beta in a Hayati row), a and alpha of every link, eqs. (3.3)
-/// and (3.4), 24 parameters for a six-axis arm with one pair of parallel axes.
+/// The link parameters differ from the nominal ones: q, d (or beta in a Hayati row), a and alpha of every link, eqs.
+/// (3.3) and (3.4), 24 parameters for a six-axis arm with one pair of parallel axes.
 class Geometry final : public ErrorSource {
  public:
   explicit Geometry(const Chain& chain) {

@@ -22,8 +22,8 @@ void load(const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state, Stat
   for (int k = 0; k < 3; ++k) jacobian->add(jacobian->rows.cog(k), first_column + 1 + k, 1);
 }
 
-/// A payload weighs, or carries its weight, other than the cell file says; four parameters for each payload of the
-/// cell. It shows through compliance and bending only; with one payload its mass scales every compliance alike.
+/// The mass or the centre of gravity of a payload differs from the cell file. Four parameters for each payload of the
+/// cell. It shows only through compliance and bending. With a single payload, its mass scales all compliances alike.
 class PayloadError final : public ErrorSource {
  public:
   explicit PayloadError(const Cell& cell) {

@@ -10,7 +10,7 @@
 
 namespace trammel {
 
-/// Nominal chain + error sources with a value for each parameter: where the tool really is, by physics alone.
+/// The nominal chain and error sources with a value for each parameter: predicts the real tool pose by physics alone.
 /// An immutable value once built; thread-safe.
 struct PhysicalModel {
   std::shared_ptr<const Cell> cell;

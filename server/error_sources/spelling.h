@@ -9,8 +9,8 @@
 /// Error sources as cell files, levels and models spell them.
 namespace trammel {
 
-/// The forms of a cause between which the data decide, the first being the usual one: `compliance` has three where
-/// `cell` carries anything. All other specs stand for themselves.
+/// The forms of a cause among which the data decide, the usual one first: `compliance` has three where `cell` carries
+/// anything. All other specs stand for themselves.
 [[nodiscard]] std::vector<std::string> alternatives(const std::string& spec, const Cell& cell);
 
 /// The source that `spec` names for this cell, in its usual form: a cause, `:joint` (1-based) where it concerns one,
@@ -18,7 +18,7 @@ namespace trammel {
 /// unknown name, joint or number.
 [[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
 
-/// The order in which causes act on the arm: frames and links first, what hangs on the loaded posture last.
+/// The order in which causes act on the arm: frames and links first, causes that depend on the loaded posture last.
 [[nodiscard]] bool acts_before(const ErrorSource& one, const ErrorSource& other);
 
 /// Spellings of everything that an error source describes, a cause with several forms by each of them, in the order in
@@ -42,8 +42,8 @@ namespace trammel {
 /// Whether one of these sources corrects that part of the nominal cell.
 [[nodiscard]] bool corrects(const std::vector<std::string>& sources, causes::Part part);
 
-/// For people: `gear ripple in joint 3` for `gear_transmission:3@48`, `link geometry (d6)` for `geometry:d6`,
-/// `the tracker moved from row 40 on`. What no known cause is spelled like comes back as it is.
+/// For people: `gear ripple in joint 3` for `gear_transmission:3@48`, `link geometry (d6)` for `geometry:d6`, `the
+/// tracker moved from row 40 on`. An unknown spelling is returned unchanged.
 [[nodiscard]] std::string in_words(const std::string& spelling);
 
 }  // namespace trammel

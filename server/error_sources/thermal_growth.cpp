@@ -32,7 +32,7 @@ class ThermalGrowth final : public ErrorSource {
       LinkGeometry& link = state.links[static_cast<std::size_t>(i)];
       const StateRows rows(state.chain->size());
       grow(link.a, rows.a(i));
-      // A rail's d is where it stands, not how long something is.
+      // The d of a rail is a position, not a length: it does not grow.
       if (state.chain->joint(i).type == JointType::kRevolute) grow(link.d, rows.d(i));
     }
   }

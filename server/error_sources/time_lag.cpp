@@ -5,7 +5,7 @@ namespace trammel {
 
 namespace {
 
-/// The measurement belongs to a moment other than the commanded joints: every joint is where it was `lag` earlier.
+/// Measurement and commanded joints belong to different times: every joint stands where it was commanded `lag` earlier.
 class TimeLag final : public JointError {
  public:
   explicit TimeLag(const SourceSpec& spec) : JointError(spec.text, -1, {{"lag", "s", 1, 0, 0.05}}) {}

@@ -14,9 +14,9 @@ void add_six(std::vector<Parameter>& parameters, const std::string& suffix) {
   for (const char* name : {"trz", "try", "trx"}) parameters.push_back(angle_parameter(name + suffix, 5e-3));
 }
 
-/// A tool sits on the flange elsewhere than believed: X_FT = Tx Ty Tz Rz Ry Rx X_FT_nominal, in F; six parameters for
-/// each tool of the cell. With one tool it is told from the last link only in part: tx = a6, tz = d6, trx = alpha6, trz
-/// = q6.
+/// The pose of a tool on the flange differs from the nominal one: X_FT = Tx Ty Tz Rz Ry Rx X_FT_nominal, in F; six
+/// parameters for each tool of the cell. With one tool it is told from the last link only in part: tx = a6, tz = d6,
+/// trx = alpha6, trz = q6.
 class Tool final : public ErrorSource {
  public:
   explicit Tool(const Cell& cell) {

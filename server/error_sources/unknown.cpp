@@ -1,6 +1,6 @@
 #include "server/error_sources/shipped_causes.h"
 
-/// What is found without being known: it stands where a cause stands, and no error source describes it.
+/// The record of effects that no known cause explains. No error source describes it.
 namespace trammel {
 
 const CauseRecord& causes::drift() {

@@ -8,8 +8,7 @@ namespace {
 
 Parameter ratio_parameter(std::string name) { return {std::move(name), "rad/rad", 1, 0, 1e-3}; }
 
-/// The wrist's shafts run through one another: turning joint 4 drags 5 and 6 along, turning joint 5 drags 6, in
-/// proportion.
+/// The shafts of the wrist are concentric: joint 4 drags joints 5 and 6 along in proportion, and joint 5 drags joint 6.
 class WristCoupling final : public JointError {
  public:
   explicit WristCoupling(const SourceSpec& spec)

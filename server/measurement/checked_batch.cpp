@@ -17,7 +17,7 @@ namespace {
 
 std::string name_of(const MeasurementBatch& batch) { return batch.where.empty() ? "batch " + batch.id : batch.where; }
 
-/// Counts times from the first one that was recorded.
+/// Shifts the times so that the first recorded one is 0.
 void rebase_times(std::vector<Measurement>& measurements) {
   const auto timed = std::find_if(measurements.begin(), measurements.end(),
                                   [](const Measurement& m) { return m.context.time.has_value(); });
@@ -47,7 +47,7 @@ void mark(MeasurementBatch& batch, MeasurementSet set) {
   for (Measurement& m : batch.measurements) m.set = set;
 }
 
-/// Appends `next` in time.
+/// Appends the measurements of `next` after those of `all`.
 void append(MeasurementBatch& all, const MeasurementBatch& next) {
   for (Measurement m : next.measurements) {
     m.pose_id = next.id + "/" + m.pose_id;

@@ -9,7 +9,7 @@
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
 
-/// What a tracker saw and what the robot had been told.
+/// Measured tool poses with the joints that were commanded.
 namespace trammel {
 
 enum class MeasurementSet { kUnassigned, kTrain, kValidation };
@@ -27,18 +27,18 @@ struct Measurement {
 
 /// Measurements taken together. The order is the order in time.
 struct MeasurementBatch {
-  std::string id;     ///< name given by whoever submits it, else the file's name without its ending
+  std::string id;     ///< name given at submission, else the file's name without its extension
   std::string where;  ///< the file as messages name it; empty = not from a file
   std::vector<Measurement> measurements;
   std::vector<JointType> joint_types;      ///< as the column says: `q1_deg` or, of a rail, `q7_mm`; empty = the robot's
   std::vector<std::string> extra_columns;  ///< header names of columns that Trammel does not know, kept
   std::string source_text;                 ///< the CSV as it came
-  std::optional<std::int64_t> measured_at = {};  ///< Unix time, s, of the newest measurement; empty = nobody knows
+  std::optional<std::int64_t> measured_at = {};  ///< Unix time, s, of the newest measurement; empty = unknown
 };
 
-/// The batch with its measured_at: the latest `time_s` where that column is Unix time, else `taken_in`, when the batch
-/// was received or its file was written (Unix time, s). Times from before 2001 count from some start of their own, and
-/// those of more than a day after `taken_in` are no times of day.
+/// The batch with measured_at set: the latest `time_s` if that column is Unix time, else `taken_in`. `taken_in` is when
+/// the batch was received or its file was written (Unix time, s). A time before September 2001, or more than a day
+/// after `taken_in`, is no Unix time.
 [[nodiscard]] MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in);
 
 /// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit: an empty file, a
@@ -49,7 +49,7 @@ struct MeasurementBatch {
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);
 /// The batch as parse_batch_csv() reads it; optional columns only where a row has them.
 [[nodiscard]] std::string to_csv(const MeasurementBatch& batch);
-/// SHA-256 of the batch as it came, or of its CSV where it came from elsewhere.
+/// SHA-256 of the batch as received, or of to_csv() if it has no source text.
 [[nodiscard]] std::string batch_hash(const MeasurementBatch& batch);
 
 }  // namespace trammel

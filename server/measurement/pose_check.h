@@ -9,11 +9,11 @@
 
 namespace trammel {
 
-/// Refuses joint columns that are not those of the robot: their number, and degrees for a rail.
+/// Refuses joint columns that do not match the robot: another number, or degrees for a rail.
 [[nodiscard]] Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
                                          const std::string& where);
 
-/// Holds the joints against the robot's limits and resolves tool and payload. File and row are the caller's to add.
+/// Checks the joint limits and resolves tool and payload. The caller adds file and row to the error.
 [[nodiscard]] Status check_pose(PoseContext& context, const Cell& cell);
 
 }  // namespace trammel

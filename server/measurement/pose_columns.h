@@ -11,7 +11,7 @@
 
 namespace trammel {
 
-/// Where a table says how poses were commanded: `q1_deg` (of a rail `q1_mm`) and on, `dir1` and on, `time_s`,
+/// The columns of a table that describe commanded poses: `q1_deg` (of a rail `q1_mm`) and on, `dir1` and on, `time_s`,
 /// `temperature_c`, `tool_id`, `payload_id`, `pose_id`. Shared by batches, joint lists and targets.
 class PoseColumns {
  public:
@@ -41,7 +41,7 @@ class PoseColumns {
 
 /// `q3_deg`, or `q3_mm` of a prismatic joint; `joint` counts from 0.
 [[nodiscard]] std::string joint_column(int joint, JointType type);
-/// Of all joints of a robot.
+/// The types of all joints of a robot.
 [[nodiscard]] std::vector<JointType> joint_types(const Chain& robot);
 /// A joint value as its column holds it.
 [[nodiscard]] double joint_to_column(double value, JointType type);

@@ -24,7 +24,8 @@ bool are_repeats(const Measurement& a, const Measurement& b) {
   return ((a.context.q - b.context.q).array().abs() <= kSameJoint).all();
 }
 
-/// A number that close joints have close, and other joints rarely: it finds candidates without comparing every pair.
+/// A number that is nearly equal for nearly equal joints and rarely for others. It finds candidates without comparing
+/// every pair.
 double joint_key(const JointVector& q) {
   double key = 0;
   for (Eigen::Index j = 0; j < q.size(); ++j) key += std::sqrt(static_cast<double>(j) + 2) * q(j);
@@ -37,7 +38,7 @@ double key_tolerance(const JointVector& q) {
   return sum * kSameJoint;
 }
 
-/// In the order of each group's first measurement.
+/// Groups of repeats, in the order of their first measurement.
 std::vector<Group> group_repeats(const MeasurementBatch& batch) {
   std::vector<Group> groups;
   std::multimap<double, std::size_t> group_of_key;

@@ -4,7 +4,7 @@
 
 namespace trammel {
 
-/// What measuring the same pose several times says about one measurement.
+/// Repeatability: the scatter of one measurement, estimated from poses measured several times.
 struct RepeatStatistics {
   int groups = 0;              ///< poses measured more than once
   int measurements = 0;        ///< in those groups
@@ -12,8 +12,8 @@ struct RepeatStatistics {
   int degrees_of_freedom = 0;  ///< 3 (n - 1) summed over the groups; 0 = `sigma` says nothing
   double sigma_rotation = 0;   ///< rad, one axis of one measured orientation, pooled
   int rotation_degrees_of_freedom = 0;
-  /// What the stated sigmas were multiplied with, >= 1: the square root of chi² per degree of freedom (Birge ratio),
-  /// where that is above 1 and known from 6 degrees of freedom at least.
+  /// Factor on the stated sigmas, >= 1: the square root of chi² per degree of freedom (Birge ratio). 1 if the ratio is
+  /// below 1 or has fewer than 6 degrees of freedom.
   double sigma_factor = 1;
 };
 
@@ -22,14 +22,14 @@ struct MergedRepeats {
   RepeatStatistics statistics;
 };
 
-/// One measurement for each pose measured repeatedly. Repeats have the same commanded joints (each within 1e-6 rad or
-/// m), tool, payload, approach direction and set; measurements with a velocity are never repeats. The average takes the
-/// place of the first, with its pose id, row, index and extra fields: position weighted by 1/sigma² (`default_sigma`,
-/// m, one axis, where a row states none), orientation the rotation with the least squared angles, time and temperature
-/// the means of those recorded. Where the batch has repeats, each row's sigma is then that of its (averaged) position,
-/// `sigma_factor` / sqrt(sum 1/sigma²): poses measured once share the scatter that the repeated ones show. A batch
-/// without repeats comes back as it was. What changes between repeats (a drift, a step) is averaged over: look for that
-/// in the batch itself.
+/// Merges repeats into one measurement per pose. Repeats have the same commanded joints (each within 1e-6 rad or m),
+/// tool, payload, approach direction and set; measurements with a velocity are never repeats. The average replaces the
+/// first measurement and keeps its pose id, row, index and extra fields: position weighted by 1/sigma²
+/// (`default_sigma`, m, one axis, where a row states none), orientation the rotation with the least squared angles,
+/// time and temperature the means of those recorded. If the batch has repeats, the sigma of each row becomes that of
+/// its (averaged) position, `sigma_factor` / sqrt(sum 1/sigma²). So `sigma_factor` also applies to poses measured once.
+/// A batch without repeats is returned unchanged. A change between repeats (a drift, a step) is averaged out: look for
+/// it in the original batch.
 [[nodiscard]] MergedRepeats merge_repeats(const MeasurementBatch& batch, double default_sigma);
 
 }  // namespace trammel

@@ -11,7 +11,8 @@ namespace trammel {
 
 namespace {
 
-/// `count` of `size` rows, drawn without return. Fisher-Yates by hand: std::shuffle differs between libraries.
+/// Draws `count` of `size` rows without replacement. Own Fisher-Yates: the result of std::shuffle differs between
+/// libraries.
 std::vector<bool> draw_rows(std::size_t size, std::size_t count, std::uint64_t seed) {
   std::vector<std::size_t> order(size);
   std::iota(order.begin(), order.end(), std::size_t{0});

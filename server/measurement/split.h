@@ -13,14 +13,14 @@ struct BatchSplit {
   MeasurementBatch validation;
 };
 
-/// One flag a row, true where it is held out: by the `set` column where the batch has one, else by drawing `share` of
-/// the rows with `seed` (one row at least stays for training). Reproducible: same rows, seed and share, same flags.
+/// One flag per row, true if it is held out. Uses the `set` column if the batch has one, else draws `share` of the rows
+/// with `seed` (at least one row stays for training). Reproducible: same rows, seed and share, same flags.
 [[nodiscard]] std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share, std::uint64_t seed);
 
-/// `held_out`: one flag a row.
+/// Splits the batch by `held_out`, one flag per row.
 [[nodiscard]] BatchSplit split_rows(const MeasurementBatch& batch, const std::vector<bool>& held_out);
 
-/// Both of these.
+/// split_rows() by rows_held_out().
 [[nodiscard]] BatchSplit split_batch(const MeasurementBatch& batch, double share, std::uint64_t seed);
 
 }  // namespace trammel

@@ -17,7 +17,7 @@ constexpr double kSlackOfSmallAngles = 0.01;  // m: with |q| within 2 pi degrees
 constexpr double kSmallAngle = 6.4;           // the largest radian value of a joint, two half turns and a little
 constexpr double kUnknownToolLength = 0.5;    // m
 
-/// Between which spreads the nominal tool may move, m.
+/// The smallest and largest possible spread of the nominal tool points, m.
 struct NominalSpread {
   double smallest = 0;
   double largest = 0;
@@ -71,7 +71,7 @@ NominalSpread nominal_spread(const std::vector<Pose>& flanges, const std::option
   return {spread, spread};
 }
 
-/// What was measured with one tool.
+/// The measurements with one tool.
 struct ToolGroup {
   std::vector<Pose> flanges;  // X_BF
   std::vector<Vector3> measured_W;

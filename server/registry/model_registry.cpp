@@ -13,7 +13,7 @@ std::shared_ptr<const ServedModel> ModelRegistry::in_force(const std::string& ce
 void ModelRegistry::publish(std::shared_ptr<const ServedModel> model) {
   TRAMMEL_CHECK(model != nullptr);
   const MutexLock lock(mutex_);
-  models_[model->cell].swap(model);  // the model before is let go after the lock, with `model`
+  models_[model->cell].swap(model);  // `model` then holds the previous one, which is freed after the lock
 }
 
 std::vector<std::shared_ptr<const ServedModel>> ModelRegistry::all() const {

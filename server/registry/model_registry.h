@@ -17,15 +17,15 @@ struct ServedModel {
   CompensatedModel model;
 };
 
-/// The model in force for each cell. Thread-safe: a reader gets the whole model or the one before, and keeps it for as
-/// long as it holds the pointer. Readers never wait for training.
+/// The model in force for each cell. Thread-safe. A reader gets the new model or the previous one, never a mixture, and
+/// keeps it while it holds the pointer. Readers never wait for training.
 class ModelRegistry {
  public:
   /// Null when the cell has no model in force.
   [[nodiscard]] std::shared_ptr<const ServedModel> in_force(const std::string& cell) const;
-  /// Puts it in the place of its cell's model; those who hold the one before keep it.
+  /// Replaces the model of its cell. Readers that hold the previous one keep it.
   void publish(std::shared_ptr<const ServedModel> model);
-  /// Of every cell that has one in force, by cell name.
+  /// The model in force of every cell that has one, ordered by cell name.
   [[nodiscard]] std::vector<std::shared_ptr<const ServedModel>> all() const;
 
  private:

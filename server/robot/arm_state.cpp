@@ -17,7 +17,7 @@ void ArmState::add_to_joint(int joint, double delta) {
 
 StateJacobian::StateJacobian(const Chain& chain, int parameters)
     : rows(chain.size()), chain_(&chain), parameters_(parameters) {
-  constexpr std::size_t kRowsOfMost = 3;  // most parameters move fewer numbers than this
+  constexpr std::size_t kRowsOfMost = 3;  // rows reserved per parameter; most parameters move fewer
   entries_.reserve(kRowsOfMost * static_cast<std::size_t>(parameters));
 }
 
@@ -57,8 +57,8 @@ void StateJacobian::transform(int first_row, const Eigen::Ref<const Eigen::Matri
 }
 
 Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
-  // The state after a passage is (I + E L) times the state before: what comes after sees E L through `by_state`, what
-  // was recorded before sees by_state (I + E L).
+  // A passage multiplies d(state) by (I + E L): L is the passage's own by_state, E puts its rows into the state. So,
+  // going backwards, `by_state` becomes by_state (I + E L) for the entries recorded before the passage.
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(6, parameters_);
   std::size_t end = entries_.size();
   const auto collect = [&](std::size_t begin) {
@@ -195,7 +195,8 @@ StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& d
   const LinkVectors velocity = velocities_of(kinematic_tip_W_);
   const LinkVectors turn = turns();
   StateMatrix<6> D = StateMatrix<6>::Zero(6, rows.size());
-  // The columns of joints beyond a link turn with it; of those up to it, only the lever changes.
+  // When a link turns, the Jacobian columns of joints beyond it turn too. In the columns of the joints up to it only
+  // the lever changes.
   Vector6 beyond = J * deflection;
   Vector3 up_to = Vector3::Zero();
   const auto turned = [&](int row, const Vector3& w) {
@@ -243,9 +244,9 @@ JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
     for (int j = 0; j <= body.last; ++j) {
       const Vector3& z = links_[static_cast<std::size_t>(j)].z;
       const bool revolute = chain_->joint(j).type == JointType::kRevolute;
-      // The force's direction that does work: tau = leverage . F.
+      // The direction in which a force does work on the joint: tau = leverage . F.
       const Vector3 leverage = revolute ? z.cross(body.p - links_[static_cast<std::size_t>(j)].p) : z;
-      // Upstream of the joint a rotation turns arm and axis alike: the same as turning the force back.
+      // A rotation upstream of the joint turns lever and axis together. That equals turning the force back.
       const Vector3 by_turn = leverage.cross(body.force);
       const Vector3 by_cog = revolute ? body.force.cross(z) : Vector3::Zero();
       for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));
@@ -269,7 +270,8 @@ StateMatrix<15> ArmKinematics::loaded_link_jacobian(int joint) const {
   const LoadedLink link = loaded_link(joint);
   StateMatrix<15> J = StateMatrix<15>::Zero(15, rows.size());
   const Vector3 points[] = {link.start, link.end, link.cog, link.tip};
-  // What moves each point: links before its own; alpha and beta of a link turn about its far end, which stays.
+  // The rows that move each point are those of the links before it. alpha and beta of a link turn about its far end,
+  // which stays.
   const int moving[] = {rows.theta(joint), rows.theta(joint) + 5, rows.base(0), rows.base(0)};
   for (int p = 0; p < 4; ++p) {
     J.block(3 * p, 0, 3, moving[p]) = velocities_of(points[p]).leftCols(moving[p]);

@@ -7,7 +7,7 @@
 #include "server/robot/chain.h"
 #include "server/robot/pose.h"
 
-/// The arm as it stands at one pose, and how its tool moves when any of its numbers changes.
+/// The state of the arm at one pose, and the derivative of the tool pose by every number of that state.
 namespace trammel {
 
 struct Payload {
@@ -17,7 +17,7 @@ struct Payload {
 
 constexpr double kGravity = 9.80665;  // m/s^2
 
-/// What error sources act upon, one after the other: it starts nominal and ends as the real arm stands.
+/// The state that the error sources change, one after the other: nominal at first, the real arm at the end.
 struct ArmState {
   const Chain* chain = nullptr;     ///< not owned
   std::vector<LinkGeometry> links;  ///< n, joint values included
@@ -31,9 +31,9 @@ struct ArmState {
   void add_to_joint(int joint, double delta);
 };
 
-/// Where each number of an ArmState stands in a derivative: five rows a link, then base, tool, payload, tip.
-/// Base and tool rows are small motions [translation; rotation vector]: of B seen in W, about the origin of B; of T
-/// seen in F, about the origin of F.
+/// The row of each number of an ArmState in a derivative: five rows per link, then base, tool, payload, tip. Base and
+/// tool rows are small motions [translation; rotation vector]. The base motion is that of B in W, about the origin of
+/// B; the tool motion is that of T in F, about the origin of F.
 class StateRows {
  public:
   explicit StateRows(int joints) : joints_(joints) {}
@@ -42,7 +42,7 @@ class StateRows {
   [[nodiscard]] int a(int joint) const { return 5 * joint + 2; }
   [[nodiscard]] int alpha(int joint) const { return 5 * joint + 3; }
   [[nodiscard]] int beta(int joint) const { return 5 * joint + 4; }
-  /// The row that joint `joint` of `chain` itself turns or shifts.
+  /// The row of the value of joint `joint`: theta if revolute, d if prismatic.
   [[nodiscard]] int of_joint(const Chain& chain, int joint) const {
     return chain.joint(joint).type == JointType::kRevolute ? theta(joint) : d(joint);
   }
@@ -60,31 +60,31 @@ class StateRows {
 
 constexpr int kMaxStateRows = 5 * kMaxJoints + 22;
 
-/// Something of `Rows` numbers by every number of the state: one column for each of StateRows.
+/// The derivative of `Rows` numbers by the state: one column for each of StateRows.
 template <int Rows>
 using StateMatrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, kMaxStateRows>;
 /// The same with a row for each joint.
 using JointStateMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxStateRows>;
 
-/// d(state)/d(parameters), recorded while sources act and multiplied out once from its end, so that a source costs the
-/// same however many parameters came before it.
+/// d(state)/d(parameters). Recorded while the sources act, and multiplied out once, from the last source to the first.
+/// So the cost of a source does not grow with the number of parameters before it.
 class StateJacobian {
  public:
   StateJacobian(const Chain& chain, int parameters);
-  /// The parameter in `column` moves the number in state row `row` by `rate` per unit.
+  /// Records that the parameter in `column` moves state row `row` by `rate` per unit.
   void add(int row, int column, double rate);
   /// The same for several rows from `first_row` and columns from `first_column`; zeros cost nothing.
   void add_block(int first_row, int first_column, const Eigen::Ref<const Eigen::MatrixXd>& rates);
-  /// The parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per unit.
+  /// Records that the parameter in `column` moves `joint` (as ArmState::add_to_joint) by `rate` per unit.
   void add_to_joint(int joint, int column, double rate);
-  /// Whatever has moved the state so far moves the numbers in `rows` in addition, by `by_state` (one row for each of
-  /// them, a column for each of StateRows).
+  /// Records that every change of the state so far also changes the numbers in `rows`, by `by_state` (one row for each
+  /// of `rows`, one column for each of StateRows).
   void pass_on(std::vector<int> rows, Eigen::MatrixXd by_state);
-  /// Whatever has moved the state so far moves `joint` (as ArmState::add_to_joint) in addition, by `by_state`.
+  /// Records that every change of the state so far also moves `joint` (as ArmState::add_to_joint), by `by_state`.
   void pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_state);
-  /// The numbers in the state rows from `first_row` on become `factor` times what they were, with all that moved them.
+  /// Multiplies the numbers in the state rows from `first_row` on, and their derivatives so far, by `factor`.
   void transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor);
-  /// `by_state` (6 x StateRows::size()) times all that was recorded: 6 x parameters.
+  /// `by_state` (6 x StateRows::size()) times the recorded derivative: 6 x parameters.
   [[nodiscard]] Eigen::MatrixXd times(StateMatrix<6> by_state) const;
 
   StateRows rows;
@@ -96,7 +96,7 @@ class StateJacobian {
     double rate;
   };
   struct Passage {
-    std::size_t entries;  ///< how many were recorded before
+    std::size_t entries;  ///< number of entries recorded before
     std::vector<int> rows;
     int first_column;  ///< of by_state in the state
     Eigen::MatrixXd by_state;
@@ -107,7 +107,7 @@ class StateJacobian {
   std::vector<Passage> passages_;
 };
 
-/// Forward kinematics of a state with everything needed to differentiate it.
+/// Forward kinematics of a state, with derivatives.
 class ArmKinematics {
  public:
   explicit ArmKinematics(const ArmState& state);
@@ -115,9 +115,9 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: moment of all weights about each joint's axis (force along a prismatic one), Nm (N): the payload's and, where
-  /// the robot file gives them, the links', each at its centre of gravity (the physical wrench), eq. (3.6) without C
-  /// and the outer J.
+  /// n: moment of all weights about the axis of each joint, Nm (for a prismatic joint the force along it, N). The
+  /// weights are the payload's and, if the robot file gives them, the links', each at its centre of gravity (the
+  /// physical wrench). Eq. (3.6) without C and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
@@ -126,8 +126,8 @@ class ArmKinematics {
   [[nodiscard]] DeflectionJacobian deflection_jacobian() const;
   /// Derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
   [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& deflection) const;
-  /// Points in W that bending depends on: axis of `joint`, far end of its link, centre of gravity, tool point; and the
-  /// weight, N.
+  /// Points in W that bending depends on: a point on the axis of `joint`, the far end of its link, the centre of
+  /// gravity, the tool point. Also the weight, N.
   struct LoadedLink {
     Vector3 start, end, cog, tip, weight;
   };
@@ -140,15 +140,15 @@ class ArmKinematics {
   struct Link {
     Vector3 z, p, x, y, q;
   };
-  /// Something heavy, carried by link `last` and all before it.
+  /// A weight on link `last`: it loads that link and all links before it.
   struct Body {
     Vector3 p, force;  ///< in W
     int last;
   };
   using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
-  /// One column a link row: how fast `point` moves in W, carried by everything downstream of the link.
+  /// One column per link row: the velocity in W of `point`, fixed to what is downstream of the link.
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
-  /// One column a link row: the rotation of everything downstream.
+  /// One column per link row: the rotation of everything downstream of the link.
   [[nodiscard]] LinkVectors turns() const;
 
   const Chain* chain_;

@@ -9,15 +9,15 @@
 #include "server/robot/arm_state.h"
 #include "server/robot/chain.h"
 
-/// A cell as its owner describes it: the robot, where it stands, what it carries and who measures it.
+/// A cell as its owner describes it: the robot, its base, tools and payloads, and the tracker.
 namespace trammel {
 
 struct Tracker {
   double sigma = 13e-6;                        ///< m, one measurement, one axis
   double sigma_rotation = 61e-6;               ///< rad, one measurement, one axis
-  std::optional<Vector3> p_W;                  ///< where it stands, for visibility
-  std::optional<double> aperture;              ///< rad, half angle in which the target is seen
-  Vector3 target_normal_T = Vector3::UnitZ();  ///< where the target looks, unit vector in T
+  std::optional<Vector3> p_W;                  ///< position of the tracker, for visibility
+  std::optional<double> aperture;              ///< rad, half angle of the cone in which the target is visible
+  Vector3 target_normal_T = Vector3::UnitZ();  ///< direction in which the target faces, unit vector in T
 };
 
 /// What to identify and what to learn. Sources as spelled on the command line: `geometry`, `gear_transmission:3`.
@@ -42,7 +42,7 @@ struct Cell {
   ModelSpec model;
   std::vector<std::pair<double, double>> joint_ranges;  ///< rad, of this cell; empty = the robot's limits
   std::optional<Workspace> workspace;
-  std::string cell_yaml;  ///< the texts it was read from, kept so that a stored model is whole
+  std::string cell_yaml;  ///< the texts it was read from, kept so that a stored model is self-contained
   std::string robot_yaml;
 };
 
@@ -56,8 +56,8 @@ struct Cell {
 [[nodiscard]] Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where);
 [[nodiscard]] Result<Chain> read_robot(const std::string& path);
 
-/// The tool a request means: `requested`, or the only one when that is empty. Refuses an unknown name, or none of
-/// several.
+/// The tool of a request: `requested`, or the only tool if that is empty. Refuses an unknown name. Refuses an empty
+/// name if the cell has several tools.
 [[nodiscard]] Result<std::string> resolve_tool(const Cell& cell, const std::string& requested);
 /// The same for payloads; a cell without payloads has the one called "" (nothing carried).
 [[nodiscard]] Result<std::string> resolve_payload(const Cell& cell, const std::string& requested);

@@ -28,7 +28,7 @@ void read_link(const YamlMap& map, Joint& joint) {
   joint.link.beta = from_deg(map.number("beta_deg", 0));
 }
 
-/// How far and how fast the joint goes.
+/// Reads the limits and the speed of the joint.
 void read_motion(const YamlMap& map, Joint& joint) {
   const bool revolute = joint.type == JointType::kRevolute;
   const std::string limits = revolute ? "limits_deg" : "limits_mm";
@@ -235,7 +235,7 @@ Result<Chain> read_robot(const std::string& path) {
 
 namespace {
 
-/// Whatever became of its robot, all that is wrong with the cell is said.
+/// Reads the cell even if its robot was refused, so that all errors of the cell file are reported.
 Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml, const std::string& where) {
   return read_yaml(cell_yaml, where, [&](const YamlMap& map) {
     Cell cell = read_cell_map(map);
@@ -247,7 +247,7 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
   });
 }
 
-/// Of the robot that the cell names; its path is relative to the cell's.
+/// The text of the robot file that the cell names. Its path is relative to the cell file.
 Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
   const Result<std::string> name = read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); });
   if (!name) return tl::make_unexpected(name.error());

@@ -10,7 +10,7 @@ namespace trammel {
 
 namespace {
 
-/// From where to where the text says a value.
+/// Begin and end of a value in the text.
 struct Span {
   std::size_t begin = 0, end = 0;
 };
@@ -22,13 +22,13 @@ std::size_t line_start(const std::string& text, std::size_t at) {
   return newline == std::string::npos ? 0 : newline + 1;
 }
 
-/// Past the end of the line that holds `at`.
+/// The start of the line after the one that holds `at`.
 std::size_t next_line(const std::string& text, std::size_t at) {
   const std::size_t newline = text.find('\n', at);
   return newline == std::string::npos ? text.size() : newline + 1;
 }
 
-/// Of a flow list from its `[` to its `]`; a list of words holds no other one.
+/// The span of a flow list, from `[` to `]`. A list of words contains no other list.
 Span flow_list(const std::string& text, std::size_t open) {
   bool comment = false;
   for (std::size_t at = open; at < text.size(); ++at) {
@@ -39,7 +39,7 @@ Span flow_list(const std::string& text, std::size_t open) {
   return {open, text.size()};
 }
 
-/// Of a block list, whose lines begin with a dash at the column of the first.
+/// The span of a block list. Its lines begin with a dash in the column of the first dash.
 Span block_list(const std::string& text, std::size_t first_dash) {
   const std::size_t indent = first_dash - line_start(text, first_dash);
   std::size_t end = first_dash;
@@ -54,7 +54,7 @@ Span block_list(const std::string& text, std::size_t first_dash) {
   return {first_dash, std::min(end, text.size())};
 }
 
-/// The present list replaced, in the style it is written in.
+/// The text with the present list replaced, in the same style (flow or block).
 std::string replaced(const std::string& text, std::size_t mark, const std::vector<std::string>& sources) {
   const bool flow = text[mark] == '[';
   const Span span = flow ? flow_list(text, mark) : block_list(text, mark);
@@ -63,7 +63,7 @@ std::string replaced(const std::string& text, std::size_t mark, const std::vecto
   return text.substr(0, span.begin) + list + text.substr(span.end);
 }
 
-/// A list put before the first key of the mapping `model`.
+/// The text with the list inserted before the first key of the mapping `model`.
 std::string inserted(const std::string& text, const YAML::Node& model, const std::string& list) {
   const std::string entry = "error_sources: " + list;
   const auto mark = static_cast<std::size_t>(model.Mark().pos);
@@ -89,7 +89,7 @@ std::string edited(const std::string& text, const YAML::Node& root, const std::v
   return inserted(text, model, list);
 }
 
-/// The file's content with the list taken out, for comparing.
+/// The content of the file without the list, for comparison.
 std::string all_but_the_list(const std::string& text) {
   YAML::Node root = YAML::Load(text);
   if (root["model"].IsDefined() && root["model"].IsMap()) root["model"].remove("error_sources");

@@ -13,7 +13,7 @@ namespace trammel {
 
 enum class JointType { kRevolute, kPrismatic };
 
-constexpr int kMaxJoints = 12;  // of a chain; what is computed at every pose lives in storage of this size
+constexpr int kMaxJoints = 12;  // of a chain; computations at every pose use fixed storage of this size
 
 /// One number per joint.
 using JointArray = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxJoints, 1>;
@@ -33,12 +33,12 @@ struct Joint {
   JointType type = JointType::kRevolute;
   LinkGeometry link;    ///< nominal; theta (revolute) or d (prismatic) is the offset at joint value 0
   bool hayati = false;  ///< beta is a parameter of this link and d is not
-  double sign = 1;      ///< +1 or -1: the controller's sense of this joint against the right-hand rule
+  double sign = 1;      ///< -1 where the controller counts against the right-hand rule, else +1
   double lower = -std::numeric_limits<double>::infinity();  ///< rad (m), of the commanded value
   double upper = std::numeric_limits<double>::infinity();
   double gear_ratio = 0;            ///< motor turns per joint turn; 0 when unknown
   double compliance_prior = 0;      ///< rad/Nm
-  double mass = 0;                  ///< kg, of the link that follows; 0 when its weight is left to the controller
+  double mass = 0;                  ///< kg, of the link that follows; 0: the controller compensates its weight
   Vector3 p_cog = Vector3::Zero();  ///< m, its centre of gravity in the link's own frame (at its far end)
   std::optional<double> max_speed;  ///< rad/s (m/s)
 };

@@ -1,4 +1,4 @@
-// Where a nominal chain stands: the arm's kinematics without any error.
+// Kinematics of the nominal chain: the arm without any error source.
 #include "server/robot/arm_state.h"
 #include "server/robot/chain.h"
 

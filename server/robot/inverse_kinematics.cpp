@@ -34,7 +34,7 @@ Descent descend(const Chain& chain, const Pose& X_BF, const JointVector& start, 
   while (now.iterations < kMaxIterations && now.error > kConverged) {
     ++now.iterations;
     Eigen::MatrixXd J = chain.jacobian(now.q);
-    // A joint that stands at its limit and would be pushed out is held.
+    // A joint at its limit that the step would push beyond it is held.
     for (int pass = 0; within_limits && pass < 2; ++pass) {
       const Eigen::VectorXd push = J.transpose() * e;
       for (int i = 0; i < chain.size(); ++i) {
@@ -130,8 +130,8 @@ std::optional<std::array<double, 6>> branch(const Chain& chain, const Pose& X_BF
   const double fore = std::hypot(link(2).a, fore_y);
   const double cosine = (p.x() * p.x() + p.y() * p.y() - upper * upper - fore * fore) / (2 * upper * fore);
   if (std::abs(cosine) > 1) return std::nullopt;
-  // Two elbows; the one whose wrist lies in front of the line of the lower arm is told by the sign of the sine, which
-  // depends on how frame 1 is turned and on which side of axis 1 the arm works.
+  // There are two elbows. The sign of the sine tells in which one the wrist lies in front of the lower arm. It depends
+  // on the orientation of frame 1 and on the side of axis 1 on which the arm works.
   const double forward = (R_B1.transpose() * Vector3(std::cos(theta[0]), std::sin(theta[0]), 0)).x() *
                          (std::sin(link(0).alpha) < 0 ? 1.0 : -1.0);
   const bool positive_sine = (forward > 0) != behind_arm;
@@ -160,7 +160,8 @@ std::optional<std::array<double, 6>> branch(const Chain& chain, const Pose& X_BF
   return theta;
 }
 
-/// The turn of `angle` (rad) nearest to `near` that the joint's limits allow; the nearest of all when none does.
+/// `angle` (rad) plus the number of whole turns that brings it nearest to `near` within the joint's limits. If none
+/// lies within the limits, the nearest of all.
 double nearest_turn(const Joint& joint, double angle, double near) {
   const double nearest = angle + 2 * kPi * std::round((near - angle) / (2 * kPi));
   for (const double turns : {0.0, 1.0, -1.0, 2.0, -2.0}) {

@@ -6,7 +6,7 @@
 #include "server/base/result.h"
 #include "server/robot/chain.h"
 
-/// From a flange pose to joints: the nominal robot's, as its controller computes them.
+/// Inverse kinematics of the nominal robot, as its controller computes it.
 namespace trammel {
 
 enum class InverseStatus {

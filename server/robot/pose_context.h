@@ -8,7 +8,7 @@
 
 namespace trammel {
 
-/// Everything known about the moment of one pose that may matter to where the tool is.
+/// Everything recorded with one pose that may influence the tool pose.
 struct PoseContext {
   JointVector q;                        ///< as commanded, rad (m for a prismatic joint), size n
   std::optional<double> time;           ///< s
@@ -18,9 +18,9 @@ struct PoseContext {
   std::string tool;                     ///< id in the cell file
   std::string payload;                  ///< id in the cell file
   int index = 0;                        ///< position in its batch, for effects that begin at a pose
-  bool served = false;  ///< asked for, not measured: after every pose of the batch, and without its tracker
+  bool served = false;  ///< of a request, not measured: later than every pose of the batch, and without its tracker
 
-  /// True from the pose with this index on, and in everything that is served.
+  /// True from the pose with index `first` on, and for every served pose.
   [[nodiscard]] bool from(int first) const { return served || index >= first; }
 };
 

@@ -5,7 +5,7 @@
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
 
-// Batches: their text as it came, and which of them no training takes.
+// Batches: their text as received, and which of them are in quarantine.
 
 namespace trammel {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kRecordColumns =
     "SELECT id, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? ";
 
-/// Of a row of kRecordColumns: all but the text.
+/// The batch in a row of kRecordColumns, without its text.
 StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
   return {cell,
           row.getColumn(0).getString(),

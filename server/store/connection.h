@@ -13,7 +13,7 @@
 
 namespace trammel {
 
-constexpr int kBusyTimeout = 5000;  // ms, for whoever else reads the file
+constexpr int kBusyTimeout = 5000;  // ms to wait while another program reads the file
 
 /// One connection behind one lock.
 struct StoreConnection {
@@ -22,7 +22,7 @@ struct StoreConnection {
         lock(std::move(writer)),
         database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout) {}
 
-  /// `work(database)` alone at the connection; what SQLite throws becomes kInternal.
+  /// Runs `work(database)` with the lock held. An exception of SQLite becomes kInternal.
   template <typename Work>
   auto exclusively(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
     const MutexLock guard(mutex);
@@ -35,7 +35,7 @@ struct StoreConnection {
     }
   }
 
-  /// The same in one transaction, which holds only if `work` succeeds.
+  /// The same in one transaction, committed only if `work` succeeds.
   template <typename Work>
   auto in_transaction(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
     return exclusively([&work](SQLite::Database& open) {

@@ -7,12 +7,12 @@
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
 
-// Jobs and what diagnoses found.
+// Jobs and the findings of diagnoses.
 
 namespace trammel {
 namespace {
 
-constexpr int kPagesKept = 20;  // of diagnoses; their findings are kept for ever
+constexpr int kPagesKept = 20;  // pages of diagnoses; findings are kept for ever
 
 constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
                                                                          {JobState::kRunning, "running"},
@@ -30,10 +30,10 @@ JobState job_state_of(std::string_view text) {
   for (const auto& [value, name] : kJobStates) {
     if (text == name) return value;
   }
-  return JobState::kFailed;  // the schema's CHECK lets no other text in
+  return JobState::kFailed;  // the schema's CHECK allows no other text
 }
 
-/// Of the change of one unfinished job.
+/// The result of an UPDATE that should have changed one unfinished job.
 Status changed_one(int changes, std::int64_t id) {
   if (changes == 1) return {};
   return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);

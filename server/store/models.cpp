@@ -6,12 +6,12 @@
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
 
-// Models, and which of them was in force when.
+// Models, and the history of which was in force.
 
 namespace trammel {
 namespace {
 
-/// The newest line of a cell's history of what was in force.
+/// A row of the cell's history of models in force.
 struct Activation {
   std::int64_t number = 0;
   int version = 0;
@@ -30,7 +30,7 @@ std::optional<Activation> present_activation(SQLite::Database& database, const s
       database, "SELECT number, version, back FROM activations WHERE cell = ? ORDER BY number DESC LIMIT 1", cell));
 }
 
-/// Where rolling back again and again leads, the next one first.
+/// The activations that repeated rollbacks restore, the next one first.
 Result<std::vector<Activation>> activations_before(SQLite::Database& database, const std::string& cell) {
   const auto present = present_activation(database, cell);
   if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
@@ -58,7 +58,7 @@ void insert_activation(SQLite::Database& database, const std::string& cell, int 
   row.exec();
 }
 
-/// What the job that made the version may release leaves quarantine.
+/// Releases from quarantine the batches that the job of this version may release.
 void release_batches_of(SQLite::Database& database, const std::string& cell, int version) {
   change(database,
          "UPDATE batches SET quarantine = '' WHERE cell = ? AND id IN (SELECT batch FROM job_releases JOIN jobs "
@@ -66,7 +66,7 @@ void release_batches_of(SQLite::Database& database, const std::string& cell, int
          cell, cell, version);
 }
 
-/// Puts `version` in force on top of what is.
+/// Puts `version` in force. The new activation remembers the present one.
 void activate_on_top(SQLite::Database& database, const std::string& cell, int version) {
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;

@@ -81,9 +81,10 @@ CREATE TABLE diagnoses (
 );
 )sql";
 
-/// Beside the tables of the schema, so that programs that do not know them can still open the file: when jobs began and
-/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded);
-/// which batches in quarantine a job may train from, and releases if its model goes in force.
+/// Extra tables beside those of the schema version, so that older programs can still open the file. They hold when jobs
+/// began and ended, when models were trained, and when their newest measurement was taken (Unix time, s; NULL = not
+/// recorded). They also hold the batches in quarantine that a job may train from; these are released if its model is
+/// put in force.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -111,7 +112,7 @@ INSERT INTO model_times (cell, version, trained_at)
     AND json_valid(content) AND json_type(content, '$.stamp.trained_at') = 'integer';
 )sql";
 
-/// Ours, or empty and to be ours; nothing is changed here.
+/// Refuses a file that is neither empty nor a store of ours. Changes nothing.
 Status check_owner(SQLite::Database& database, const std::string& path) {
   const int application = database.execAndGet("PRAGMA application_id").getInt();
   const int schema = database.execAndGet("PRAGMA user_version").getInt();

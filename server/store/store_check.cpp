@@ -42,7 +42,7 @@ Status check_folder(const fs::path& path) {
   return {};
 }
 
-/// Of a file that is there and not empty. What is still in its journal it does not say.
+/// Checks the header of a file that exists and is not empty. Does not see what is still in the journal.
 Status check_header(const fs::path& path) {
   std::string header(kHeader, '\0');
   std::ifstream in(path, std::ios::binary);

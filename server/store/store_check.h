@@ -6,9 +6,9 @@
 
 namespace trammel {
 
-/// Whether a store could be opened at `path`, as far as can be told without changing or creating anything: its folder
-/// is there and may be written to, the file, if any, is a store of a schema that this program knows, and nobody else
-/// writes it (kConflict). What stands in pages beyond the first is looked at when it is opened.
+/// Checks whether a store could be opened at `path`, without changing or creating anything. Its folder must exist and
+/// be writable. A file that exists must be a store with a known schema, without another writer (kConflict). Only the
+/// first page is read; open() checks the rest.
 [[nodiscard]] Status check_store(const std::string& path);
 
 }  // namespace trammel

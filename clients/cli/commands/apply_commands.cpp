@@ -13,7 +13,7 @@ namespace trammel::cli {
 
 namespace {
 
-constexpr std::size_t kPosesTogether = 1000;  // that a model predicts between two looks at the progress
+constexpr std::size_t kPosesTogether = 1000;  // poses that a model predicts between two updates of the progress
 
 /// What predict and correct have in common.
 struct ApplyArguments {
@@ -158,7 +158,7 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
 }
 
-/// Whether what could not be corrected counts.
+/// The options that decide whether targets without correction are errors.
 struct CorrectArguments : ApplyArguments {
   bool allow_failed = false, strict = false;
 };

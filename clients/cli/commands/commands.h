@@ -15,7 +15,7 @@ class App;
 /// line names is put into `chosen`.
 namespace trammel::cli {
 
-/// How much of what was asked a command did; of kPart it has said on standard error what is missing.
+/// How much of its task a command did. For kPart it has printed what is missing on standard error.
 enum class Extent { kAll, kPart };
 
 /// What the command line names to do. Commands that do all or nothing answer a Status.

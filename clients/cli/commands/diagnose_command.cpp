@@ -20,7 +20,8 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kCellOption = "--cell-out";
-constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
+constexpr double kHeldOutShare =
+    0.2;  // share of the rows held out to judge an extended model, if the batch has no `set` column
 
 Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 std::uint64_t seed) {
@@ -68,7 +69,7 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
   return said;
 }
 
-/// Never silently worse: what does not lower the error on poses held out beyond chance goes into no file.
+/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance.
 Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                         const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
@@ -86,7 +87,7 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBa
   return extension;
 }
 
-/// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
+/// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
 Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
   return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
     return check_against_cell(std::move(batch), cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));

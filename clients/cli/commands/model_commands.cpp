@@ -37,8 +37,8 @@ struct TrainArguments {
   double validation_share = 0;
 };
 
-/// As the service does before it learns from a batch: holds it against the model to start from. What is refitted may
-/// differ; anything else would be learned as if it belonged to it.
+/// Checks the batch against the model to start from, as the service does before training. Only the refitted sources may
+/// differ: another difference would be learned as part of them.
 Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
                     const CheckedBatch& batch) {
   if (const Status fits = check_may_start_from(from, cell, batch.rows(), refit); !fits) return fits;

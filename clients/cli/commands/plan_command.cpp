@@ -60,7 +60,7 @@ ProgramOptions program_called_after(const std::string& path, ProgramOptions opti
   return options;
 }
 
-/// Texts by where they go; nothing is written before all are known to be right.
+/// The texts by their output paths. Nothing is written until all are complete.
 Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& cell, const PlanArguments& arguments,
                                                                     const Plan& plan) {
   std::vector<std::pair<std::string, std::string>> outputs = {{arguments.output, as_csv(cell, arguments.output, plan)}};
@@ -146,7 +146,7 @@ ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Pla
   return json;
 }
 
-/// Poses that somebody has chosen already: those of `diagnose --next-poses`, for one.
+/// A plan of given poses, for example those of `diagnose --next-poses`.
 Result<Plan> plan_from(const Cell& cell, const std::string& path) {
   return read_joint_csv(path)
       .and_then([&](JointList list) { return check_against_cell(std::move(list), cell); })

@@ -25,7 +25,7 @@ struct ServiceArguments {
   ServiceOptions service;
 };
 
-/// A job did all that it was to if it made no model, or one that is in force.
+/// A job is complete if it made no model, or if its model is in force.
 Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || job.in_force ? Extent::kAll : Extent::kPart;
 }

@@ -32,7 +32,7 @@ ordered_json pose_json(const client::PoseMm& pose) {
           {"qx", pose.qx},     {"qy", pose.qy},     {"qz", pose.qz}};
 }
 
-/// False: there is nothing to command, so no numbers are handed out that a program could take for some.
+/// Whether there is a pose to command. If not, no numbers are written: a program could take them for a command.
 bool has_command(const client::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
 }

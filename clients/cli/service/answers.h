@@ -19,7 +19,7 @@ namespace trammel::cli {
 [[nodiscard]] std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types);
 [[nodiscard]] client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types);
 
-/// What the wire does not carry of a prediction's uncertainty.
+/// The parts of a prediction's uncertainty that the wire does not carry.
 struct JointUncertainty {
   double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
   double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error: without the tracker's own sigma
@@ -53,8 +53,7 @@ struct Corrections {
 
 /// The columns of the target file, then `row` (line in that file), `status`, the pose and joints to command, errors to
 /// expect, `iterations`, `model_id`, `message`. A column of the file that is named as one of these comes as
-/// `input_NAME`. A target that is left alone has no pose and no joints to command, and an error only where something
-/// can be said of it.
+/// `input_NAME`. A target that is not corrected has no pose and no joints to command, and an error only if it is known.
 [[nodiscard]] std::string corrections_csv(const TargetFile& file, const Corrections& corrections);
 [[nodiscard]] nlohmann::ordered_json corrections_json(const TargetFile& file, const Corrections& corrections);
 /// `12 targets: 10 ok, 2 unreachable`

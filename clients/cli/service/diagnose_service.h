@@ -27,7 +27,7 @@ void say(const std::string& text, const DiagnoseArguments& arguments);
                                      const DiagnoseArguments& arguments);
 
 /// Has a service diagnose one of its batches (`batch` names it; empty: the newest) or the file `batch`, waits, and
-/// writes what it found. Refuses when what was found was to be put in force and is not.
+/// writes what it found. Refuses if the result was to be put in force and was not.
 [[nodiscard]] Status diagnose_at_service(const DiagnoseArguments& arguments);
 
 }  // namespace trammel::cli

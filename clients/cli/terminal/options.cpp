@@ -47,7 +47,7 @@ Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& opti
 }
 
 void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
-  // Taken for an unsigned number, -1 would silently be the largest.
+  // Read as an unsigned number, -1 would silently become the largest one.
   const CLI::Validator whole(
       [](const std::string& text) {
         const bool digits = !text.empty() &&

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 bool is_standard_output(const std::string& path) { return path == "-" || path == "/dev/stdout"; }
 
-/// Whether writing one would change the other; a device is no file that anybody reads again.
+/// Whether writing one would change the other. Devices do not count: nothing is read back from them.
 bool same_file(const std::string& a, const std::string& b) {
   if (is_standard_output(a) || is_standard_output(b)) return is_standard_output(a) && is_standard_output(b);
   std::error_code error;
@@ -26,7 +26,7 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
 }
 
-/// Whether this process has written a result there: a second one beside it would be nobody's JSON.
+/// Whether this process has written a result to standard output. A second one after it would not be valid JSON.
 bool& standard_output_is_taken() {
   static bool taken = false;
   return taken;

@@ -18,8 +18,8 @@ namespace trammel::cli {
 /// The members of an error that are known, and the whole sentence.
 [[nodiscard]] nlohmann::ordered_json error_json(const Error& error);
 
-/// A refusal as `{"error": {...}}` where the result for programs would have stood: on standard output, and only where
-/// no result stands there already. Files stay as they were.
+/// Writes a refusal as `{"error": {...}}` to standard output, if the JSON result would have gone there and none was
+/// written yet. Files stay as they were.
 void tell_refusal(const Error& error, const std::string& json_path);
 
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
@@ -32,13 +32,13 @@ struct NamedFile {
   std::string option, path;
 };
 
-/// The files of one command that belong together: looked at before the work, written after it, all or none.
+/// The output files of one command: checked before the work, written after it, all or none.
 class Outputs {
  public:
   /// An empty path is no output. `may_replace`: the input that it may be the new state of.
   void add(const std::string& option, const std::string& path, const std::string& may_replace = "");
-  /// Refuses as wrong usage two of them in one file or both on standard output, and one that is an input; as refused
-  /// data what cannot be written.
+  /// Refuses as wrong usage two outputs in one file or on standard output, and an output that is also an input. Refuses
+  /// as kRefused an output that cannot be written.
   [[nodiscard]] Status check(const std::vector<NamedFile>& inputs) const;
   /// The text of an output that was added; one that gets none is not written.
   void put(const std::string& option, std::string text);

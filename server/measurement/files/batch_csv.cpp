@@ -13,7 +13,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPositionLimitMm = 1e6;  // no tracker sees farther
+constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
 constexpr double kSigmaLimitMm = 1e3;
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};

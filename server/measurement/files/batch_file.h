@@ -4,7 +4,7 @@
 
 #include "server/measurement/measurement.h"
 
-/// Batches as other programs write them, and any of them.
+/// Batches in the formats of other programs, and recognising a format.
 namespace trammel {
 
 /// Reads the measurements of a RoboDK calibration or validation project, exported as CSV. Fields are separated by `;`,
@@ -31,19 +31,20 @@ namespace trammel {
 /// The TCP is kept in columns `tcp_...`. Where it is not the same in every row, each one is a tool of its own: `tcp-1`,
 /// `tcp-2`, ... in the order of their first rows, to be named so in the cell file.
 ///
-/// Refuses, naming `where`, row, column, value and limit, what parse_batch_csv() refuses, and angles in radians beyond
-/// a whole turn: they are degrees.
+/// Refuses, naming `where`, row, column, value and limit, what parse_batch_csv() refuses, and angles of more than a
+/// whole turn in a column of radians: they must be degrees.
 [[nodiscard]] Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_robodk_csv(const std::string& path);
 
 enum class BatchKind { kTrammel, kRoboDk, kPoints };
 
-/// What the text is, where that is beyond doubt, else kTrammel, whose reader says what it misses. RoboDK: a first line
-/// that names J1 or Joint 1 and on, without a column of ours (`q1_deg`, `x_mm`); or other names above rows of 12 or 18
-/// numbers. Points: what parse_points() reads without being told anything.
+/// The kind of the text if it is certain, else kTrammel: that reader reports what is missing. RoboDK: a first line that
+/// names J1 or Joint 1 and on, without a column of ours (`q1_deg`, `x_mm`); or other names above rows of 12 or 18
+/// numbers. Points: a text that parse_points() reads without options.
 [[nodiscard]] BatchKind recognise_batch(const std::string& text);
 
-/// A batch of whatever kind: parse_batch_csv() or parse_robodk_csv(). Refuses points, naming how they become a batch.
+/// Reads a batch of either kind, by parse_batch_csv() or parse_robodk_csv(). Refuses points; the error says how to make
+/// a batch of them.
 [[nodiscard]] Result<MeasurementBatch> parse_batch(const std::string& text, const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_batch(const std::string& path);
 

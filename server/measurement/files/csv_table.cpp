@@ -46,7 +46,7 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-/// Takes one record after the other off the text.
+/// Reads the text record by record.
 class Scanner {
  public:
   Scanner(std::string_view text, const std::string& where) : text_(text), where_(where) {
@@ -127,7 +127,7 @@ class Scanner {
   int line_ = 1;
 };
 
-/// What a number should have been, for people: values are shown as they stand, cut when long.
+/// A value as it is shown in messages: unchanged, but cut when long.
 std::string shown(const std::string& field) { return field.size() <= 40 ? field : field.substr(0, 40) + "..."; }
 
 }  // namespace

@@ -18,7 +18,8 @@ class CsvTable {
   /// Refuses a text without header, a column without a name or named twice, a row of another length than the header, an
   /// open quote, bytes that are not UTF-8.
   [[nodiscard]] static Result<CsvTable> parse(std::string_view text, std::string where);
-  /// What another reader took apart, for the same checks and the same messages. Refuses as parse() does.
+  /// A row that another reader has split. A table made of such rows has the same checks and messages. Refuses as
+  /// parse() does.
   struct Row {
     int line = 0;
     std::vector<std::string> fields;
@@ -31,9 +32,9 @@ class CsvTable {
   [[nodiscard]] int line(std::size_t row) const { return rows_[row].line; }
 
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const;
-  /// Refuses a column that is not there, naming those that are.
+  /// Refuses a column that is missing; the error lists the columns of the file.
   [[nodiscard]] Result<std::size_t> require(std::string_view column) const;
-  /// All of them, none of them (empty result), or refused.
+  /// The numbers of all `columns`; empty if the file has none of them. Refuses a part of them.
   [[nodiscard]] Result<std::vector<std::size_t>> all_or_none(const std::vector<std::string>& columns) const;
 
   [[nodiscard]] const std::string& field(std::size_t row, std::size_t column) const {
@@ -42,9 +43,9 @@ class CsvTable {
   /// Refuses what is not a finite number of magnitude <= `limit`.
   [[nodiscard]] Result<double> number(std::size_t row, std::size_t column, double limit = 1e12) const;
   [[nodiscard]] Result<int> integer(std::size_t row, std::size_t column, int lowest, int highest) const;
-  /// A unit quaternion from four columns w, x, y, z, as a rotation matrix; limit of its length's error 1e-3.
+  /// A rotation matrix from a unit quaternion in four columns w, x, y, z. Its length may differ from 1 by 1e-3.
   [[nodiscard]] Result<Eigen::Matrix3d> rotation(std::size_t row, const std::vector<std::size_t>& wxyz) const;
-  /// With the file and the line of the row.
+  /// An error with the file and the line of the row.
   template <typename... Args>
   [[nodiscard]] Failure refuse(std::size_t row, fmt::format_string<Args...> text, Args&&... args) const {
     return refused(text, std::forward<Args>(args)...).in(where_).at_row(line(row));
@@ -59,7 +60,7 @@ class CsvTable {
   std::vector<Row> rows_;
 };
 
-/// The field as CsvTable reads it back: quoted where it must be.
+/// The field as it is written to a file, in quotes if necessary.
 [[nodiscard]] std::string csv_field(std::string_view text);
 /// The shortest decimal form that keeps 12 digits.
 [[nodiscard]] std::string csv_number(double value);

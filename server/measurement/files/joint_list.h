@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// A pose that is to be, or was, commanded: no measurement yet.
+/// A commanded pose without a measurement.
 struct CommandedPose {
   std::string pose_id;
   PoseContext context;
@@ -23,15 +23,15 @@ struct JointList {
   std::vector<CommandedPose> poses;
 };
 
-/// Reads a CSV with `q1_deg` ... `qn_deg` and any of the optional columns of a batch; all others are passed over.
+/// Reads a CSV with `q1_deg` ... `qn_deg` and any of the optional columns of a batch; other columns are ignored.
 /// Refuses as parse_batch_csv() does.
 [[nodiscard]] Result<JointList> parse_joint_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<JointList> read_joint_csv(const std::string& path);
 /// The list as parse_joint_csv() reads it; directions, tools and payloads only where a pose has them.
 [[nodiscard]] std::string to_csv(const JointList& list);
 
-/// The list made ready for `cell`, as batches are: joints counted and held against the robot's limits, tool and payload
-/// ids resolved.
+/// Checks the list against `cell`, as batches are checked: number of joints, joint limits, tool and payload. Resolves
+/// tool and payload ids.
 [[nodiscard]] Result<JointList> check_against_cell(JointList list, const Cell& cell);
 
 }  // namespace trammel

@@ -14,7 +14,7 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPositionLimit = 1e3;   // m, no tracker sees farther
+constexpr double kPositionLimit = 1e3;   // m, beyond the range of any tracker
 constexpr double kUncertaintyLimit = 1;  // m
 constexpr double kAngleLimit = 360;      // deg
 constexpr double kInch = 0.0254;         // m

@@ -8,7 +8,7 @@
 #include "server/measurement/files/point_options.h"
 #include "server/measurement/measurement.h"
 
-/// Points and frames that a tracker's software exports: where things are, and not yet why.
+/// Points and frames that the software of a tracker exports: positions without the commanded joints.
 namespace trammel {
 
 struct NamedPoint {
@@ -61,9 +61,9 @@ struct PointList {
                                              const PointFileOptions& options = {});
 [[nodiscard]] Result<PointList> read_points(const std::string& path, const PointFileOptions& options = {});
 
-/// Measurements of commanded poses: each point is the measurement of the pose whose pose_id is its name. The order is
-/// that of the points, which is the order in time; poses that were not measured are left out. Refuses a point without a
-/// pose, a pose_id twice, and lists without a point.
+/// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the name of the point.
+/// The batch has the order of the points, which is the order in time. Poses without a point are left out. Refuses a
+/// point without a pose, a pose_id twice, and lists without a point.
 [[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded);
 
 }  // namespace trammel

@@ -6,10 +6,10 @@ namespace trammel {
 
 enum class LengthUnit { kMillimetre, kMetre, kInch };
 enum class Coordinates { kCartesian, kCylindrical, kSpherical };
-/// What the three numbers behind the coordinates are.
+/// The meaning of the three numbers after the coordinates.
 enum class BehindCoordinates { kUncertainties, kFixedXyz, kEulerZyx };
 
-/// What a file may leave unsaid. A file that says otherwise is refused.
+/// Facts that a file may leave out. A file that contradicts them is refused.
 struct PointFileOptions {
   std::optional<LengthUnit> unit;          ///< else what the file says, else mm
   std::optional<Coordinates> coordinates;  ///< else what the file says, else cartesian

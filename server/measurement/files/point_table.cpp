@@ -91,7 +91,7 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
   return state(statements.behind, *behind, where, "columns behind the coordinates");
 }
 
-/// Our name of a column, for what other programs call it; empty for one that is passed over.
+/// Our name for a column of another program; empty for a column that is ignored.
 std::string known_column(const std::string& name) {
   static const std::map<std::string, std::string> kNames = {
       {"name", "name"},       {"point", "name"}, {"pointname", "name"}, {"target", "name"},
@@ -115,9 +115,9 @@ std::optional<Coordinates> coordinates_of(const std::vector<std::string>& column
   return std::nullopt;
 }
 
-/// A header line taken apart; `columns` is empty when it is none.
+/// A parsed header line; `columns` is empty if the line is no header.
 struct Header {
-  std::vector<std::string> columns;  // our names; a column that is passed over has its place as a name
+  std::vector<std::string> columns;  // our names; an ignored column has its position as a name
   std::vector<std::string> units;
 };
 
@@ -155,7 +155,7 @@ Status read_header_units(const Header& header, const std::string& where, int lin
   return {};
 }
 
-/// Takes time stamps and empty fields off the end.
+/// Removes time stamps and empty fields from the end.
 void drop_time_stamp(std::vector<std::string>& fields) {
   static const std::regex kStamp(R"(.*[/:].*|[AaPp]\.?[Mm]\.?|\d{4}-\d{2}-\d{2}.*)");
   while (fields.size() > kLeastFields && (fields.back().empty() || std::regex_match(fields.back(), kStamp))) {

@@ -7,10 +7,10 @@
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/point_options.h"
 
-/// The layout of a list of points, found out.
+/// Finds the layout of a list of points.
 namespace trammel {
 
-/// What the file and the caller say about it.
+/// What the file and the caller state about the layout.
 struct Statements {
   std::optional<LengthUnit> unit;
   std::optional<Coordinates> coordinates;

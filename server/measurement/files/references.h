@@ -5,8 +5,8 @@
 
 #include "server/measurement/files/point_list.h"
 
-/// Localisation by reference reflectors: fixed points of the cell, measured when the world frame was made and again
-/// later, say whether the tracker has moved and where to. Thesis 3.2.4 (five of them).
+/// Localisation by reference reflectors. These are fixed points of the cell, measured when the world frame was set up
+/// and again later. They show whether the tracker has moved, and how far. Thesis 3.2.4 (five reflectors).
 namespace trammel {
 
 struct ReferenceOptions {
@@ -15,15 +15,15 @@ struct ReferenceOptions {
 };
 
 enum class ReferenceVerdict {
-  kFine,              ///< rms <= localise_above: measure on
-  kLocalise,          ///< the transform belongs to what is measured from now on
-  kLocaliseAndRepeat  ///< rms > repeat_above: the test before this check belongs repeated too
+  kFine,              ///< rms <= localise_above: go on measuring
+  kLocalise,          ///< apply the transform to what is measured from now on
+  kLocaliseAndRepeat  ///< rms > repeat_above: also repeat the test before this check
 };
 
 struct ReferenceResidual {
   std::string name;
   Vector3 difference_W = Vector3::Zero();  ///< measured - reference, as measured, m
-  Vector3 remaining_W = Vector3::Zero();   ///< what the transform leaves of it, m
+  Vector3 remaining_W = Vector3::Zero();   ///< residual after the transform, m
 };
 
 struct ReferenceCheck {
@@ -40,13 +40,13 @@ struct ReferenceCheck {
   std::vector<std::string> not_measured;     ///< references that the new measurement lacks
 };
 
-/// The verdict takes both measurements to be from the same station. Refuses fewer than 3 reflectors in both, reflectors
-/// on a line, a measured reflector that no reference is named like, and limits that are not 0 < localise <= repeat.
+/// Assumes that both measurements are from the same station. Refuses fewer than 3 common reflectors, reflectors on a
+/// line, a measured reflector without a reference of that name, and limits that are not 0 < localise <= repeat.
 [[nodiscard]] Result<ReferenceCheck> check_references(const PointList& references, const PointList& measured,
                                                       const ReferenceOptions& options = {});
 
-/// The batch in the world frame of the references: positions and orientations moved by `X_WV`, source text written
-/// anew.
+/// The batch in the world frame of the references: positions and orientations are transformed by `X_WV`, and
+/// source_text is written anew.
 [[nodiscard]] MeasurementBatch localised(MeasurementBatch batch, const Pose& X_WV);
 
 }  // namespace trammel

@@ -24,7 +24,7 @@ constexpr double kInch = 0.0254;  // m
 
 enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kQuaternion };
 
-/// A column and what one of its units is in ours; `angle` says rad, else m.
+/// A column and the factor from its unit to ours: rad if `angle`, else m.
 struct ScaledColumn {
   std::size_t column = 0;
   double scale = 1;
@@ -263,7 +263,7 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
   });
 }
 
-/// Columns of the layouts by position: the TCP is set apart, and kept.
+/// The columns of the layouts by position. The TCP columns are separate, and kept.
 Result<RoboDkColumns> find_columns(const RoboDkTable& parts) {
   Result<RoboDkColumns> columns = NamedColumns(parts.table).find();
   if (columns && parts.positional) columns->tcp = columns->extra;
@@ -321,7 +321,7 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   return measurement;
 }
 
-/// A tool for each TCP where there are several.
+/// Names a tool for each TCP if there are several.
 Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, MeasurementBatch& batch) {
   std::vector<std::vector<double>> tools;
   for (std::size_t row = 0; row < table.size(); ++row) {

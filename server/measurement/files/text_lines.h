@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-/// Taking apart the text files of other programs.
+/// Splits the text files of other programs into lines and fields.
 namespace trammel {
 
 struct TextLine {
@@ -28,7 +28,7 @@ struct TextLine {
 /// A column name as programs write it: `X (mm)`, `J1 [deg]`, `x_mm`.
 struct ColumnName {
   std::string name;  ///< lower case, letters and digits only
-  std::string unit;  ///< lower case, deg, rad and in so for all who write more; empty = not said
+  std::string unit;  ///< lower case; longer spellings become deg, rad and in; empty: none given
 };
 [[nodiscard]] ColumnName column_name(std::string_view field);
 
