@@ -69,19 +69,19 @@ struct Finding {
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };
 [[nodiscard]] std::string_view to_string(Verdict verdict);
 
-/// What is left and is not noise.
+/// What is left and is more than noise.
 struct Unexplained {
   bool present = false;
   std::vector<std::string> depends_on;  ///< `q4`, `time`, `torque`
   double rms = 0;                       ///< m
   double p_value = 1;
-  std::string hint = {};  ///< for people: what it may be all the same, or what would show more; may be empty
+  std::string hint = {};  ///< for people: what it may be, or what would show more; may be empty
 };
 
-/// What is left after all that was found, against what is stated for one measurement; per axis, SI.
+/// What is left after all that was found, beside what is stated for one measurement.
 struct LeftOver {
-  double left = 0, stated = 0;
-  double freedom = 0;  ///< degrees of it; 0 where nothing was measured
+  double left = 0, stated = 0;  ///< standard deviation per axis, m or rad
+  double freedom = 0;           ///< degrees of freedom; 0 where nothing was measured
 };
 
 /// A cause that this batch could not have shown, or only from some size on.
@@ -131,7 +131,7 @@ struct NextPoses {
   double stddev_random = 0;      ///< with as many random ones
 };
 
-/// How large an effect must be to be found in these poses: measured by hiding it in simulated noise.
+/// How large an effect must be to be named at these poses: measured by hiding it in simulated noise.
 struct Recovery {
   Cause cause;
   Eigen::VectorXd effect_rms;  ///< m, sizes hidden
@@ -149,8 +149,8 @@ struct Diagnosis {
   Verdict verdict = Verdict::kNothing;
   std::string sentence;   ///< the verdict for people, graded by the evidence
   int poses = 0;          ///< repeats merged
-  double noise = 0;       ///< m per axis: of a pose, whatever its reason: what no cause explains
-  double instrument = 0;  ///< m per axis: what the measurement itself is said to be good for
+  double noise = 0;       ///< m per axis: standard deviation of a pose that no cause explains, whatever its reason
+  double instrument = 0;  ///< m per axis: standard deviation that is stated for a measurement
   std::string noise_from;
   LeftOver left_position, left_rotation;  ///< m; rad
   ErrorFigures before, after;             ///< of all poses used, before and after extension

@@ -135,11 +135,11 @@ LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string
   return extended;
 }
 
-/// Residuals and derivatives of all poses, SI; the weights of the measurements alone.
+/// Residuals, derivatives and stated standard deviations of all poses, SI.
 void LinearProblem::differentiate(const Extended& extended) {
   const Index R = first_row_.back();
   residual_.resize(R);
-  weight_.resize(R);
+  sigma_.resize(R);
   by_joint_.resize(R, static_cast<Index>(extended.joints.size()));
   nuisance_.resize(R, static_cast<Index>(priors_.size()));
   for (Effect& effect : effects_) effect.columns.resize(R, static_cast<Index>(effect.parameters.size()));
@@ -164,10 +164,10 @@ void LinearProblem::measure(Index pose, const Pose& X_WT) {
   const Tracker& tracker = model_.cell->tracker;
   const Index row = first_row(pose);
   residual_.segment<3>(row) = m.p_W - X_WT.translation();
-  weight_.segment<3>(row).setConstant(m.sigma.value_or(tracker.sigma));
+  sigma_.segment<3>(row).setConstant(m.sigma.value_or(tracker.sigma));
   if (!m.R_WT) return;
   residual_.segment<3>(row + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose());
-  weight_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
+  sigma_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
 }
 
 /// From what was measured to rows of unit variance: adds to every standard deviation what is left beyond it, and
@@ -179,9 +179,10 @@ void LinearProblem::whiten() {
   }
   const VectorXd scales = scales_of(priors_);
   // The noise is what no parameter explains, whether the model stands at its best fit already or not.
-  const Leftover left = leftover_of(residual_, nuisance_, scales, weight_);
-  const double surplus = robust_surplus(left.residual(position), weight_(position), left.share);
-  const double surplus_rotation = robust_surplus(left.residual(rotation), weight_(rotation), left.share);
+  const Leftover left = leftover_of(residual_, nuisance_, scales, sigma_);
+  const double surplus = robust_surplus(left.residual(position), sigma_(position), left.share);
+  const double surplus_rotation = robust_surplus(left.residual(rotation), sigma_(rotation), left.share);
+  weight_.resize(sigma_.size());
   position_ = weigh(position, surplus, left.share);
   rotation_ = weigh(rotation, surplus_rotation, left.share);
 
@@ -193,14 +194,15 @@ void LinearProblem::whiten() {
   }
 }
 
-/// Turns the standard deviations of `rows` into weights, with `surplus` (SI) on top of each. `share`: of freedom.
+/// Weighs `rows` by their stated standard deviation with `surplus` (SI) on top. `share`: of freedom that the fit
+/// leaves.
 LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, double surplus, double share) {
   if (rows.empty()) return {};
   const auto count = static_cast<double>(rows.size());
-  const double stated = weight_(rows).norm() / std::sqrt(count);
+  const double stated = sigma_(rows).norm() / std::sqrt(count);
   double sum = 0;
   for (const Index row : rows) {
-    const double sigma = std::hypot(weight_(row), surplus);
+    const double sigma = std::hypot(sigma_(row), surplus);
     sum += sigma * sigma;
     weight_(row) = 1 / sigma;
   }

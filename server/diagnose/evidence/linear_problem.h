@@ -72,7 +72,9 @@ class LinearProblem {
   const MeasurementBatch* batch_;
   std::vector<Parameter> priors_;
   std::vector<Eigen::Index> first_row_;
-  Eigen::VectorXd residual_, weight_;
+  Eigen::VectorXd residual_;
+  Eigen::VectorXd sigma_;   // as stated, m and rad
+  Eigen::VectorXd weight_;  // 1 / standard deviation with what is left beyond the stated one
   Eigen::MatrixXd nuisance_, by_joint_;
   std::vector<Effect> effects_;
   Spread position_, rotation_;

@@ -57,6 +57,18 @@ VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>
   return left;
 }
 
+VectorXd Folds::rest_beside(const Background& background, const VectorXd& keep, const MatrixXd& columns,
+                            const VectorXd& data) const {
+  const VectorXd known = keep.cwiseProduct(data);
+  if (columns.cols() == 0) return data - columns_ * background.estimate(known);
+  const MatrixXd kept = keep.asDiagonal() * columns;
+  const MatrixXd information =
+      kept.transpose() * background.project(kept) + MatrixXd::Identity(columns.cols(), columns.cols());
+  const VectorXd numbers = information.llt().solve(kept.transpose() * background.project(known));
+  const VectorXd rest = known - kept * numbers;
+  return data - columns * numbers - columns_ * background.estimate(rest);
+}
+
 Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<FamilyPtr>& families, const Chance& chance,
                                      const std::function<bool(std::size_t)>& admitted) const {
   Gain gain;
@@ -65,22 +77,10 @@ Folds::Gain Folds::gain_of_selection(const VectorXd& data, const std::vector<Fam
     const VectorXd keep = ones_without(data.size(), held);
     const Background background(keep.asDiagonal() * columns_, information_without(fold));
     const Scan seen = scan(families, {background, &keep}, data, chance, admitted);
-    const VectorXd known = keep.cwiseProduct(data);
-    const VectorXd left = data - columns_ * background.estimate(known);
-    gain.before += VectorXd(left(held)).squaredNorm();
-    const auto chosen = seen.strongest([](std::size_t) { return true; });
-    if (!chosen) {
-      gain.after += VectorXd(left(held)).squaredNorm();
-      continue;
-    }
-    // Beside the fold's background the chosen columns are fitted to what it leaves; the background follows.
-    const MatrixXd C = families[*chosen]->columns(seen.best[*chosen]);
-    const MatrixXd kept = keep.asDiagonal() * C;
-    const MatrixXd information = kept.transpose() * background.project(kept) + MatrixXd::Identity(C.cols(), C.cols());
-    const VectorXd numbers = information.llt().solve(kept.transpose() * background.project(known));
-    const VectorXd rest = known - kept * numbers;
-    const VectorXd after = data - C * numbers - columns_ * background.estimate(rest);
-    gain.after += VectorXd(after(held)).squaredNorm();
+    const auto best = seen.strongest([](std::size_t) { return true; });
+    const MatrixXd chosen = best ? families[*best]->columns(seen.best[*best]) : MatrixXd(data.size(), 0);
+    gain.before += VectorXd(rest_beside(background, keep, MatrixXd(data.size(), 0), data)(held)).squaredNorm();
+    gain.after += VectorXd(rest_beside(background, keep, chosen, data)(held)).squaredNorm();
   }
   return gain;
 }

@@ -16,12 +16,12 @@ class Folds {
 
   [[nodiscard]] std::size_t count() const { return held_.size(); }
 
-  /// R: every row less what the other folds' poses say of it by the columns in `chosen` (empty: all).
+  /// R: every row of `data` less what the poses of the other folds say of it by the columns in `chosen` (empty: all).
   [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data,
                                                   const std::vector<Eigen::Index>& chosen = {}) const;
 
-  /// Sum of squares of the held-out rows, without and with the best of `families` as each fold by itself chooses it (of
-  /// those `admitted`).
+  /// Sum of squares of the held-out rows: without any family, and with the best one of those `admitted`, which every
+  /// fold chooses by itself.
   struct Gain {
     double before = 0, after = 0;
   };
@@ -30,6 +30,10 @@ class Folds {
 
  private:
   [[nodiscard]] Eigen::MatrixXd information_without(std::size_t fold) const;
+  /// R: `data` less what the rows that `keep` is 1 for say of it by the background and by `columns` beside it. First
+  /// the columns are fitted to what the background leaves, then the background to the rest.
+  [[nodiscard]] Eigen::VectorXd rest_beside(const Background& background, const Eigen::VectorXd& keep,
+                                            const Eigen::MatrixXd& columns, const Eigen::VectorXd& data) const;
 
   Eigen::MatrixXd columns_;
   std::vector<std::vector<Eigen::Index>> held_;  // rows
