@@ -355,6 +355,41 @@ void find_in_code(const SourceTree& tree, const std::regex& pattern, const std::
   }
 }
 
+/// The spellings of the causes that ship, as their list has them.
+std::vector<std::string> shipped_causes(const SourceTree& tree) {
+  static const std::regex kLine(R"(\bCAUSE\((\w+)\))");
+  std::vector<std::string> causes;
+  const auto list = tree.find("server/error_sources/shipped_causes.h");
+  if (list == tree.end()) return causes;
+  for (std::sregex_iterator one(list->second.begin(), list->second.end(), kLine), end; one != end; ++one)
+    if ((*one)[1] != "CAUSE") causes.push_back((*one)[1]);
+  return causes;
+}
+
+/// Complains of whoever asks for a cause by its spelling instead of asking its record: by a comparison, by the
+/// beginning or end of a text, or by a table with a spelling for a key.
+Complaints check_causes(const SourceTree& tree) {
+  std::string any;
+  for (const std::string& cause : shipped_causes(tree)) any += (any.empty() ? "" : "|") + cause;
+  Complaints complaints;
+  if (any.empty()) return complaints;
+  const std::string spelling = "\"(" + any + ")[:@_]?\"";
+  const std::regex asks("[=!]= *" + spelling + "|" + spelling +
+                        " *[=!]=|(starts_with|ends_with|contains|find|count|compare)\\(" + spelling + "|(^|[{,]) *\\{" +
+                        spelling + ", \"");
+  for (const auto& [path, text] : tree) {
+    const bool is_of_server = is_under(path, "server") && !is_under(path, "server/error_sources");
+    if (!is_source(path) || !(is_of_server || is_under(path, "clients"))) continue;
+    std::istringstream lines(text);
+    std::string line;
+    for (int number = 1; std::getline(lines, line); ++number) {
+      if (std::regex_search(line, asks))
+        complaints.push_back(path + ":" + std::to_string(number) + ": asks for a cause by its spelling");
+    }
+  }
+  return complaints;
+}
+
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
   static const std::regex kMayStart(R"(^server/main\.cpp$|^(server/trainer|server/dds|clients/session)/.*)");
@@ -439,6 +474,12 @@ TEST(Tidy, NobodyLooksBehindADoor) {
 TEST(Tidy, LibrariesStayInTheFoldersThatOwnThem) { EXPECT_EQ(shown(check_reserved_libraries(read_source_tree())), ""); }
 
 TEST(Tidy, NothingIncludesItselfByWayOfOthers) { EXPECT_EQ(shown(check_circles(read_source_tree())), ""); }
+
+TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
+  const SourceTree tree = read_source_tree();
+  EXPECT_GT(shipped_causes(tree).size(), 15u);
+  EXPECT_EQ(shown(check_causes(tree)), "");
+}
 
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
@@ -593,6 +634,20 @@ TEST(TidyChecks, FindCirclesOfSubfoldersButLetARoomAndItsSubfoldersMeet) {
                                  {"server/a/y/c.h", include("server/a/x/d.h")},
                                  {"server/a/x/d.h", ""}})),
             "server/a/x: includes itself by way of others\nserver/a/y: includes itself by way of others\n");
+}
+
+TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
+  const std::string list = "#define CAUSES(CAUSE) \\\n  CAUSE(tool) \\\n  CAUSE(joint_map)\n";
+  const auto complaints = [&](const std::string& path, const std::string& line) {
+    return check_causes({{"server/error_sources/shipped_causes.h", list}, {path, line}}).size();
+  };
+  EXPECT_EQ(complaints("server/plan/a.cpp", "if (cause == \"tool\") return;"), 1u);
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (\"joint_map\" != cause) return;"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "name.starts_with(\"joint_map:\")"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "contains(\"tool\")"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "{\"joint_map\", \"a map of a joint\"},"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(\"tool\");"), 0u);
+  EXPECT_EQ(complaints("server/error_sources/tool.cpp", "if (cause == \"tool\") return;"), 0u);
 }
 
 TEST(TidyChecks, FindThreadsInCodeAndNotInComments) {

@@ -10,6 +10,7 @@
 
 namespace trammel {
 
+using causes::Part;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -23,9 +24,9 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 /// Tools, or payloads, of the cell, in the order in which a source has parameters for each.
 std::vector<std::string> owners(const ErrorSource& source, const Cell& cell) {
   std::vector<std::string> ids;
-  if (source.name() == "tool") {
+  if (source.cause().part == Part::kTool) {
     for (const auto& [id, X_FT] : cell.tools) ids.push_back(id);
-  } else if (source.name() == "payload") {
+  } else if (source.cause().part == Part::kPayload) {
     for (const auto& [id, payload] : cell.payloads) ids.push_back(id);
   }
   return ids;
@@ -90,7 +91,7 @@ std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<st
     const std::vector<std::string> ids = owners(*source, *model.cell);
     for (std::size_t k = 0; k < count; ++k) {
       const bool here =
-          ids.empty() || (source->name() == "tool" ? tools : payloads).contains(ids[k * ids.size() / count]);
+          ids.empty() || (source->cause().part == Part::kTool ? tools : payloads).contains(ids[k * ids.size() / count]);
       chosen.push_back(here && contains(names, source->name()));
     }
   }
@@ -215,13 +216,13 @@ Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const 
     refit.anew.push_back(at);
     problem.model.values(at) = parameters[k].prior;
   }
-  if (contains(names, "tool")) {
+  if (corrects(names, Part::kTool)) {
     for (const Measurement& m : batch.measurements) {
       if (const auto& X_FT = cell->tools.at(m.context.tool)) problem.model.tools[m.context.tool] = *X_FT;
     }
   }
-  if (Status located =
-          locate_refitted_frames(before, batch, contains(names, "base"), contains(names, "tool"), problem.model);
+  if (Status located = locate_refitted_frames(before, batch, corrects(names, Part::kBase), corrects(names, Part::kTool),
+                                              problem.model);
       !located) {
     return Failure(located.error()).in("batch " + batch.id);
   }

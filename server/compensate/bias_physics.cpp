@@ -9,12 +9,10 @@ namespace trammel {
 
 namespace {
 
-/// `compliance` has three forms; any of them will do.
+/// In any of its forms.
 bool has_source(const PhysicalModel& physics, const std::string& name) {
-  return std::any_of(physics.sources.begin(), physics.sources.end(), [&](const ErrorSourcePtr& source) {
-    const std::string cause = source->name().substr(0, source->name().find_first_of(":@"));
-    return cause == name || (name == "compliance" && cause.starts_with("compliance_"));
-  });
+  return std::any_of(physics.sources.begin(), physics.sources.end(),
+                     [&](const ErrorSourcePtr& source) { return &source->cause() == find_cause(name); });
 }
 
 ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
@@ -26,7 +24,7 @@ ArmState served_arm(const PhysicalModel& physics, const std::string& tool) {
 }
 
 PhysicalModel with_standard_sources(PhysicalModel physics) {
-  for (const std::string& name : with_unknown_tool({"base", "geometry", "compliance"}, *physics.cell)) {
+  for (const std::string& name : with_unknown_tool(standard_sources(), *physics.cell)) {
     if (has_source(physics, name)) continue;
     Result<ErrorSourcePtr> source = make_error_source(name, *physics.cell);
     TRAMMEL_CHECK(source.has_value());

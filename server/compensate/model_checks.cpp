@@ -88,9 +88,10 @@ Status check_bias(const BiasState& bias) {
 
 /// Where a bias was learned that was kept since: with all the standard sources, which it was told of.
 Status check_origin(const CompensatedModel::Parts::BiasOrigin& origin, Eigen::Index P) {
-  for (const std::string_view name : {"base", "geometry", "compliance"}) {
+  for (const std::string& name : standard_sources()) {
     const auto& sources = origin.physics.sources;
-    if (std::none_of(sources.begin(), sources.end(), [&](const auto& one) { return one->name().starts_with(name); }))
+    if (std::none_of(sources.begin(), sources.end(),
+                     [&](const auto& one) { return &one->cause() == find_cause(name); }))
       return refused("model: the physics that its bias was learned beside has no {}", name);
   }
   Status fine = check_frames(origin.physics, "where its bias was learned, ");

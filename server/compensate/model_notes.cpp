@@ -52,8 +52,6 @@ Eigen::VectorXd effects(const CompensatedModel::Parts& parts) {
   return most;
 }
 
-bool is_compliance(const std::string& source) { return source.starts_with("compliance"); }
-
 bool carries_nothing(const CompensatedModel::Parts& parts) {
   const Cell& cell = *parts.physics.cell;
   const bool loaded = std::any_of(parts.trained_with.begin(), parts.trained_with.end(), [&](const auto& used) {
@@ -63,26 +61,36 @@ bool carries_nothing(const CompensatedModel::Parts& parts) {
   return !loaded && !cell.robot.has_link_masses();
 }
 
-/// What the level is without the compliance, for people.
-std::string so_it_is(const CompensatedModel::Parts& parts) {
-  std::string others;
+/// What the model is without a source that does nothing, for people.
+std::string so_it_is(const CompensatedModel::Parts& parts, const ErrorSource& idle) {
+  std::vector<std::string> others;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
-    if (!is_compliance(source->name())) others += (others.empty() ? "" : ",") + source->name();
+    if (source.get() != &idle) others.push_back(source->name());
   }
-  return others == "base,geometry" ? "so M3 is M2" : kAsWithout;
+  std::vector<std::string> all = others;
+  all.emplace_back(idle.cause().spelling);
+  return all == standard_sources() && others == *parse_level("M2") ? "so M3 is M2" : kAsWithout;
 }
 
-std::string idle_sentence(const CompensatedModel::Parts& parts, const std::string& source) {
-  const std::string name = is_compliance(source) ? "compliance" : source;
-  const std::string without = is_compliance(source) ? so_it_is(parts) : kAsWithout;
-  if (name == "payload" || name.starts_with("payload_changed")) {
-    return fmt::format("{} does nothing here: nothing gives way under a load (no compliance, no link_bending)", name);
+/// `no gearbox compliance, no link bending`
+std::string what_would_give_way() {
+  std::string text;
+  for (const CauseRecord* record : all_causes()) {
+    if (record->gives_way) text += fmt::format("{}no {}", text.empty() ? "" : ", ", record->plain_name);
   }
-  if ((is_compliance(source) || name.starts_with("link_bending")) && carries_nothing(parts)) {
+  return text;
+}
+
+std::string idle_sentence(const CompensatedModel::Parts& parts, const ErrorSource& source) {
+  const CauseRecord& cause = source.cause();
+  const std::string name = in_words(source.name());
+  if (cause.needs.payload && !cause.gives_way)
+    return fmt::format("{} does nothing here: nothing gives way under a load ({})", name, what_would_give_way());
+  if (cause.gives_way && carries_nothing(parts)) {
     return fmt::format(
         "{} does nothing here: neither link masses nor a payload with a mass are given, {}; give payloads: {{NAME: "
         "{{mass_kg: ..., cog_mm: [x, y, z]}}}} in the cell file",
-        name, without);
+        name, so_it_is(parts, source));
   }
   return fmt::format("{} does nothing here: at these poses it has nothing to act on", name);
 }
@@ -93,8 +101,7 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<std::str
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    if (count > 0 && effect.segment(first, count).maxCoeff() < kNothing)
-      notes.push_back(idle_sentence(parts, source->name()));
+    if (count > 0 && effect.segment(first, count).maxCoeff() < kNothing) notes.push_back(idle_sentence(parts, *source));
     first += count;
   }
 }

@@ -1,7 +1,5 @@
 #include "server/diagnose/diagnosis.h"
 
-#include "server/error_sources/catalogue.h"
-
 namespace trammel {
 
 std::string to_string(const Cause& cause) {
@@ -9,37 +7,31 @@ std::string to_string(const Cause& cause) {
   return cause.joint < 0 ? cause.cause : fmt::format("{}:{}", cause.cause, cause.joint + 1);
 }
 
-Cause cause_from(std::string_view spelling) {
-  const std::string_view name = spelling.substr(0, spelling.find(':'));
-  if (find_cause(name) == nullptr || name.size() == spelling.size()) return {std::string(spelling)};
-  Cause cause{std::string(name)};
-  const std::string rest(spelling.substr(name.size() + 1));
-  const bool is_joint = !rest.empty() && rest.find_first_not_of("0123456789") == std::string::npos;
-  if (is_joint) {
-    cause.joint = std::stoi(rest) - 1;
-  } else {
-    cause.parameter = rest;
-  }
+const CauseRecord& record_of(const Cause& cause) { return cause_spelled(cause.cause); }
+
+std::string kind_in_words(const Cause& cause) {
+  const CauseRecord* record = find_cause(cause.cause);
+  const std::string words = record != nullptr ? plain_name(*record) : cause.cause;
+  return words + (cause.parameter.empty() ? "" : fmt::format(" ({})", cause.parameter));
+}
+
+std::string in_words(const Cause& cause) {
+  const CauseRecord* record = find_cause(cause.cause);
+  std::string words = record != nullptr ? plain_name(*record, cause.joint) : to_string(cause);
+  if (record != nullptr && !cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
+  if (cause.pose_id.empty()) return words;
+  const bool begins = record != nullptr && record->lasting == causes::Lasting::kFromAPose;
+  return words + (begins ? fmt::format(" from pose {} on", cause.pose_id) : fmt::format(", pose {}", cause.pose_id));
+}
+
+Cause cause_at(const CauseRecord& record, int joint) {
+  Cause cause;
+  cause.cause = record.spelling;
+  cause.joint = joint;
   return cause;
 }
 
-namespace {
-
-/// Of the joint, or of any where it is -1.
-std::string named(const Cause& cause, int joint) {
-  const CauseRecord* record = find_cause(cause.cause);
-  std::string words = record != nullptr ? plain_name(*record, joint) : cause.cause;
-  if (!cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
-  return words;
-}
-
-}  // namespace
-
-std::string in_words(const Cause& cause) {
-  return named(cause, cause.joint) + (cause.pose_id.empty() ? "" : fmt::format(" at pose {}", cause.pose_id));
-}
-
-std::string kind_in_words(const Cause& cause) { return named(cause, -1); }
+Cause unknown_cause(int joint) { return cause_at(cause_spelled("unknown"), joint); }
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {

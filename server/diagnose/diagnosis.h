@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/error_sources/catalogue.h"
 
 /// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
 namespace trammel {
@@ -25,12 +26,17 @@ struct Cause {
 };
 /// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
-/// The cause that is spelled so; one that is not known has the spelling for its cause.
-[[nodiscard]] Cause cause_from(std::string_view spelling);
-/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved at pose p40`. No order.
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`. What another
+/// version of the program calls a cause that this one does not know comes as it is spelled.
 [[nodiscard]] std::string in_words(const Cause& cause);
 /// The same without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
+/// What is known of it, wherever on the arm it is.
+[[nodiscard]] const CauseRecord& record_of(const Cause& cause);
+/// The cause of that record, of `joint` (0-based; -1: of no single one).
+[[nodiscard]] Cause cause_at(const CauseRecord& record, int joint = -1);
+/// Something is there, of `joint` (-1: of any), and no known cause is it.
+[[nodiscard]] Cause unknown_cause(int joint = -1);
 
 /// A number found, in the unit people read it in.
 struct Estimate {

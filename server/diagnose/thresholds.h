@@ -38,8 +38,6 @@ inline constexpr double kMostOutliers = 0.1;
 inline constexpr double kSmallestSpan = 0.035;
 /// K between the coldest and the warmest pose: less is one temperature, and nothing grows.
 inline constexpr double kSameTemperature = 0.5;
-/// Nat by which bent links must beat compliant joints while the model has neither: joints give way before links do.
-inline constexpr double kBendingFirst = 4;
 
 // Naming: which other causes explain a finding as well.
 

@@ -145,7 +145,8 @@ Triage Judge::told(const Tried& none) const {
       triage.learn = triage.learn && !tried_[k].alternative.harmful;
     }
     if (triage.cause.cause.empty() && !triage.outliers.empty()) {
-      triage.cause = {"outlier", -1, "", triage.outliers.front(), {}};
+      triage.cause = cause_at(first_searched_by(causes::SearchFamily::kPose));
+      triage.cause.pose_id = triage.outliers.front();
     }
     triage.verdict = triage.cause.cause.empty() ? TriageVerdict::kClean : TriageVerdict::kExplained;
   }
@@ -153,12 +154,10 @@ Triage Judge::told(const Tried& none) const {
   return triage;
 }
 
-std::string told_as(const Cause& cause) {
-  if (cause.cause == "tracker_moved") return "the tracker, or the robot's base, stands elsewhere";
-  if (cause.cause == "tool_changed") return "the tool is another one, or sits elsewhere on the flange";
-  if (cause.cause == "payload_changed") return "the payload is another one";
-  if (cause.cause == "joint_slip") return fmt::format("joint {} lost its zero", cause.joint + 1);
-  return "the arm itself has changed";
+std::string what_happened(const Cause& cause) {
+  const CauseRecord& record = record_of(cause);
+  if (!record.whole_batch) return plain_name(record);
+  return fmt::format(fmt::runtime(record.whole_batch->sentence), cause.joint + 1);
 }
 
 /// Of positions and, where they were judged, of orientations.
@@ -181,14 +180,15 @@ std::string Judge::sentence(const Triage& triage) const {
     case TriageVerdict::kExplained:
       break;
   }
-  if (triage.cause.cause == "outlier") {
+  if (record_of(triage.cause).search == causes::SearchFamily::kPose) {
     return fmt::format("as the model in force expects it but for single poses: {}", fmt::join(triage.outliers, ", "));
   }
   std::string text = triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
-  text += fmt::format("{} ({})", told_as(triage.cause), how_much(triage));
+  text += fmt::format("{} ({})", what_happened(triage.cause), how_much(triage));
   if (triage.tracker_elsewhere) text += ", and the tracker stands elsewhere";
   for (const Cause& other : triage.could_also_be) {
-    text += "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + told_as(other);
+    text +=
+        "; or " + (other.pose_id.empty() ? "" : fmt::format("from pose {} on ", other.pose_id)) + what_happened(other);
   }
   return text + bad;
 }

@@ -43,7 +43,7 @@ Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_s
 const CauseRecord& causes::base() {
   static const CauseRecord record = {
       .spelling = "base",
-      .plain_name = "a base that stands elsewhere",
+      .plain_name = "base position",
       .plain_name_of_joint = "",
       .scope = Scope::kCell,
       .lasting = Lasting::kAlways,

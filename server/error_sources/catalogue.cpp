@@ -70,6 +70,14 @@ const CauseRecord& cause_spelled(std::string_view spelling) {
   return *found;
 }
 
+const CauseRecord& first_searched_by(causes::SearchFamily family) {
+  const auto records = catalogue().records();
+  const auto found = std::find_if(records->begin(), records->end(),
+                                  [&](const CauseRecord* record) { return record->search == family; });
+  TRAMMEL_CHECK(found != records->end());
+  return **found;
+}
+
 namespace {
 
 /// Notes what is missing of one record.
@@ -114,11 +122,7 @@ class Missing {
     want(record_.scope != causes::Scope::kJoint || !record_.plain_name_of_joint.empty(), "plain_name_of_joint");
     const bool is_step = record_.lasting == causes::Lasting::kFromAPose;
     want(!is_step || record_.whole_batch.has_value(), "whole_batch: what a batch shows that it began before");
-    want(!is_step || std::any_of(record_.rivals.begin(), record_.rivals.end(),
-                                 [](const causes::Rival& rival) {
-                                   return rival.likeness == causes::Likeness::kFromTheFirstPose;
-                                 }),
-         "rivals: what it would be from the first pose on");
+    want(!is_step || whole_of(record_) != nullptr, "rivals: what it would be from the first pose on");
   }
 
   const CauseRecord& record_;

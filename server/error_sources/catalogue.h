@@ -19,6 +19,9 @@ namespace trammel {
 /// The same where it must be known: anything else is a bug.
 [[nodiscard]] const CauseRecord& cause_spelled(std::string_view spelling);
 
+/// The first that is looked for like this. A bug where there is none.
+[[nodiscard]] const CauseRecord& first_searched_by(causes::SearchFamily family);
+
 /// What a record does not say and ought to, in words for its author; empty where it is complete. Its rivals are held
 /// against the causes that are known.
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);

@@ -178,6 +178,12 @@ struct CauseRecord {
   bool (*forms_differ)(const Cell& cell) = nullptr;
 };
 
+/// What a step would be if it had begun before the first pose; null for what does not begin at a pose.
+[[nodiscard]] const causes::Rival* whole_of(const CauseRecord& record);
+
+/// The parameter that a rival of a cause of `joint` (0-based) means: `q3`.
+[[nodiscard]] std::string parameter_of(const causes::Rival& rival, int joint);
+
 /// `gear ripple in joint 3`, or `gear ripple` without a joint (0-based; -1).
 [[nodiscard]] std::string plain_name(const CauseRecord& record, int joint = -1);
 

@@ -141,8 +141,8 @@ bool carries_anything(const Cell& cell) { return !cell.payloads.empty() || cell.
 const CauseRecord& causes::compliance() {
   static const CauseRecord record = {
       .spelling = "compliance",
-      .plain_name = "gearboxes that give way",
-      .plain_name_of_joint = "a gearbox that gives way in joint {}",
+      .plain_name = "gearbox compliance",
+      .plain_name_of_joint = "gearbox compliance in joint {}",
       .scope = Scope::kArm,
       .lasting = Lasting::kAlways,
       .needs = {},

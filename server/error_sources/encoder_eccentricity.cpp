@@ -35,8 +35,8 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::m
 const CauseRecord& causes::encoder_eccentricity() {
   static const CauseRecord record = {
       .spelling = "encoder_eccentricity",
-      .plain_name = "an encoder off centre",
-      .plain_name_of_joint = "an encoder off centre in joint {}",
+      .plain_name = "off-centre encoder",
+      .plain_name_of_joint = "off-centre encoder in joint {}",
       .scope = Scope::kJoint,
       .lasting = Lasting::kAlways,
       .needs = {},

@@ -22,6 +22,7 @@ struct Parameter {
   double prior = 0;        ///< what it is believed to be before any data, SI
   double prior_scale = 1;  ///< how far from there it may reasonably be (one standard deviation), SI
   double lower = -std::numeric_limits<double>::infinity();  ///< physical bound, SI
+  bool is_place = false;  ///< says where an effect is (the order of an oscillation), not how large
 };
 
 /// One physical cause of error: its parameters and what they do to the arm. Immutable; thread-safe.

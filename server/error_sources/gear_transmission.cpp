@@ -22,7 +22,7 @@ class GearTransmission final : public ErrorSource {
     const double spread = 0.25 * 2 * kPi / range_;
     for (std::size_t k = 0; k < orders.size(); ++k) {
       const std::string which = fmt::format("{}{}", joint_ + 1, orders.size() > 1 ? fmt::format("_{}", k + 1) : "");
-      parameters_.push_back({"order" + which, "", 1, orders[k], spread, 0.0});
+      parameters_.push_back({"order" + which, "", 1, orders[k], spread, 0.0, true});
       parameters_.push_back(angle_parameter("gear_sin" + which, kAmplitudePrior));
       parameters_.push_back(angle_parameter("gear_cos" + which, kAmplitudePrior));
     }

@@ -65,8 +65,8 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
 const CauseRecord& causes::joint_map() {
   static const CauseRecord record = {
       .spelling = "joint_map",
-      .plain_name = "an angle that is off by a function of itself",
-      .plain_name_of_joint = "an angle that is off by a function of itself in joint {}",
+      .plain_name = "angle error map",
+      .plain_name_of_joint = "angle error map in joint {}",
       .scope = Scope::kJoint,
       .lasting = Lasting::kAlways,
       .needs = {},

@@ -33,8 +33,8 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::m
 const CauseRecord& causes::joint_slip() {
   static const CauseRecord record = {
       .spelling = "joint_slip",
-      .plain_name = "a lost joint zero",
-      .plain_name_of_joint = "a lost zero of joint {}",
+      .plain_name = "lost joint zero",
+      .plain_name_of_joint = "lost zero in joint {}",
       .scope = Scope::kJoint,
       .lasting = Lasting::kFromAPose,
       .needs = {},

@@ -96,7 +96,7 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
 const CauseRecord& causes::link_bending() {
   static const CauseRecord record = {
       .spelling = "link_bending",
-      .plain_name = "a link that bends",
+      .plain_name = "link bending",
       .plain_name_of_joint = "bending of link {}",
       .scope = Scope::kJoint,
       .lasting = Lasting::kAlways,

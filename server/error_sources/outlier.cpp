@@ -5,7 +5,7 @@ namespace trammel {
 const CauseRecord& causes::outlier() {
   static const CauseRecord record = {
       .spelling = "outlier",
-      .plain_name = "a single bad pose",
+      .plain_name = "single bad pose",
       .plain_name_of_joint = "",
       .scope = Scope::kPose,
       .lasting = Lasting::kOfTheSession,

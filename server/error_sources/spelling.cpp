@@ -112,6 +112,21 @@ bool are_forms_of_one(const std::string& source, const std::string& other) {
   return record != nullptr && record->forms.size() > 1 && record == find_cause(other);
 }
 
+std::string as_listed(const std::string& source, const std::vector<std::string>& list) {
+  const auto listed = std::find_if(list.begin(), list.end(), [&](const std::string& spec) {
+    const CauseRecord* record = find_cause(spec);
+    return record != nullptr && spec == record->spelling && are_forms_of_one(source, spec);
+  });
+  return listed == list.end() ? source : *listed;
+}
+
+bool corrects(const std::vector<std::string>& sources, causes::Part part) {
+  return std::any_of(sources.begin(), sources.end(), [&](const std::string& source) {
+    const CauseRecord* record = find_cause(source);
+    return record != nullptr && record->part == part;
+  });
+}
+
 namespace {
 
 /// What stands behind the cause: `:3`, `:d6`, `@40`.
@@ -156,6 +171,8 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   }
   return names;
 }
+
+std::vector<std::string> standard_sources() { return parse_level("M3").value(); }
 
 std::string level_of(const std::vector<std::string>& sources) {
   return sources.empty() ? "M0" : fmt::format("{}", fmt::join(sources, ","));

@@ -29,10 +29,18 @@ namespace trammel {
 [[nodiscard]] Result<std::vector<std::string>> parse_level(const std::string& level);
 /// Its inverse: what parse_level() reads as these sources; `M0` where there are none.
 [[nodiscard]] std::string level_of(const std::vector<std::string>& sources);
+/// The sources of level M3, which a bias is told of in any case.
+[[nodiscard]] std::vector<std::string> standard_sources();
 
 /// Whether both spellings are of one cause, whichever of its forms: `compliance` and `compliance_linear`; joints and
 /// what begins at a pose apart.
 [[nodiscard]] bool are_forms_of_one(const std::string& source, const std::string& other);
+
+/// `source` as `list` has it: by its cause where that is listed and `source` is one of its forms; else as it is.
+[[nodiscard]] std::string as_listed(const std::string& source, const std::vector<std::string>& list);
+
+/// Whether one of these sources corrects that part of the nominal cell.
+[[nodiscard]] bool corrects(const std::vector<std::string>& sources, causes::Part part);
 
 /// For people: `gear ripple in joint 3` for `gear_transmission:3@48`, `link geometry (d6)` for `geometry:d6`,
 /// `the tracker moved from row 40 on`. What no known cause is spelled like comes back as it is.

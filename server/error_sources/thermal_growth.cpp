@@ -48,7 +48,7 @@ Result<ErrorSourcePtr> make(const SourceSpec&, const Cell&) { return std::make_s
 const CauseRecord& causes::thermal_growth() {
   static const CauseRecord record = {
       .spelling = "thermal_growth",
-      .plain_name = "links that grow as they warm up",
+      .plain_name = "thermal growth",
       .plain_name_of_joint = "",
       .scope = Scope::kArm,
       .lasting = Lasting::kAlways,

@@ -28,7 +28,7 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::m
 const CauseRecord& causes::time_lag() {
   static const CauseRecord record = {
       .spelling = "time_lag",
-      .plain_name = "a time lag between robot and tracker",
+      .plain_name = "time lag between robot and tracker",
       .plain_name_of_joint = "",
       .scope = Scope::kSession,
       .lasting = Lasting::kAlways,

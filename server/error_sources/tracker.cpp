@@ -99,7 +99,7 @@ const CauseRecord& causes::tracker_moved() {
 const CauseRecord& causes::tracker_drift() {
   static const CauseRecord record = {
       .spelling = "tracker_drift",
-      .plain_name = "the tracker drifts",
+      .plain_name = "tracker drift",
       .plain_name_of_joint = "",
       .scope = Scope::kSession,
       .lasting = Lasting::kOfTheSession,

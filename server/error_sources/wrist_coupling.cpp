@@ -36,7 +36,7 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
 const CauseRecord& causes::wrist_coupling() {
   static const CauseRecord record = {
       .spelling = "wrist_coupling",
-      .plain_name = "wrist axes that drag one another along",
+      .plain_name = "wrist coupling",
       .plain_name_of_joint = "",
       .scope = Scope::kArm,
       .lasting = Lasting::kAlways,

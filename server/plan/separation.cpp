@@ -7,28 +7,6 @@
 
 namespace trammel {
 
-namespace {
-
-/// What makes a cause's effect differ from that of its imitators; the first whose cause is one of the two speaks.
-struct Remedy {
-  const char* cause;
-  const char* needs;
-};
-constexpr Remedy kRemedies[] = {
-    {"backlash", "approaching every pose from both sides (--bidirectional)"},
-    {"payload", "a second known payload, or a run without any"},
-    {"compliance", "a second known payload, or a run without any"},
-    {"link_bending", "a second known payload, or a run without any"},
-    {"thermal_growth", "a second temperature, recorded with every pose"},
-    {"tracker", "reference reflectors, and the time of every pose"},
-    {"joint_slip", "reference reflectors, and the time of every pose"},
-    {"time_lag", "other speeds, and the time of every pose"},
-    {"tool", "a second tool"},
-    {"base", "reference reflectors that fix where the base stands"},
-};
-
-}  // namespace
-
 Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell, const std::string& cause,
                                   const std::string& other) {
   const Result<ErrorSourcePtr> first = make_error_source(cause, *cell);
@@ -83,10 +61,13 @@ Separability separability(const CausePair& pair, const Eigen::MatrixXd& informat
 }
 
 std::string what_would_separate(const std::string& cause, const std::string& other) {
-  for (const Remedy& remedy : kRemedies) {
-    if (cause.starts_with(remedy.cause) || other.starts_with(remedy.cause)) return remedy.needs;
-  }
-  return "a wider range of joints, or another tool";
+  const auto remedy = [](const std::string& spelling) {
+    const CauseRecord* record = find_cause(spelling);
+    return record == nullptr ? causes::remedies::kWiderRange : record->told_apart_by;
+  };
+  const causes::Remedy one = remedy(cause);
+  const causes::Remedy another = remedy(other);
+  return std::string(one.rank <= another.rank ? one.text : another.text);
 }
 
 }  // namespace trammel

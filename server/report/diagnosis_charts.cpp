@@ -74,7 +74,7 @@ class Arm {
 ordered_json waterfall(const Diagnosis& diagnosis) {
   ordered_json names = ordered_json::array(), rms = ordered_json::array();
   for (const WaterfallStep& step : diagnosis.waterfall) {
-    names.push_back(in_words(cause_from(step.name)));
+    names.push_back(in_words(step.name));
     rms.push_back(tenth_of_um(step.rms));
   }
   return {{"names", names}, {"rms_um", rms}};
@@ -83,16 +83,17 @@ ordered_json waterfall(const Diagnosis& diagnosis) {
 /// What was found of a joint and shows in its periodogram. A line that stands out may be another joint's.
 std::string found_in(const Periodogram& lines, const std::vector<Finding>& findings) {
   std::vector<std::string> orders;
-  bool map = false;
+  std::string map;
   for (const Finding& finding : findings) {
     const Cause& cause = finding.cause;
     if (cause.joint != lines.joint) continue;
-    if (cause.cause == "gear_transmission" && cause.order) orders.push_back(fmt::format("{:.2f}", *cause.order));
-    if (cause.cause == "encoder_eccentricity") orders.emplace_back("1");
-    map = map || cause.cause == "joint_map";
+    const CauseRecord& record = record_of(cause);
+    if (cause.order) orders.push_back(fmt::format("{:.2f}", *cause.order));
+    if (record.order) orders.push_back(fmt::format("{:.0f}", *record.order));
+    if (record.search == causes::SearchFamily::kMap) map = plain_name(record);
   }
-  if (orders.empty()) return map ? "joint map" : "no oscillation found";
-  return fmt::format("{} a turn{}", fmt::join(orders, ", "), map ? ", joint map" : "");
+  if (orders.empty()) return map.empty() ? "no oscillation found" : map;
+  return fmt::format("{} a turn{}{}", fmt::join(orders, ", "), map.empty() ? "" : ", ", map);
 }
 
 /// Thinned so that every peak stays: of each stretch its highest point.

@@ -167,9 +167,10 @@ std::string provenance_rows(const CompensatedModel& model, const Evaluation& eva
 }
 
 HtmlRow source_row(const ErrorSource& source) {
-  return {.cells = {fmt::format("{} <span>{}</span>", html_text(source.name()), html_text(source.explanation()))},
-          .kind = "cause",
-          .last_spans = 5};
+  return {
+      .cells = {fmt::format("{} <span>{}</span>", html_text(in_words(source.name())), html_text(source.explanation()))},
+      .kind = "cause",
+      .last_spans = 5};
 }
 
 HtmlRow parameter_row(const IdentifiedParameter& identified) {

@@ -15,7 +15,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
-#include "server/error_sources/error_source.h"
+#include "server/error_sources/spelling.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/measurement.h"
 #include "server/measurement/velocity.h"
@@ -99,9 +99,7 @@ void append(MeasurementBatch& all, MeasurementBatch next) {
 std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force) {
   std::vector<std::string> level = cell.model.error_sources;
   const auto listed = [&](const std::string& name) {
-    return std::any_of(level.begin(), level.end(), [&](const std::string& spec) {
-      return name == spec || (spec == "compliance" && name.starts_with("compliance"));
-    });
+    return std::find(level.begin(), level.end(), as_listed(name, level)) != level.end();
   };
   std::vector<std::string> names;
   for (const ErrorSourcePtr& source : in_force.parts().physics.sources) names.push_back(source->name());

@@ -31,10 +31,10 @@ TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
     for (const char* form : {"compliance_linear", "compliance_first_order", "compliance_equilibrium"}) {
       const std::vector<std::string> notes = notes_of(model_of({"base", "geometry", form}, payloads));
       ASSERT_EQ(notes.size(), 1U) << form;
-      EXPECT_EQ(
-          notes.front(),
-          "compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 is M2; give "
-          "payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
+      EXPECT_EQ(notes.front(),
+                "gearbox compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 "
+                "is M2; give "
+                "payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
     }
   }
   EXPECT_TRUE(notes_of(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());
@@ -43,11 +43,13 @@ TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
 TEST(ModelNotes, EverySourceThatHasNothingToActOnIsNamed) {
   const std::vector<std::string> idle = notes_of(model_of({"base", "link_bending:2"}, kWeightless));
   ASSERT_EQ(idle.size(), 1U);
-  EXPECT_TRUE(idle.front().starts_with("link_bending:2 does nothing here: neither link masses nor a payload"))
+  EXPECT_TRUE(idle.front().starts_with("bending of link 2 does nothing here: neither link masses nor a payload"))
       << idle[0];
   const std::vector<std::string> stiff = notes_of(model_of({"base", "geometry", "payload"}, kHeavy));
   ASSERT_EQ(stiff.size(), 1U);
-  EXPECT_TRUE(stiff.front().starts_with("payload does nothing here: nothing gives way under a load")) << stiff[0];
+  EXPECT_TRUE(
+      stiff.front().starts_with("payload mass or centre of gravity does nothing here: nothing gives way under a load"))
+      << stiff[0];
 }
 
 TEST(ModelNotes, ASourceThatActsIsNot) {

@@ -88,7 +88,7 @@ TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
 TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRows) {
   const Calibrated calibrated(120);
   const LinearProblem problem = calibrated.problem();
-  const FamilyPtr gear = make_gear_family(problem, 2);
+  const FamilyPtr gear = make_order_family(problem, {"gear_transmission", 2, "", "", {}});
   ASSERT_NE(gear, nullptr);
   Best planted = gear->typical();
   planted.order = 37.3;

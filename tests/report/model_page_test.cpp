@@ -76,7 +76,8 @@ TEST_F(ModelPage, SaysThatComplianceWithoutALoadDoesNothing) {
   options.level = "M3";
   options.bias = "none";
   const CompensatedModel model = train(cell_, batch_, options).value();
-  EXPECT_TRUE(has(model_page(model, std::nullopt), "Compliance does nothing here: neither link masses nor a payload"));
+  EXPECT_TRUE(
+      has(model_page(model, std::nullopt), "Gearbox compliance does nothing here: neither link masses nor a payload"));
   EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "does nothing here"));
 }
 

@@ -43,14 +43,12 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   });
   if (!known) return {};
   const Triage seen = triage(from, *checked, with_known_tools(cell, from, refit));
-  const std::map<std::string, std::string> same = {
-      {"tracker_moved", "base"}, {"tool_changed", "tool"}, {"payload_changed", "payload"}};
-  const auto named = [&](const std::string& source) {
-    return std::find(refit.begin(), refit.end(), source) != refit.end();
+  const auto is_refitted = [&](const Cause& cause) {
+    const causes::Rival* whole = whole_of(record_of(cause));
+    return whole != nullptr && std::find(refit.begin(), refit.end(), whole->cause) != refit.end();
   };
-  const auto source = same.find(seen.cause.cause);
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
-                        source != same.end() && named(source->second) && (!seen.tracker_elsewhere || named("base"));
+                        is_refitted(seen.cause) && (!seen.tracker_elsewhere || corrects(refit, causes::Part::kBase));
   if (seen.learn || refitted) return {};
   return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id, seen.sentence,
                  fmt::join(refit, ","));

@@ -76,8 +76,9 @@ Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& 
 
 std::string separation_text(const PlanArguments& arguments, const Plan::Separation& separation) {
   const PlanOptions& options = arguments.options;
-  std::string text = fmt::format("{} beside {}: strength {:.3g}, of a Latin hypercube {:.3g}\n", options.cause,
-                                 options.other, separation.plan.strength, separation.latin_hypercube.strength);
+  std::string text =
+      fmt::format("{} beside {}: strength {:.3g}, of a Latin hypercube {:.3g}\n", in_words(options.cause),
+                  in_words(options.other), separation.plan.strength, separation.latin_hypercube.strength);
   for (std::size_t i = 0; i < separation.plan.parameters.size(); ++i) {
     const ParameterSeparation& after = separation.plan.parameters[i];
     const ParameterSeparation& before = separation.latin_hypercube.parameters[i];
@@ -88,8 +89,9 @@ std::string separation_text(const PlanArguments& arguments, const Plan::Separati
   const bool all = separation.hopeless.size() == separation.plan.parameters.size();
   return text +
          fmt::format("No pose of this cell separates {} from {} and the cell's other sources; {} would\n",
-                     all ? options.cause : fmt::format("{} of {}", fmt::join(separation.hopeless, ", "), options.cause),
-                     options.other, separation.needs);
+                     all ? in_words(options.cause)
+                         : fmt::format("{} of {}", fmt::join(separation.hopeless, ", "), in_words(options.cause)),
+                     in_words(options.other), separation.needs);
 }
 
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {

@@ -1,7 +1,9 @@
 #include "clients/cli/text/diagnose_text.h"
 
 #include "server/base/units.h"
+#include "server/diagnose/diagnosis.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/error_sources/spelling.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
 #include "server/report/shown_value.h"
@@ -22,7 +24,7 @@ Cause cause_of(const ordered_json& json) {
   return cause;
 }
 
-/// `gear ripple in joint 3`, `a single bad pose at pose p28`.
+/// `gear ripple in joint 3`, `single bad pose, pose p28`.
 std::string cause_text(const ordered_json& cause) { return in_words(cause_of(cause)); }
 
 std::string causes_text(const ordered_json& causes) {
@@ -184,13 +186,13 @@ std::string not_separable_lines(const ordered_json& diagnosis) {
   std::vector<Saying> sayings;
   for (const ordered_json& group : diagnosis.at("not_separable")) {
     std::vector<std::string> others;
-    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(in_words(cause_from(group[k].get<std::string>())));
+    for (std::size_t k = 1; k < group.size(); ++k) others.push_back(in_words(group[k].get<std::string>()));
     say(sayings, group.front(), fmt::format("{}", fmt::join(others, ", ")), ", ");
   }
   std::string text;
   for (const auto& [name, others] : sayings) {
     const std::string need = need_of(diagnosis.at("could_not_have_seen"), name);
-    text += fmt::format("  not told apart by these poses: {} from {}{}\n", in_words(cause_from(name)), others,
+    text += fmt::format("  not told apart by these poses: {} from {}{}\n", in_words(name), others,
                         need.empty() ? "" : fmt::format(" (needs {})", need));
   }
   return text;

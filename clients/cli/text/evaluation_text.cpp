@@ -124,7 +124,7 @@ std::string negative_play_text(const CompensatedModel::Parts& parts) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const std::size_t first = next;
     next += source->parameters().size();
-    if (!source->name().starts_with("backlash:") || next > parts.parameters.size()) continue;
+    if (source->cause().search != causes::SearchFamily::kPlay || next > parts.parameters.size()) continue;
     const IdentifiedParameter& play = parts.parameters[first];
     const double expanded = kExpanded * play.stddev;
     if (play.value + expanded >= 0) continue;

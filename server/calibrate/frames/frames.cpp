@@ -15,8 +15,8 @@ bool has_unknown_tool(const Cell& cell) {
 }
 
 std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell) {
-  const auto has = [&](const char* name) { return std::find(sources.begin(), sources.end(), name) != sources.end(); };
-  if (has_unknown_tool(cell) && has("geometry") && !has("tool")) sources.emplace_back("tool");
+  if (has_unknown_tool(cell) && corrects(sources, causes::Part::kLinks) && !corrects(sources, causes::Part::kTool))
+    sources.emplace_back("tool");
   return sources;
 }
 
@@ -92,7 +92,7 @@ Vector6 motion_values(const Pose& X) {
 void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    if (source->name() == "base") break;
+    if (source->cause().part == causes::Part::kBase) break;
     first += static_cast<Eigen::Index>(source->parameters().size());
   }
   if (first == model.values.size()) return;

@@ -86,7 +86,7 @@ Result<Pose> tool_on(const Pose& X_WB, const ToolPoses& tool) {
 void place_base(PhysicalModel& model, const Pose& X_WB) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    if (source->name() == "base") break;
+    if (source->cause().part == causes::Part::kBase) break;
     first += static_cast<Eigen::Index>(source->parameters().size());
   }
   model.X_WB = model.cell->X_WB.value_or(X_WB);

@@ -21,8 +21,8 @@ ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector
   ScaledParameters s{model.parameters(), Eigen::VectorXd(P), Eigen::VectorXd(P), Eigen::VectorXd(P), held};
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
-    const bool unknown = (source->name() == "base" && (!model.cell->X_WB || !held.empty())) ||
-                         (source->name() == "tool" && has_unknown_tool(*model.cell));
+    const bool unknown = (source->cause().part == causes::Part::kBase && (!model.cell->X_WB || !held.empty())) ||
+                         (source->cause().part == causes::Part::kTool && has_unknown_tool(*model.cell));
     for (std::size_t i = 0; i < source->parameters().size(); ++i, ++k) {
       Parameter& parameter = s.parameters[static_cast<std::size_t>(k)];
       s.typical(k) = parameter.prior_scale;

@@ -51,7 +51,7 @@ OwnEstimate own_estimate(const LinearProblem& problem, const std::string& source
   OwnEstimate own{VectorXd(change(places)), Eigen::MatrixXd(covariance(places, places))};
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Parameter& parameter = problem.nuisance_parameters()[static_cast<std::size_t>(places[k])];
-    if (parameter.name.starts_with("order")) {
+    if (parameter.is_place) {
       own.size(static_cast<Index>(k)) = 0;
     } else {
       own.size(static_cast<Index>(k)) += problem.model().values(places[k]) / parameter.prior_scale;

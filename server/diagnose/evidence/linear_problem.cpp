@@ -43,8 +43,7 @@ Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& mo
   Result<ErrorSourcePtr> source = make_error_source(spec, *model.cell);
   if (!source) return source;
   const bool there = std::any_of(model.sources.begin(), model.sources.end(), [&](const ErrorSourcePtr& own) {
-    return own->name() == (*source)->name() ||
-           (own->name().starts_with("compliance") && (*source)->name().starts_with("compliance"));
+    return are_forms_of_one(own->name(), (*source)->name());
   });
   if (there) return refused("error source {} is in the model", spec);
   return source;
@@ -108,9 +107,10 @@ LinearProblem::LinearProblem(const PhysicalModel& model, const MeasurementBatch&
 
 LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string>& further) {
   std::vector<ErrorSourcePtr> joints, wanted;
+  const CauseRecord& slip = first_searched_by(causes::SearchFamily::kZeroStep);
   for (int joint = 0; joint < model_.cell->robot.size(); ++joint) {
     // A joint that has slipped before the first pose is off everywhere: its column is the joint's own.
-    joints.push_back(*make_error_source(fmt::format("joint_slip:{}@1", joint + 1), *model_.cell));
+    joints.push_back(*make_error_source(fmt::format("{}:{}@1", slip.spelling, joint + 1), *model_.cell));
   }
   for (const std::string& spec : further) {
     Result<ErrorSourcePtr> source = possible(spec, model_);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
 
 #include "server/diagnose/thresholds.h"
 
@@ -10,6 +9,11 @@ namespace trammel::cause_search {
 
 namespace {
 
+using causes::Lasting;
+using causes::Numbers;
+using causes::Part;
+using causes::Scope;
+using causes::SearchFamily;
 using Eigen::Index;
 
 bool any(const MeasurementBatch& batch, const std::function<bool(const PoseContext&)>& has) {
@@ -44,77 +48,75 @@ double heaviest(const Cell& cell) {
   return mass;
 }
 
-/// Collects what can be looked for, and why the rest cannot.
-class Possible {
- public:
-  Possible(const Cell& cell, const MeasurementBatch& batch, std::vector<Unseen>* unseen)
-      : cell_(cell), batch_(batch), unseen_(unseen) {}
-
-  void take(const std::string& spec) {
-    if (make_error_source(spec, cell_)) sources.push_back(spec);
+/// What `batch` would have to record for a cause of `joint` (-1: of no single one) to show; empty where it does.
+std::string lacking(const ContextNeeds& needs, const Cell& cell, const MeasurementBatch& batch, int joint) {
+  if (needs.payload && heaviest(cell) <= 0) return "a payload in the cell file, with its mass";
+  if (needs.direction && !every(batch, [](const PoseContext& c) { return !c.direction.empty(); }))
+    return "the approach direction of every pose (dir columns)";
+  if (needs.direction && joint >= 0) {
+    const bool up = approached(batch, joint, 1);
+    const bool down = approached(batch, joint, -1);
+    if (up != down) return "approaching the poses from both sides of this joint";
+    if (!up) return "the approach direction of each pose (dir columns), both occurring";
   }
-  void leave(const Cause& cause, const std::string& needs) const {
-    if (unseen_ != nullptr) unseen_->push_back({cause, 0, {}, {}, needs});
-  }
-  void backlash(int joint) {
-    if (!every(batch_, [](const PoseContext& c) { return !c.direction.empty(); }))
-      return leave({"backlash", joint, "", "", {}}, "the approach direction of every pose (dir columns)");
-    const bool up = approached(batch_, joint, 1);
-    const bool down = approached(batch_, joint, -1);
-    if (up && down) return take(fmt::format("backlash:{}", joint + 1));
-    leave({"backlash", joint, "", "", {}}, up || down ? "approaching the poses from both sides of this joint"
-                                                      : "the approach direction of each pose (dir columns), both "
-                                                        "occurring");
-  }
-  void loads() {
-    if (heaviest(cell_) <= 0) {
-      return leave({"payload", -1, "", "", {}}, "a payload in the cell file, with its mass");
-    }
-    take("payload");
-    take("payload_changed@1");
-    for (int joint = 0; joint < cell_.robot.size(); ++joint) take(fmt::format("link_bending:{}", joint + 1));
-  }
-  void times() {
-    if (every(batch_, [](const PoseContext& c) { return c.time.has_value(); })) {
-      take("tracker_drift");
-    } else {
-      leave({"tracker_drift", -1, "", "", {}}, "the time of every pose (time_s)");
-    }
-    if (any(batch_, [](const PoseContext& c) { return c.velocity.has_value(); })) {
-      take("time_lag");
-    } else {
-      leave({"time_lag", -1, "", "", {}}, "a continuous path with times (time_s)");
-    }
-    if (every(batch_, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
-        warming(batch_) > thresholds::kSameTemperature) {
-      take("thermal_growth");
-    } else {
-      leave({"thermal_growth", -1, "", "", {}},
-            "the temperature of every pose (temperature_c), differing between poses");
-    }
-  }
-
-  std::vector<std::string> sources;
-
- private:
-  const Cell& cell_;
-  const MeasurementBatch& batch_;
-  std::vector<Unseen>* unseen_;
-};
-
-std::string cause_name(const std::string& source) {
-  const std::string name = source.substr(0, source.find_first_of(":@"));
-  return name.starts_with("compliance") ? "compliance" : name;
+  if (needs.time && !every(batch, [](const PoseContext& c) { return c.time.has_value(); }))
+    return "the time of every pose (time_s)";
+  if (needs.velocity && !any(batch, [](const PoseContext& c) { return c.velocity.has_value(); }))
+    return "a continuous path with times (time_s)";
+  if (needs.temperature && !(every(batch, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
+                             warming(batch) > thresholds::kSameTemperature))
+    return "the temperature of every pose (temperature_c), differing between poses";
+  return "";
 }
 
-/// Which causes have numbers of their own that may be lacking one by one.
-bool has_single_parameters(const std::string& cause) {
-  return cause == "geometry" || cause == "compliance" || cause == "payload" || cause == "wrist_coupling";
+/// Each cause with each joint that it may be of (-1 where it is of none), in the order of looking: causes of a joint
+/// that follow one another in the catalogue are taken joint by joint.
+template <typename Take>
+void for_each_cause(const Chain& robot, const Take& take) {
+  const std::vector<const CauseRecord*> all = all_causes();
+  const auto is_of_joint = [](const CauseRecord* record) { return record->scope == Scope::kJoint; };
+  for (auto first = all.begin(); first != all.end();) {
+    if (!is_of_joint(*first)) {
+      take(**first++, -1);
+      continue;
+    }
+    const auto last = std::find_if_not(first, all.end(), is_of_joint);
+    for (int joint = 0; joint < robot.size(); ++joint) {
+      for (auto one = first; one != last; ++one) {
+        if (!(*one)->of_turning_joint || robot.joint(joint).type == JointType::kRevolute) take(**one, joint);
+      }
+    }
+    first = last;
+  }
 }
 
-bool has_effect(const LinearProblem& problem, const std::string& source) {
-  return std::any_of(problem.effects().begin(), problem.effects().end(),
-                     [&](const Effect& effect) { return effect.source == source; });
+/// As a list of error sources spells it, without the pose at which it begins.
+std::string spelled(const CauseRecord& record, int joint) { return to_string(cause_at(record, joint)); }
+
+/// The same of one that acts at all poses.
+std::string always_acting(const CauseRecord& record, int joint) {
+  return spelled(record, joint) + (record.lasting == Lasting::kFromAPose ? "@1" : "");
+}
+
+/// Whether it is looked for by the derivative of an error source of its own.
+bool has_own_columns(const CauseRecord& record) {
+  return record.search == SearchFamily::kColumns || record.search == SearchFamily::kPlay ||
+         record.search == SearchFamily::kStep;
+}
+
+const Effect* effect_of(const LinearProblem& problem, std::string_view source) {
+  const auto found = std::find_if(problem.effects().begin(), problem.effects().end(),
+                                  [&](const Effect& effect) { return effect.source == source; });
+  return found == problem.effects().end() ? nullptr : &*found;
+}
+
+/// nat: how much less it is to be expected while a simpler cause is not in the model.
+double surprise_of(const CauseRecord& record, const LinearProblem& problem) {
+  double surprise = 0;
+  for (const causes::Rival& rival : record.rivals) {
+    if (rival.surprise > 0 && effect_of(problem, rival.cause) != nullptr) surprise += rival.surprise;
+  }
+  return surprise;
 }
 
 std::vector<Index> all_columns(const Effect& effect) {
@@ -123,75 +125,104 @@ std::vector<Index> all_columns(const Effect& effect) {
   return all;
 }
 
+/// Families of one cause of one joint.
+class Families {
+ public:
+  explicit Families(const LinearProblem& problem) : problem_(problem) {}
+
+  void add(FamilyPtr family) {
+    if (family) all_.push_back(std::move(family));
+  }
+  void add(const CauseRecord& record, int joint) {
+    const Cause cause = cause_at(record, joint);
+    switch (record.search) {
+      case SearchFamily::kNone:
+        return;
+      case SearchFamily::kColumns:
+      case SearchFamily::kPlay:
+        return add_fixed(record, cause);
+      case SearchFamily::kStep:
+        if (const Effect* effect = effect_of(problem_, always_acting(record, joint)))
+          add(make_step_family(problem_, *effect, cause, spelled(record, joint)));
+        return;
+      case SearchFamily::kZeroStep:
+        return add_zero_step(record, cause);
+      case SearchFamily::kOrder:
+        return add(make_order_family(problem_, cause));
+      case SearchFamily::kMap:
+        return add(make_joint_map_family(problem_, cause));
+      case SearchFamily::kPose:
+        return add(make_pose_family(problem_, cause));
+    }
+  }
+  std::vector<FamilyPtr> take() { return std::move(all_); }
+
+ private:
+  void add_fixed(const CauseRecord& record, const Cause& cause) {
+    const Effect* effect = effect_of(problem_, to_string(cause));
+    if (effect == nullptr) return;
+    add(make_fixed_family(problem_, *effect, cause, all_columns(*effect), surprise_of(record, problem_)));
+    if (record.numbers == Numbers::kTogether || effect->parameters.size() < 2) return;
+    for (std::size_t k = 0; k < effect->parameters.size(); ++k) {
+      Cause single = cause;
+      single.parameter = effect->parameters[k].name;
+      if (record.numbers == Numbers::kOneAJoint) single.joint = static_cast<int>(k);
+      add(make_fixed_family(problem_, *effect, single, {static_cast<Index>(k)}));
+    }
+  }
+  /// A joint's own column is there already, per radian.
+  void add_zero_step(const CauseRecord& record, const Cause& cause) {
+    const std::string spec = always_acting(record, cause.joint);
+    const Result<ErrorSourcePtr> source = make_error_source(spec, *problem_.model().cell);
+    if (!source) return;
+    const Effect slip{spec, {}, (*source)->parameters().front().prior_scale * problem_.by_joint().col(cause.joint)};
+    add(make_step_family(problem_, slip, cause, to_string(cause)));
+  }
+
+  const LinearProblem& problem_;
+  std::vector<FamilyPtr> all_;
+};
+
 }  // namespace
 
 std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBatch& batch,
                                            std::vector<Unseen>* unseen) {
-  Possible possible(cell, batch, unseen);
-  for (const char* spec :
-       {"base", "geometry", "tool", "compliance", "wrist_coupling", "tracker_moved@1", "tool_changed@1"}) {
-    possible.take(spec);
-  }
-  for (int joint = 0; joint < cell.robot.size(); ++joint) {
-    if (cell.robot.joint(joint).type == JointType::kRevolute)
-      possible.take(fmt::format("encoder_eccentricity:{}", joint + 1));
-    possible.backlash(joint);
-  }
-  possible.loads();
-  possible.times();
-  return possible.sources;
+  std::vector<std::string> sources;
+  for_each_cause(cell.robot, [&](const CauseRecord& record, int joint) {
+    if (!has_own_columns(record)) return;
+    const std::string lacks = lacking(record.needs, cell, batch, joint);
+    const std::string spec = always_acting(record, joint);
+    if (lacks.empty()) {
+      if (make_error_source(spec, cell)) sources.push_back(spec);
+      return;
+    }
+    // That nothing is carried is said once, of the payload itself.
+    const bool said_elsewhere = record.needs.payload && (record.part != Part::kPayload);
+    if (unseen != nullptr && !said_elsewhere) unseen->push_back({cause_at(record, joint), 0, {}, {}, lacks});
+  });
+  return sources;
 }
 
 std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
-  std::vector<FamilyPtr> families;
-  const auto add = [&](FamilyPtr family) {
-    if (family) families.push_back(std::move(family));
-  };
-  for (const Effect& effect : problem.effects()) {
-    Cause cause{cause_name(effect.source), -1, "", "", {}};
-    const std::size_t colon = effect.source.find(':');
-    if (colon != std::string::npos) cause.joint = std::stoi(effect.source.substr(colon + 1)) - 1;
-    if (const std::size_t at = effect.source.find('@'); at != std::string::npos) {
-      add(make_step_family(problem, effect, cause, effect.source.substr(0, at)));
-      continue;
-    }
-    const double surprise =
-        cause.cause == "link_bending" && has_effect(problem, "compliance") ? thresholds::kBendingFirst : 0;
-    add(make_fixed_family(problem, effect, cause, all_columns(effect), surprise));
-    if (!has_single_parameters(cause.cause) || effect.parameters.size() < 2) continue;
-    for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
-      Cause single = cause;
-      single.parameter = effect.parameters[k].name;
-      if (cause.cause == "compliance") single.joint = static_cast<int>(k);
-      add(make_fixed_family(problem, effect, single, {static_cast<Index>(k)}));
-    }
-  }
   const Chain& robot = problem.model().cell->robot;
+  Families families(problem);
+  for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add(record, joint); });
+  families.add(make_anonymous_family(problem, {}));
   for (int joint = 0; joint < robot.size(); ++joint) {
-    Effect slip{fmt::format("joint_slip:{}@1", joint + 1), {}, 2e-3 * problem.by_joint().col(joint)};
-    add(make_step_family(problem, slip, {"joint_slip", joint, "", "", {}}, fmt::format("joint_slip:{}", joint + 1)));
-    if (robot.joint(joint).type != JointType::kRevolute) continue;
-    add(make_gear_family(problem, joint));
-    add(make_joint_map_family(problem, joint));
+    families.add(make_anonymous_family(problem, {joint}));
+    for (int other = joint + 1; other < robot.size(); ++other)
+      families.add(make_anonymous_family(problem, {joint, other}));
   }
-  add(make_outlier_family(problem));
-  add(make_anonymous_family(problem, {}));
-  for (int joint = 0; joint < robot.size(); ++joint) {
-    add(make_anonymous_family(problem, {joint}));
-    for (int other = joint + 1; other < robot.size(); ++other) add(make_anonymous_family(problem, {joint, other}));
-  }
-  return families;
+  return families.take();
 }
 
 Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch) {
-  Cause cause{cause_name(source.name()), source.joint(), "", "", {}};
-  if (const std::size_t at = source.name().find('@');
-      at != std::string::npos &&
-      (cause.cause.ends_with("_changed") || cause.cause == "tracker_moved" || cause.cause == "joint_slip")) {
-    const int index = std::stoi(source.name().substr(at + 1)) - 1;
-    for (const Measurement& m : batch.measurements) {
-      if (m.context.index == index) cause.pose_id = m.pose_id;
-    }
+  Cause cause = cause_at(source.cause(), source.joint());
+  if (source.cause().lasting != Lasting::kFromAPose) return cause;
+  const std::string name = source.name();
+  const int index = std::stoi(name.substr(name.find('@') + 1)) - 1;
+  for (const Measurement& m : batch.measurements) {
+    if (m.context.index == index) cause.pose_id = m.pose_id;
   }
   return cause;
 }

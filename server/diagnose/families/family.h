@@ -77,20 +77,20 @@ using FamilyPtr = std::unique_ptr<Family>;
 /// A cause whose effect is a fixed set of columns; `chosen` of the effect's.
 [[nodiscard]] FamilyPtr make_fixed_family(const LinearProblem& problem, const Effect& effect, Cause cause,
                                           const std::vector<Eigen::Index>& chosen, double surprise = 0);
-/// A gear: a sine and a cosine of one joint's angle, of any order. Null where the joint hardly moves.
-[[nodiscard]] FamilyPtr make_gear_family(const LinearProblem& problem, int joint);
+/// A sine and a cosine of the angle of the cause's joint, of any order. Null where the joint hardly moves.
+[[nodiscard]] FamilyPtr make_order_family(const LinearProblem& problem, Cause cause);
 /// A cause that begins at a pose; `effect` is that of one that began before the first. `spec` without its @pose.
 [[nodiscard]] FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, Cause cause,
                                          std::string spec);
 /// One pose that does not belong.
-[[nodiscard]] FamilyPtr make_outlier_family(const LinearProblem& problem);
-/// An error of one joint's angle by a smooth function of that angle.
-[[nodiscard]] FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint);
+[[nodiscard]] FamilyPtr make_pose_family(const LinearProblem& problem, Cause cause);
+/// An error of the angle of the cause's joint by a smooth function of that angle.
+[[nodiscard]] FamilyPtr make_joint_map_family(const LinearProblem& problem, Cause cause);
 /// A displacement of the tool, any in three axes, by a smooth function of the joints (one or two) or, where `joints` is
 /// empty, of the order in time.
 [[nodiscard]] FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints);
 
-/// The lambda of every order of a joint's gear and the orders, for its periodogram.
+/// The lambda of every order of a joint and the orders, for its periodogram.
 [[nodiscard]] Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background);
 
 }  // namespace trammel::cause_search

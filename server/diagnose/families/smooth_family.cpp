@@ -151,9 +151,10 @@ class SmoothFamily : public Family {
 
 class JointMapFamily final : public SmoothFamily {
  public:
-  JointMapFamily(const LinearProblem& problem, int joint, const VectorXd& q) : SmoothFamily(problem), joint_(joint) {
+  JointMapFamily(const LinearProblem& problem, Cause cause, const VectorXd& q)
+      : SmoothFamily(problem), cause_(std::move(cause)) {
     const Index most = std::end(kHarmonics)[-1];
-    g_.emplace_back(problem.by_joint().col(joint));
+    g_.emplace_back(problem.by_joint().col(cause_.joint));
     functions_ = MatrixXd(q.size(), 2 * most);
     for (Index h = 1; h <= most; ++h) {
       functions_.col(2 * h - 2) = (static_cast<double>(h) * q.array()).sin();
@@ -166,13 +167,13 @@ class JointMapFamily final : public SmoothFamily {
     smallest_ = 1e-7;
     typical_ = 5e-5;
   }
-  Cause cause(const Best&) const override { return {"joint_map", joint_, "", "", {}}; }
+  Cause cause(const Best&) const override { return cause_; }
   std::string source(const Best& best) const override {
-    return fmt::format("joint_map:{}@{}", joint_ + 1, kHarmonics[best.length_scale]);
+    return fmt::format("{}@{}", to_string(cause_), kHarmonics[best.length_scale]);
   }
 
  private:
-  int joint_;
+  Cause cause_;
 };
 
 class AnonymousFamily final : public SmoothFamily {
@@ -199,7 +200,7 @@ class AnonymousFamily final : public SmoothFamily {
     }
   }
   bool named() const override { return false; }
-  Cause cause(const Best&) const override { return {"unknown", -1, "", "", {}}; }
+  Cause cause(const Best&) const override { return unknown_cause(); }
   std::vector<std::string> depends_on() const override { return on_; }
 
  private:
@@ -215,10 +216,10 @@ class AnonymousFamily final : public SmoothFamily {
 
 }  // namespace
 
-FamilyPtr make_joint_map_family(const LinearProblem& problem, int joint) {
-  const VectorXd q = angles(problem, joint);
+FamilyPtr make_joint_map_family(const LinearProblem& problem, Cause cause) {
+  const VectorXd q = angles(problem, cause.joint);
   if (q.maxCoeff() - q.minCoeff() < thresholds::kSmallestSpan) return nullptr;
-  return std::make_unique<JointMapFamily>(problem, joint, q);
+  return std::make_unique<JointMapFamily>(problem, std::move(cause), q);
 }
 
 FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints) {

@@ -72,12 +72,14 @@ class StepFamily final : public Family {
   std::string spec_;
 };
 
-class OutlierFamily final : public Family {
+class PoseFamily final : public Family {
  public:
-  explicit OutlierFamily(const LinearProblem& problem) : problem_(problem) {}
+  PoseFamily(const LinearProblem& problem, Cause cause) : problem_(problem), cause_(std::move(cause)) {}
 
   Cause cause(const Best& best) const override {
-    return {"outlier", -1, "", problem_.batch().measurements[static_cast<std::size_t>(best.pose)].pose_id, {}};
+    Cause cause = cause_;
+    cause.pose_id = problem_.batch().measurements[static_cast<std::size_t>(best.pose)].pose_id;
+    return cause;
   }
   bool predicts() const override { return false; }
   MatrixXd columns(const Best& best) const override {
@@ -122,6 +124,7 @@ class OutlierFamily final : public Family {
   }
 
   const LinearProblem& problem_;
+  Cause cause_;
 };
 
 }  // namespace
@@ -130,6 +133,8 @@ FamilyPtr make_step_family(const LinearProblem& problem, const Effect& effect, C
   return std::make_unique<StepFamily>(problem, effect.columns, std::move(cause), std::move(spec));
 }
 
-FamilyPtr make_outlier_family(const LinearProblem& problem) { return std::make_unique<OutlierFamily>(problem); }
+FamilyPtr make_pose_family(const LinearProblem& problem, Cause cause) {
+  return std::make_unique<PoseFamily>(problem, std::move(cause));
+}
 
 }  // namespace trammel::cause_search

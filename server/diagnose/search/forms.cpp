@@ -13,7 +13,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr int kFewestHarmonics = 4;  // of a map: the fewest that the search looks for
-constexpr const char* kOfManyForms = "compliance";
 
 VectorXd weight_of(const PriorModel& prior_model, const MeasurementBatch& batch) {
   return LinearProblem(prior_model.model, batch, prior_model.priors, {}).weight();
@@ -29,20 +28,12 @@ double held_out_square(const PriorModel& prior_model, const SearchResult& result
 
 /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
 std::vector<std::string> spellings(const std::string& source, const Cell& cell) {
-  if (!source.starts_with("joint_map")) return alternatives(source, cell);
+  if (cause_spelled(source).search != causes::SearchFamily::kMap) return alternatives(source, cell);
   const std::size_t at = source.find('@');
   std::vector<std::string> all;
   for (int harmonics = std::stoi(source.substr(at + 1)); harmonics >= kFewestHarmonics; harmonics /= 2)
     all.push_back(source.substr(0, at + 1) + std::to_string(harmonics));
   return all;
-}
-
-/// The form of the compliance that `model` has; empty where it has none.
-std::string form_in(const PhysicalModel& model) {
-  const auto present = std::find_if(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
-    return source->name().starts_with(fmt::format("{}_", kOfManyForms));
-  });
-  return present == model.sources.end() ? "" : (*present)->name();
 }
 
 /// `now` with `other` in place of `form`, starting at its values; empty where the cell cannot have it.
@@ -74,7 +65,7 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
     if (square >= least) continue;
     least = square;
     one.in_model = spelling;
-    if (one.source.starts_with("joint_map")) one.source = spelling;
+    if (record_of(one.cause).search == causes::SearchFamily::kMap) one.source = spelling;
     best = std::move(extended);
   }
   if (!best) return false;
@@ -82,9 +73,12 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
   return true;
 }
 
-void choose_compliance_again(SearchResult& result, bool own_is_open) {
-  const std::string form = form_in(result.after.model);
-  if (form.empty()) return;
+namespace {
+
+/// Chooses between `form`, which `result.after` has, and the other forms of its cause.
+void choose_again(SearchResult& result, const std::string& form, const std::vector<std::string>& sources) {
+  const std::string cause(cause_spelled(form).spelling);
+  const bool own_is_open = std::find(sources.begin(), sources.end(), cause) != sources.end();
   const auto finding = std::find_if(result.accepted.begin(), result.accepted.end(),
                                     [&](const Accepted& one) { return one.in_model == form; });
   if (finding == result.accepted.end() && !own_is_open) return;
@@ -92,7 +86,7 @@ void choose_compliance_again(SearchResult& result, bool own_is_open) {
   const PriorModel now = result.after;
   double least = held_out_square(now, result, weight);
   std::string chosen = form;
-  for (const std::string& other : alternatives(kOfManyForms, *now.model.cell)) {
+  for (const std::string& other : alternatives(cause, *now.model.cell)) {
     if (other == form) continue;
     std::optional<PriorModel> changed = with_other_form(now, form, other, result);
     if (!changed) continue;
@@ -111,8 +105,14 @@ void choose_compliance_again(SearchResult& result, bool own_is_open) {
   result.reformed_to = chosen;
 }
 
-bool leaves_compliance_open(const std::vector<std::string>& sources) {
-  return std::find(sources.begin(), sources.end(), kOfManyForms) != sources.end();
+}  // namespace
+
+void choose_forms_again(SearchResult& result, const std::vector<std::string>& sources) {
+  std::vector<std::string> forms;
+  for (const ErrorSourcePtr& source : result.after.model.sources) {
+    if (source->cause().forms.size() > 1) forms.push_back(source->name());
+  }
+  for (const std::string& form : forms) choose_again(result, form, sources);
 }
 
 }  // namespace trammel::cause_search

@@ -11,12 +11,9 @@ namespace trammel::cause_search {
 /// predicted no better than without it.
 [[nodiscard]] Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepted* poorer);
 
-/// Chooses the form of the model's compliance anew beside all that was found since. Chosen while much was missing it
-/// may be another one, and what a wrong form leaves over would be given other names. A compliance of the cell's own
-/// list is changed only where that list leaves its form open: `own_is_open`.
-void choose_compliance_again(SearchResult& result, bool own_is_open);
-
-/// Whether a cell's list of error sources leaves the form of the compliance open.
-[[nodiscard]] bool leaves_compliance_open(const std::vector<std::string>& sources);
+/// Chooses the forms of causes that have several anew, beside all that was found since. Chosen while much was missing
+/// they may be others, and what a wrong form leaves over would be given other names. A cause of the cell's own list
+/// (`sources`) is changed only where that list leaves its form open.
+void choose_forms_again(SearchResult& result, const std::vector<std::string>& sources);
 
 }  // namespace trammel::cause_search

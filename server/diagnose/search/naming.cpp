@@ -31,25 +31,54 @@ VectorXd fitted(const Background& background, const MatrixXd& columns, const Vec
 
 }  // namespace
 
+namespace {
+
+using causes::Likeness;
+
+/// Whether `rival`, as the record of `own` has it, means `other`: of the same joint where it is of one, and the number
+/// that it names. `or_whole`: the cause as a whole counts for its number.
+bool means(const causes::Rival& rival, const Cause& own, const Cause& other, bool or_whole) {
+  if (other.cause != rival.cause) return false;
+  if (record_of(other).scope == causes::Scope::kJoint && other.joint != own.joint) return false;
+  if (rival.parameter.empty() || (or_whole && other.parameter.empty())) return true;
+  return other.parameter == parameter_of(rival, own.joint);
+}
+
+bool has_rival(const Cause& own, const Cause& other, std::initializer_list<Likeness> likenesses, bool or_whole) {
+  const std::vector<causes::Rival>& rivals = record_of(own).rivals;
+  return std::any_of(rivals.begin(), rivals.end(), [&](const causes::Rival& rival) {
+    return std::find(likenesses.begin(), likenesses.end(), rival.likeness) != likenesses.end() &&
+           means(rival, own, other, or_whole);
+  });
+}
+
+/// Whether two numbers of this cause are two causes.
+bool numbers_are_causes(const CauseRecord& record) {
+  return record.numbers == causes::Numbers::kApart || record.numbers == causes::Numbers::kOneAJoint;
+}
+
+/// A special case that is not sure where the general one is as likely.
+bool is_doubtful_case(const Cause& general, const Cause& special) {
+  return has_rival(general, special, {Likeness::kDoubtfulCase}, false);
+}
+
+}  // namespace
+
 bool is_whole_of(const Cause& whole, const Cause& step) {
-  if (step.cause == "tracker_moved") return whole.cause == "base";
-  if (step.cause == "tool_changed") return whole.cause == "tool";
-  if (step.cause == "payload_changed") return whole.cause == "payload";
-  return step.cause == "joint_slip" && whole.cause == "geometry" &&
-         (whole.parameter.empty() || whole.parameter == fmt::format("q{}", step.joint + 1));
+  return has_rival(step, whole, {Likeness::kFromTheFirstPose}, true);
 }
 
 bool is_description_of(const Cause& general, const Cause& special) {
-  const bool of_links = special.cause == "geometry" || special.cause == "compliance";
-  if (general.cause == special.cause && of_links && !general.parameter.empty() && !special.parameter.empty())
-    return general.parameter == special.parameter;
-  if (general.cause == special.cause) return general.joint == special.joint || general.joint < 0 || special.joint < 0;
-  if (special.cause == "geometry" && general.cause == "joint_map")
-    return special.parameter == fmt::format("q{}", general.joint + 1);
-  // Joints give way before links do; only beside the joints' compliance is bending a cause of its own.
-  if (special.cause == "compliance" && general.cause == "link_bending") return true;
-  const bool angle = special.cause == "gear_transmission" || special.cause == "encoder_eccentricity";
-  return angle && general.cause == "joint_map" && special.joint == general.joint;
+  if (general.cause == special.cause) {
+    if (numbers_are_causes(record_of(general)) && !general.parameter.empty() && !special.parameter.empty())
+      return general.parameter == special.parameter;
+    return general.joint == special.joint || general.joint < 0 || special.joint < 0;
+  }
+  return has_rival(general, special, {Likeness::kSpecialCase, Likeness::kSimplerCase, Likeness::kDoubtfulCase}, false);
+}
+
+bool is_simpler_case(const Cause& simple, const Cause& general) {
+  return has_rival(general, simple, {Likeness::kSimplerCase}, false);
 }
 
 namespace {
@@ -70,19 +99,25 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
     return std::all_of(batch.measurements.begin(), batch.measurements.end(),
                        [&](const Measurement& m) { return has(m.context); });
   };
-  const bool in_time =
-      cause.cause == "tracker_moved" || cause.cause == "tracker_drift" || cause.cause == "thermal_growth";
+  const bool times = recorded([](const PoseContext& c) { return c.time.has_value(); });
+  const bool temperatures = recorded([](const PoseContext& c) { return c.temperature.has_value(); });
+  const auto lacks = [&](const ContextNeeds& needs) {
+    return (needs.time && !times) || (needs.temperature && !temperatures);
+  };
+  const CauseRecord& own = record_of(cause);
   std::vector<Cause> rivals;
-  if (in_time && cause.cause != "tracker_drift" && !recorded([](const PoseContext& c) { return c.time.has_value(); }))
-    rivals.push_back({"tracker_drift", -1, "", "", {}});
-  if (in_time && cause.cause != "thermal_growth" &&
-      !recorded([](const PoseContext& c) { return c.temperature.has_value(); }))
-    rivals.push_back({"thermal_growth", -1, "", "", {}});
+  for (const CauseRecord* other : all_causes()) {
+    if (own.goes_with_time && other->goes_with_time && other != &own && lacks(other->needs))
+      rivals.push_back(cause_at(*other));
+  }
   // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
-  if (cause.cause != "outlier" && is_path(batch) &&
-      std::none_of(batch.measurements.begin(), batch.measurements.end(),
-                   [](const Measurement& m) { return m.context.velocity.has_value(); }))
-    rivals.push_back({"time_lag", -1, "", "", {}});
+  const bool in_motion =
+      is_path(batch) && std::none_of(batch.measurements.begin(), batch.measurements.end(),
+                                     [](const Measurement& m) { return m.context.velocity.has_value(); });
+  if (!in_motion || own.search == causes::SearchFamily::kPose) return rivals;
+  for (const CauseRecord* other : all_causes()) {
+    if (other->needs.velocity) rivals.push_back(cause_at(*other));
+  }
   return rivals;
 }
 
@@ -154,8 +189,7 @@ bool Doubt::is_rival(std::size_t f, double frequency) const {
   const Cause other = families_[f]->cause(seen_.best[f]);
   const bool decided = is_decided(f, frequency);
   // A more general description that is as likely says that the special one is not sure.
-  const bool only_describes =
-      no_rival(cause(), other) && (decided || other.cause != "joint_map" || cause().cause != "gear_transmission");
+  const bool only_describes = no_rival(cause(), other) && (decided || !is_doubtful_case(other, cause()));
   if (only_describes || begins_at_once(other, seen_.best[f], problem_.poses())) return false;
   const double made = families_[f]->scan({background_}, projected_).front().strength;
   if (is_as_good(f, made)) return true;

@@ -11,6 +11,9 @@ namespace trammel::cause_search {
 /// Whether `general` is only a more general description of `special`, not another cause.
 [[nodiscard]] bool is_description_of(const Cause& general, const Cause& special);
 
+/// Whether `simple` is the one to name where it explains nearly as much as `general` does.
+[[nodiscard]] bool is_simpler_case(const Cause& simple, const Cause& general);
+
 /// How sure the name of a cause is.
 struct Naming {
   double frequency = 1;              ///< share of repetitions of the batch, the effect as fitted, that name it

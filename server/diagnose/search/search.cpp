@@ -14,6 +14,7 @@ namespace trammel::cause_search {
 
 namespace {
 
+using causes::SearchFamily;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -46,7 +47,7 @@ class Search {
   [[nodiscard]] Result<bool> step();
   /// Drops one that does not pass any more beside all the rest; false where all pass.
   [[nodiscard]] bool prune();
-  void choose_compliance_again() { cause_search::choose_compliance_again(result_, own_compliance_is_open_); }
+  void choose_forms_again() { cause_search::choose_forms_again(result_, sources_); }
   /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
   /// more like it.
   [[nodiscard]] Status reconsider();
@@ -80,16 +81,16 @@ class Search {
   const DiagnoseOptions& options_;
   SearchResult result_;
   Chance chance_;
-  bool own_compliance_is_open_ = false;
-  std::size_t renewed_for_ = 0;  // how much had been found when chance_ was drawn
-  std::vector<Cause> closed_;    // were tried and did not hold
+  std::vector<std::string> sources_;  // the cell's own list
+  std::size_t renewed_for_ = 0;       // how much had been found when chance_ was drawn
+  std::vector<Cause> closed_;         // were tried and did not hold
 };
 
 Status Search::start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   result_.all = result_.batch = batch;
   const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
   if (!calibration) return tl::make_unexpected(calibration.error());
-  own_compliance_is_open_ = leaves_compliance_open(sources);
+  sources_ = sources;
   result_.before = {calibration->model, priors_of(*calibration)};
   result_.after = result_.before;
   return {};
@@ -270,7 +271,8 @@ Status Search::take_cause(Accepted one) {
 /// The map of that joint among what is accepted.
 std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
   return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
-    return cause.cause == "joint_map" && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
+    return record_of(cause).search == SearchFamily::kMap && one.cause.cause == cause.cause &&
+           one.cause.joint == cause.joint;
   });
 }
 
@@ -322,7 +324,8 @@ Result<bool> Search::name_again(Accepted& one) {
 void Search::open_negative_play() {
   for (std::size_t k = 0; k < result_.accepted.size();) {
     const Accepted one = result_.accepted[k];
-    const std::optional<PlaySign> sign = one.cause.cause == "backlash" ? std::optional(sign_of(one)) : std::nullopt;
+    const bool is_play = record_of(one.cause).search == SearchFamily::kPlay;
+    const std::optional<PlaySign> sign = is_play ? std::optional(sign_of(one)) : std::nullopt;
     if (!sign || !sign->negative) {
       ++k;
       continue;
@@ -387,7 +390,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
     const Result<bool> more = search.step();
     if (!more) return tl::make_unexpected(more.error());
     changed = *more || search.prune();
-    if (changed) search.choose_compliance_again();
+    if (changed) search.choose_forms_again();
   }
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
   search.open_negative_play();

@@ -9,8 +9,7 @@ namespace trammel::cause_search {
 namespace {
 
 bool is_simpler(const Cause& other, const Cause& cause) {
-  return is_whole_of(other, cause) ||
-         (cause.cause == "joint_map" && other.cause == "encoder_eccentricity" && other.joint == cause.joint);
+  return is_whole_of(other, cause) || is_simpler_case(other, cause);
 }
 
 }  // namespace

@@ -66,41 +66,67 @@ void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch) 
 }
 
 bool is_by_surrogate(const Surrogates& surrogates, const Cause& cause) {
-  return (surrogates.time && cause.cause == "tracker_drift") ||
-         (surrogates.temperature && cause.cause == "thermal_growth") ||
-         (surrogates.direction && cause.cause == "backlash");
+  const ContextNeeds& needs = record_of(cause).needs;
+  return (surrogates.time && needs.time) || (surrogates.temperature && needs.temperature) ||
+         (surrogates.direction && needs.direction);
 }
 
 bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause) {
-  return is_by_surrogate(surrogates, cause) && cause.cause != "backlash";
+  return is_by_surrogate(surrogates, cause) && !record_of(cause).needs.direction;
 }
 
-std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model, const MeasurementBatch& recorded) {
-  const std::vector<Parameter> own = model.parameters();
-  const auto is_free = [&](const std::string& name) {
-    return std::any_of(own.begin(), own.end(), [&](const Parameter& p) { return p.name == name; });
-  };
-  std::vector<Inseparable> pairs;
+namespace {
+
+/// Whether every pose was approached from one and the same side of `joint`.
+bool has_one_side(const MeasurementBatch& recorded, int joint) {
   const auto& rows = recorded.measurements;
-  const bool directions =
-      std::all_of(rows.begin(), rows.end(), [](const Measurement& m) { return !m.context.direction.empty(); });
-  for (int j = 0; directions && j < model.cell->robot.size(); ++j) {
-    const auto side = [j](const Measurement& m) { return m.context.direction[static_cast<std::size_t>(j)]; };
-    const bool one = side(rows.front()) != 0 && std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) {
-                       return side(m) == side(rows.front());
-                     });
-    const std::string zero = fmt::format("q{}", j + 1);
-    if (one && is_free(zero)) pairs.push_back({{{"backlash", j, "", "", {}}, {"geometry", -1, zero, "", {}}}, 1});
-  }
+  const auto side = [joint](const Measurement& m) { return m.context.direction[static_cast<std::size_t>(joint)]; };
+  return std::none_of(rows.begin(), rows.end(), [](const Measurement& m) { return m.context.direction.empty(); }) &&
+         side(rows.front()) != 0 &&
+         std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return side(m) == side(rows.front()); });
+}
+
+bool has_one_temperature(const MeasurementBatch& recorded) {
+  const auto& rows = recorded.measurements;
   const auto [low, high] =
       std::minmax_element(rows.begin(), rows.end(), [](const Measurement& a, const Measurement& b) {
         return a.context.temperature.value_or(-kUnrecorded) < b.context.temperature.value_or(-kUnrecorded);
       });
-  const bool constant =
-      low->context.temperature && *high->context.temperature - *low->context.temperature < thresholds::kSameTemperature;
-  const bool lengths = std::any_of(model.sources.begin(), model.sources.end(),
-                                   [](const ErrorSourcePtr& source) { return source->name() == "geometry"; });
-  if (constant && lengths) pairs.push_back({{{"thermal_growth", -1, "", "", {}}, {"geometry", -1, "", "", {}}}, 1});
+  return low->context.temperature &&
+         *high->context.temperature - *low->context.temperature < thresholds::kSameTemperature;
+}
+
+/// Whether what a cause of `joint` depends on was recorded, and never changed.
+bool is_constant(const ContextNeeds& needs, const MeasurementBatch& recorded, int joint) {
+  return (needs.direction && joint >= 0 && has_one_side(recorded, joint)) ||
+         (needs.temperature && has_one_temperature(recorded));
+}
+
+/// Whether `model` identifies what takes the effect over: one number, or all of a cause.
+bool is_free(const PhysicalModel& model, const Cause& cause) {
+  const std::vector<Parameter> own = model.parameters();
+  if (!cause.parameter.empty())
+    return std::any_of(own.begin(), own.end(), [&](const Parameter& p) { return p.name == cause.parameter; });
+  return std::any_of(model.sources.begin(), model.sources.end(),
+                     [&](const ErrorSourcePtr& source) { return &source->cause() == &record_of(cause); });
+}
+
+}  // namespace
+
+std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model, const MeasurementBatch& recorded) {
+  std::vector<Inseparable> pairs;
+  for (const CauseRecord* record : all_causes()) {
+    const bool of_joint = record->scope == causes::Scope::kJoint;
+    for (const causes::Rival& rival : record->rivals) {
+      if (rival.likeness != causes::Likeness::kWhereConstant) continue;
+      for (int joint = of_joint ? 0 : -1; joint < (of_joint ? model.cell->robot.size() : 0); ++joint) {
+        Cause taken_for = cause_at(cause_spelled(rival.cause));
+        taken_for.parameter = parameter_of(rival, joint);
+        if (is_constant(record->needs, recorded, joint) && is_free(model, taken_for))
+          pairs.push_back({{cause_at(*record, joint), taken_for}, 1});
+      }
+    }
+  }
   return pairs;
 }
 

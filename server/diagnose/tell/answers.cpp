@@ -37,6 +37,17 @@ LinearProblem by_itself(const SearchResult& found) {
   return {extended.model, found.batch, extended.priors, {}};
 }
 
+bool is_play(const Cause& cause) { return record_of(cause).search == causes::SearchFamily::kPlay; }
+
+/// Causes whose sizes are shown as examples, the most telling first.
+std::vector<const CauseRecord*> examples() {
+  std::vector<const CauseRecord*> all = all_causes();
+  std::erase_if(all, [](const CauseRecord* record) { return !record->example; });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const CauseRecord* a, const CauseRecord* b) { return a->example->rank < b->example->rank; });
+  return all;
+}
+
 Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all) {
   if (found.unnamed.empty()) return {};
   const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
@@ -50,7 +61,7 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   }
   if (!found.negative_play.empty()) {
     const bool every = std::none_of(found.accepted.begin(), found.accepted.end(),
-                                    [](const Accepted& one) { return one.cause.cause == "backlash"; });
+                                    [](const Accepted& one) { return is_play(one.cause); });
     unexplained.hint = what_negative_play_may_be(found.negative_play, every);
   }
   const Index P = problem.nuisance().cols();
@@ -190,7 +201,7 @@ void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& fa
                 [&](const Unseen& unseen) { return is_by_surrogate(surrogates, unseen.cause); });
   std::erase_if(diagnosis.could_not_have_seen, [&](const Unseen& unseen) {  // seen, with a sign that has no name
     const std::vector<PlaySign>& seen = explained.found.negative_play;
-    return unseen.cause.cause == "backlash" &&
+    return is_play(unseen.cause) &&
            std::any_of(seen.begin(), seen.end(), [&](const PlaySign& one) { return one.joint == unseen.cause.joint; });
   });
   static_cast<void>(candidate_sources(cell, recorded, &diagnosis.could_not_have_seen));
@@ -202,14 +213,15 @@ void tell_blindness(const Explained& explained, const std::vector<FamilyPtr>& fa
 void tell_periodograms(const Explained& explained, Diagnosis& diagnosis) {
   const LinearProblem& before = explained.before;
   const Chance& chance = explained.found.chance;
+  const CauseRecord& gear = first_searched_by(causes::SearchFamily::kOrder);
   const Background first(before.nuisance());
   const auto& robot = before.model().cell->robot;
   for (int joint = 0; joint < robot.size(); ++joint) {
     if (robot.joint(joint).type != JointType::kRevolute) continue;
-    const FamilyPtr gears = make_gear_family(before, joint);
-    if (!gears) continue;
+    const FamilyPtr orders = make_order_family(before, cause_at(gear, joint));
+    if (!orders) continue;
     Periodogram lines = periodogram(before, joint, first);
-    lines.limit = strength_for(chance.limit_at(kPeriodogramLine) + chance.penalty_of(*gears), 2);
+    lines.limit = strength_for(chance.limit_at(kPeriodogramLine) + chance.penalty_of(*orders), 2);
     diagnosis.periodograms.push_back(std::move(lines));
   }
 }
@@ -227,7 +239,7 @@ void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& d
 void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,
                    Diagnosis& diagnosis) {
   std::vector<std::size_t> places;
-  const auto add = [&](const std::string& cause, int joint) {
+  const auto add = [&](std::string_view cause, int joint) {
     for (std::size_t f = 0; f < families.size() && places.size() < kRecoveries; ++f) {
       const Cause one = families[f]->cause(families[f]->typical());
       if (!families[f]->named() || one.cause != cause || (joint >= 0 && one.joint != joint)) continue;
@@ -236,9 +248,7 @@ void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& fam
     }
   };
   for (const Finding& finding : diagnosis.findings) add(finding.cause.cause, finding.cause.joint);
-  add("gear_transmission", -1);
-  add("encoder_eccentricity", 1);
-  add("tracker_moved", -1);
+  for (const CauseRecord* example : examples()) add(example->spelling, example->example->joint);
   diagnosis.recovery = recovery_of(explained.after, families, explained.all, explained.found.chance, places, seed);
 }
 

@@ -17,6 +17,7 @@ namespace trammel::cause_search {
 
 namespace {
 
+using causes::Summary;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -77,12 +78,13 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
       covariance(i, j) = scale * priors[static_cast<std::size_t>(other)].prior_scale * estimated.covariance(k, other);
     }
   }
-  if (cause.cause == "gear_transmission") {
+  const Summary summary = record_of(cause).summary;
+  if (summary == Summary::kOrderAndAmplitude) {
     estimates.push_back({"order", "", values(0), kExpanded * std::sqrt(covariance(0, 0))});
     estimates.push_back(amplitude_of("amplitude", values.segment<2>(1), covariance.block<2, 2>(1, 1)));
-  } else if (cause.cause == "encoder_eccentricity") {
+  } else if (summary == Summary::kAmplitude) {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
-  } else if (cause.cause == "joint_map" && values.size() > 0) {
+  } else if (summary == Summary::kPeakToPeak && values.size() > 0) {
     estimates.push_back(peak_to_peak_of(problem.batch(), cause.joint, values, covariance));
   }
   if (!cause.parameter.empty()) {
@@ -98,8 +100,8 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   }
   for (Index i = 0; i < values.size(); ++i) {
     const Parameter& parameter = priors[static_cast<std::size_t>(places[static_cast<std::size_t>(i)])];
-    if (parameter.name.starts_with("order")) continue;
-    if (cause.cause == "joint_map") break;  // a hundred harmonics tell people nothing
+    if (parameter.is_place) continue;
+    if (summary == Summary::kPeakToPeak) break;  // a hundred harmonics tell people nothing
     estimates.push_back(in_units(parameter, values(i), std::sqrt(covariance(i, i))));
   }
   return estimates;

@@ -13,51 +13,6 @@ namespace {
 
 constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
 
-struct Words {
-  const char* cause;
-  const char* action;
-  const char* needs;
-};
-
-constexpr Words kWords[] = {
-    {"gear_transmission", "compensate it, and have the gear of this joint looked at if it grows",
-     "a wider range of this joint"},
-    {"encoder_eccentricity", "compensate it; it is fixed in the joint until its encoder is replaced",
-     "the full range of this joint, a second payload"},
-    {"joint_map", "compensate it; measure again after service of this joint", "more poses over this joint's range"},
-    {"backlash", "approach every target from one side of this joint, or have its gear adjusted",
-     "approaching the poses from both sides of this joint"},
-    {"link_bending", "compensate it for this payload; identify again when the payload changes",
-     "a second known payload, or a run without any"},
-    {"compliance", "compensate it for this payload", "a second known payload, or a run without any"},
-    {"payload", "weigh the payload and correct the cell file", "a second known payload, or a run without any"},
-    {"payload_changed", "find out what was mounted or lost at that pose, and give the poses their payload_id",
-     "a payload_id for every pose, wide poses before and after"},
-    {"tool", "measure the tool again and correct the cell file", "a second tool"},
-    {"tool_changed", "find out what knocked or changed the tool at that pose; measure again after it",
-     "a second tool, or reference reflectors on the flange"},
-    {"tracker_moved", "fix the tracker (or the robot's base) to the floor and measure the reference reflectors",
-     "reference reflectors, measured before and after"},
-    {"tracker_drift", "let the tracker warm up, and measure reference reflectors in between",
-     "reference reflectors, and the time of every pose"},
-    {"joint_slip", "check this joint's brake, coupling and calibration marks, and update its revolution counter",
-     "reference reflectors, and the time of every pose"},
-    {"thermal_growth", "warm the robot up before work, or record its temperature with every job",
-     "temperatures that differ between poses and do not only rise with time"},
-    {"wrist_coupling", "set the coupling ratios of the wrist in the controller", "the full range of joints 4 and 5"},
-    {"time_lag", "trigger tracker and robot from one clock", "other speeds, and the time of every pose"},
-    {"geometry", "identify the geometry", "a wider range of joints"},
-    {"base", "localise the base", "reference reflectors that fix where the base stands"},
-    {"outlier", "single pose, cause not separable: repeat it and its neighbours", ""},
-};
-
-const Words* words_for(const std::string& cause) {
-  for (const Words& words : kWords) {
-    if (cause == words.cause) return &words;
-  }
-  return nullptr;
-}
-
 std::string listed(const std::vector<std::string>& words) {
   std::string all;
   for (std::size_t k = 0; k < words.size(); ++k)
@@ -73,15 +28,17 @@ std::string listed_clauses(const std::vector<std::string>& clauses) {
   return all;
 }
 
+bool is_single_pose(const Finding& finding) { return record_of(finding.cause).search == causes::SearchFamily::kPose; }
+
 /// Where a step may have begun besides the pose where it was found.
 std::string beginning_said(const Finding& finding) {
   if (finding.may_begin_at.size() < 2) return "";
-  return fmt::format(", or at another of {} to {},", finding.may_begin_at.front().pose_id,
+  return fmt::format(", or another of {} to {},", finding.may_begin_at.front().pose_id,
                      finding.may_begin_at.back().pose_id);
 }
 
 std::string said(const Finding& finding) {
-  if (finding.cause.cause == "outlier")
+  if (is_single_pose(finding))
     return fmt::format("pose {} ({:.2f} mm)", finding.cause.pose_id, to_mm(finding.effect_rms));
   std::vector<std::string> names = {in_words(finding.cause) + beginning_said(finding)};
   if (finding.cause.order) names.front() += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
@@ -93,16 +50,11 @@ std::string said(const Finding& finding) {
 }  // namespace
 
 std::string action_for(const Cause& cause, const std::vector<Cause>& others) {
-  const Words* words = words_for(cause.cause);
-  if (words == nullptr) return "";
-  if (others.empty()) return words->action;
+  if (others.empty()) return std::string(record_of(cause).action);
   return fmt::format("decide first which it is: {}", what_would_separate(cause.cause, others.front().cause));
 }
 
-std::string what_it_needs(const Cause& cause) {
-  const Words* words = words_for(cause.cause);
-  return words == nullptr ? "other poses" : words->needs;
-}
+std::string what_it_needs(const Cause& cause) { return std::string(record_of(cause).shown_by); }
 
 bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
   return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
@@ -131,9 +83,9 @@ struct Said {
 Said said(const std::vector<Finding>& findings) {
   Said all;
   for (const Finding& finding : findings) {
-    (finding.cause.cause == "outlier" ? all.bad_poses
-     : finding.could_also_be.empty()  ? all.sure
-                                      : all.doubtful)
+    (is_single_pose(finding)         ? all.bad_poses
+     : finding.could_also_be.empty() ? all.sure
+                                     : all.doubtful)
         .push_back(said(finding));
   }
   if (const std::size_t count = all.doubtful.size(); count > kMostDoubtful) {

@@ -1,19 +1,31 @@
 #include "server/diagnose/triage/batch_alternatives.h"
 
 #include <algorithm>
-#include <set>
 
 namespace trammel::batch_triage {
 
 namespace {
 
-const std::set<std::string> kNotTheArm = {"base",          "tool",       "payload",      "tracker_moved",
-                                          "tracker_drift", "joint_slip", "tool_changed", "payload_changed",
-                                          "time_lag"};
+using causes::Lasting;
+using causes::Part;
+using causes::Scope;
 
-std::string cause_of(const ErrorSource& source) {
-  const std::string name = source.name();
-  return name.substr(0, name.find_first_of(":@"));
+bool is_of_the_arm(const CauseRecord& record) {
+  return record.lasting == Lasting::kAlways && (record.scope == Scope::kArm || record.scope == Scope::kJoint);
+}
+
+/// Whether it is told by the base standing elsewhere.
+bool moves_base(const CauseRecord& record) {
+  const causes::Rival* whole = whole_of(record);
+  return whole != nullptr && cause_spelled(whole->cause).part == Part::kBase;
+}
+
+/// The source that a step of `joint` is when it acts at all poses: that of the whole, or the step itself where it is
+/// but one of the whole's numbers.
+std::string as_a_whole(const CauseRecord& record, int joint) {
+  const causes::Rival& whole = *whole_of(record);
+  if (whole.parameter.empty()) return std::string(whole.cause);
+  return to_string(cause_at(record, joint)) + "@1";
 }
 
 Alternative started(const Cause& cause, const PhysicalModel& model) {
@@ -60,14 +72,14 @@ std::vector<Alternative> Alternatives::from(int first, const std::string& pose_i
     one.cause.pose_id = pose_id;
     one.first = first;
     one.harmful = harmful || first > 0;
-    if (cause.cause == "tracker_moved" && first == 0) one.model.X_WB = X_WB_;
+    if (moves_base(record_of(cause)) && first == 0) one.model.X_WB = X_WB_;
     all.push_back(std::move(one));
   };
-  add({"tracker_moved", -1, "", "", {}}, "base", false);
-  add({"tool_changed", -1, "", "", {}}, "tool", true);
-  if (carries()) add({"payload_changed", -1, "", "", {}}, "payload", true);
-  for (int joint = 0; joint < physics_.cell->robot.size(); ++joint) {
-    add({"joint_slip", joint, "", "", {}}, fmt::format("joint_slip:{}@1", joint + 1), false);
+  for (const CauseRecord* record : all_causes()) {
+    if (record->lasting != Lasting::kFromAPose || (record->needs.payload && !carries())) continue;
+    const bool of_joint = record->scope == Scope::kJoint;
+    for (int joint = of_joint ? 0 : -1; joint < (of_joint ? physics_.cell->robot.size() : 0); ++joint)
+      add(cause_at(*record, joint), as_a_whole(*record, joint), record->whole_batch->harmful);
   }
   if (first == 0) add_drift(all);
   return all;
@@ -75,7 +87,7 @@ std::vector<Alternative> Alternatives::from(int first, const std::string& pose_i
 
 std::vector<Alternative> Alternatives::with_the_tracker() const {
   std::vector<Alternative> all = from(0, "");
-  std::erase_if(all, [](const Alternative& one) { return one.cause.cause == "tracker_moved"; });
+  std::erase_if(all, [](const Alternative& one) { return moves_base(record_of(one.cause)); });
   for (Alternative& one : all) {
     one.tracker_elsewhere = set_free(one, "base", one.base);
     one.model.X_WB = X_WB_;
@@ -85,19 +97,17 @@ std::vector<Alternative> Alternatives::with_the_tracker() const {
 
 bool Alternatives::carries() const {
   return !physics_.cell->payloads.empty() &&
-         std::any_of(physics_.sources.begin(), physics_.sources.end(), [](const ErrorSourcePtr& source) {
-           const std::string cause = cause_of(*source);
-           return cause.starts_with("compliance") || cause == "link_bending";
-         });
+         std::any_of(physics_.sources.begin(), physics_.sources.end(),
+                     [](const ErrorSourcePtr& source) { return source->cause().gives_way; });
 }
 
 void Alternatives::add_drift(std::vector<Alternative>& all) const {
-  Alternative one = started({"drift", -1, "", "", {}}, physics_);
+  Alternative one = started(cause_at(cause_spelled("drift")), physics_);
   Eigen::Index first = 0;
   bool any = false;
   for (const ErrorSourcePtr& source : physics_.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    if (!kNotTheArm.contains(cause_of(*source))) {
+    if (is_of_the_arm(source->cause())) {
       std::fill_n(one.free.begin() + first, count, true);
       any = true;
     }

@@ -1,7 +1,6 @@
 #include "server/trainer/pipeline/extend.h"
 
 #include <algorithm>
-#include <array>
 #include <set>
 
 #include "server/measurement/velocity.h"
@@ -9,9 +8,6 @@
 namespace trammel {
 
 namespace {
-
-constexpr std::array<std::string_view, 5> kOfOneBatch = {"tracker_moved", "tracker_drift", "joint_slip", "tool_changed",
-                                                         "payload_changed"};
 
 bool contains(const std::vector<std::string>& list, const std::string& word) {
   return std::find(list.begin(), list.end(), word) != list.end();
@@ -53,21 +49,21 @@ Status check_can_extend(const Diagnosis& diagnosis) {
 std::vector<std::string> lasting_sources(const std::vector<std::string>& sources) {
   std::vector<std::string> lasting;
   std::copy_if(sources.begin(), sources.end(), std::back_inserter(lasting), [](const std::string& source) {
-    const std::string cause = source.substr(0, source.find_first_of(":@"));
-    return std::find(kOfOneBatch.begin(), kOfOneBatch.end(), cause) == kOfOneBatch.end();
+    const CauseRecord* cause = find_cause(source);
+    return cause == nullptr || cause->lasting == causes::Lasting::kAlways;
   });
   return lasting;
 }
 
 std::vector<std::string> added_sources(const Cell& cell, const Diagnosis& diagnosis) {
   std::vector<std::string> added;
-  std::copy_if(
-      diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
-      [&](const std::string& source) {
-        // Another form of the compliance that the cell has already: training chooses it again.
-        const bool form = source.starts_with("compliance_") && contains(cell.model.error_sources, "compliance");
-        return !form && !contains(diagnosis.sources_before, source) && !contains(cell.model.error_sources, source);
-      });
+  std::copy_if(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), std::back_inserter(added),
+               [&](const std::string& source) {
+                 // Another form of what the cell has already, such as the compliance: training chooses it again.
+                 const bool form = as_listed(source, cell.model.error_sources) != source;
+                 return !form && !contains(diagnosis.sources_before, source) &&
+                        !contains(cell.model.error_sources, source);
+               });
   return added;
 }
 
@@ -75,8 +71,7 @@ std::vector<std::string> sources_in_force(const CompensatedModel& model, const C
                                           const MeasurementBatch& batch) {
   std::vector<std::string> sources;
   for (const ErrorSourcePtr& source : model.parts().physics.sources) {
-    const bool chosen = source->name().starts_with("compliance") && contains(cell.model.error_sources, "compliance");
-    sources.push_back(chosen ? "compliance" : source->name());
+    sources.push_back(as_listed(source->name(), cell.model.error_sources));
   }
   return model.provenance().batch_hash == batch_hash(batch) ? sources : lasting_sources(sources);
 }

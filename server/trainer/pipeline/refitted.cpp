@@ -50,12 +50,12 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
   if (model.cell->robot_yaml != cell.robot_yaml) {
     return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell.name);
   }
-  if (!contains(only, "base")) {
+  if (!corrects(only, causes::Part::kBase)) {
     if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
   }
   for (const auto& [name, kept] : model.tools) {
     const auto said = cell.tools.find(name);
-    if (said == cell.tools.end() || contains(only, "tool")) continue;
+    if (said == cell.tools.end() || corrects(only, causes::Part::kTool)) continue;
     const Status same = check_same_frame(cell, fmt::format("tool '{}'", name), said->second, kept, "tool");
     if (!same) return same;
   }
@@ -63,7 +63,7 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
     const std::string& tool = m.context.tool;
     const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
                                       [&](const auto& known) { return known.first == tool; });
-    if (of_model || cell.tools.at(tool) || contains(only, "tool")) continue;
+    if (of_model || cell.tools.at(tool) || corrects(only, causes::Part::kTool)) continue;
     return refused(
         "batch {} row {}: where tool '{}' sits is known to neither cell {} nor the model to start from: name "
         "tool among what is refitted",
@@ -229,7 +229,7 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
 }
 
 Cell with_known_tools(Cell cell, const CompensatedModel& from, const std::vector<std::string>& only) {
-  if (contains(only, "tool")) return cell;
+  if (corrects(only, causes::Part::kTool)) return cell;
   for (const auto& [name, payload] : from.parts().trained_with) {
     const auto tool = cell.tools.find(name);
     if (tool != cell.tools.end() && !tool->second) tool->second = served_tool(from.parts().physics, name);

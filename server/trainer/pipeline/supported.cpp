@@ -70,8 +70,8 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
 std::string to_string(const std::vector<Unsupported>& left_out) {
   std::vector<std::string> sentences;
   for (const Unsupported& one : left_out) {
-    sentences.push_back(
-        fmt::format("{} is left out: the poses held out do as well without it (z {:.2f})", one.source, one.z));
+    sentences.push_back(fmt::format("{} is left out: the poses held out do as well without it (z {:.2f})",
+                                    in_words(one.source), one.z));
   }
   return fmt::format("{}", fmt::join(sentences, "; "));
 }

@@ -23,12 +23,13 @@ constexpr double kFineSteps = 5;       // to a coarse one, about the best
 constexpr double kTypicalOrder = 50;   // cycles a joint turn: to speak of a gear where none was found
 constexpr Index kOrdersAtATime = 96;
 
-class GearFamily final : public Family {
+class OrderFamily final : public Family {
  public:
-  GearFamily(const LinearProblem& problem, int joint) : problem_(problem), joint_(joint) {
+  OrderFamily(const LinearProblem& problem, Cause cause)
+      : problem_(problem), cause_(std::move(cause)), joint_(cause_.joint) {
     q_.resize(problem.poses());
     for (Index i = 0; i < q_.size(); ++i)
-      q_(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint);
+      q_(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint_);
     const double span = q_.maxCoeff() - q_.minCoeff();
     step_ = kStep * 2 * kPi / std::max(span, thresholds::kSmallestSpan);
     orders_ = 1 + static_cast<Index>((kHighestOrder - kLowestOrder) / step_);
@@ -36,10 +37,12 @@ class GearFamily final : public Family {
 
   bool moves() const { return q_.maxCoeff() - q_.minCoeff() > thresholds::kSmallestSpan; }
   Cause cause(const Best& best) const override {
-    return {"gear_transmission", joint_, "", "", best.order > 0 ? std::optional<double>(best.order) : std::nullopt};
+    Cause cause = cause_;
+    if (best.order > 0) cause.order = best.order;
+    return cause;
   }
   std::string source(const Best& best) const override {
-    return fmt::format("gear_transmission:{}@{:.4f}", joint_ + 1, best.order);
+    return fmt::format("{}@{:.4f}", to_string(cause_), best.order);
   }
   Best typical() const override { return {.freedom = 2, .order = kTypicalOrder}; }
 
@@ -125,6 +128,7 @@ class GearFamily final : public Family {
   }
 
   const LinearProblem& problem_;
+  const Cause cause_;
   const int joint_;
   VectorXd q_;
   double step_ = 0;
@@ -133,14 +137,16 @@ class GearFamily final : public Family {
 
 }  // namespace
 
-FamilyPtr make_gear_family(const LinearProblem& problem, int joint) {
-  auto family = std::make_unique<GearFamily>(problem, joint);
+FamilyPtr make_order_family(const LinearProblem& problem, Cause cause) {
+  auto family = std::make_unique<OrderFamily>(problem, std::move(cause));
   if (!family->moves()) return nullptr;
   return family;
 }
 
 Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background) {
-  return GearFamily(problem, joint).all_orders(background);
+  Cause of_joint;
+  of_joint.joint = joint;
+  return OrderFamily(problem, of_joint).all_orders(background);
 }
 
 }  // namespace trammel::cause_search
