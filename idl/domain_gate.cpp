@@ -8,9 +8,10 @@
 #include <array>
 #include <charconv>
 #include <chrono>
-#include <mutex>
 #include <string_view>
 #include <utility>
+
+#include "server/base/mutex.h"
 
 namespace trammel::wire {
 namespace {
@@ -164,7 +165,7 @@ class Gate final : public rtps::ChainingTransport {
   bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size, LocatorsIterator* first,
             LocatorsIterator* last, const std::chrono::steady_clock::time_point& limit) override {
     if (heard_ && size >= kHeader && !knows_itself_) {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
       knows_itself_ = true;
     }
@@ -192,7 +193,7 @@ class Gate final : public rtps::ChainingTransport {
     if (writer == 0) return false;
     return any_data(message, [&](const Data& data) {
       if (data.writer != writer) return false;
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       const auto now = std::chrono::steady_clock::now();
       if (data.sequence_number <= last_lost_ || now - lost_at_ < kBetweenLosses) return false;
       last_lost_ = data.sequence_number;
@@ -205,10 +206,10 @@ class Gate final : public rtps::ChainingTransport {
   const std::uint32_t domain_;
   const std::shared_ptr<HeardOfItself> heard_;
   std::atomic<bool> knows_itself_{false};
-  std::mutex mutex_;
-  std::array<unsigned char, kPrefix> own_prefix_{};  // written once, before knows_itself_
-  std::uint64_t last_lost_ = 0;                      // guarded by mutex_; sequence number
-  std::chrono::steady_clock::time_point lost_at_;    // guarded by mutex_
+  Mutex mutex_;
+  std::array<unsigned char, kPrefix> own_prefix_{};         // written once, before knows_itself_
+  std::uint64_t last_lost_ TRAMMEL_GUARDED_BY(mutex_) = 0;  // sequence number
+  std::chrono::steady_clock::time_point lost_at_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <fastdds/dds/topic/TopicDataType.hpp>
-#include <mutex>
 
 #include "idl/valid.h"
+#include "server/base/mutex.h"
 
 namespace trammel::wire {
 
@@ -38,7 +38,7 @@ class SafeType : public PubSubType {
   }
 
   bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5) override {
-    const std::lock_guard lock(key_mutex_);
+    const MutexLock lock(key_mutex_);
     try {
       return PubSubType::getKey(data, handle, force_md5);
     } catch (...) {
@@ -51,7 +51,7 @@ class SafeType : public PubSubType {
   static constexpr std::uint32_t kReservedBytes = 4096;
 
   const std::size_t max_sample_;
-  std::mutex key_mutex_;
+  Mutex key_mutex_;  // the key buffer in PubSubType
 };
 
 }  // namespace trammel::wire

@@ -6,14 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
-#include <mutex>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
+#include "server/base/mutex.h"
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
@@ -49,18 +48,24 @@ int exit_code(const Error& error) {
   }
 }
 
-/// Each line of the message is a problem of its own.
+/// A line each of all that is wrong.
 int refuse(const Error& error) {
-  std::istringstream lines(error.message);
-  for (std::string line; std::getline(lines, line);) fmt::print(stderr, "trammeld: {}\n", line);
+  for (const Error& one : apart(error)) fmt::print(stderr, "trammeld: {}\n", sentence(one));
   return exit_code(error);
+}
+
+/// A start that would fail, of whatever kind its problems are.
+int refuse_start(std::vector<Error> problems) {
+  Error all = together(std::move(problems));
+  all.code = ErrorCode::kRefused;
+  return refuse(all);
 }
 
 /// What a start would find.
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", note);
-  if (!found.problems.empty()) return refuse(refused("{}", fmt::join(found.problems, "\n")).value());
+  if (!found.problems.empty()) return refuse_start(found.problems);
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
@@ -70,7 +75,7 @@ Status start_log(const LogOptions& options) {
     spdlog::set_default_logger(options.file.empty() ? spdlog::stderr_color_mt("trammeld")
                                                     : spdlog::basic_logger_mt("trammeld", options.file));
   } catch (const spdlog::spdlog_ex& error) {
-    return refused("log: {}", error.what());
+    return refused("{}", error.what()).under("log: file");
   }
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);
@@ -123,8 +128,8 @@ class StopSignals {
 
   /// Until the first comes.
   [[nodiscard]] const char* wait() {
-    std::unique_lock lock(mutex_);
-    came_.wait(lock, [this] { return number_ != 0; });
+    MutexLock lock(mutex_);
+    came_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return number_ != 0; });
     return ::strsignal(number_);
   }
 
@@ -138,7 +143,7 @@ class StopSignals {
     while (::sigwait(&signals_, &number) != 0) continue;
     if (over.stop_requested()) return;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       number_ = number;
     }
     came_.notify_all();
@@ -152,9 +157,9 @@ class StopSignals {
   }
 
   sigset_t signals_;
-  std::mutex mutex_;
-  std::condition_variable came_;
-  int number_ = 0;  // guarded by mutex_
+  Mutex mutex_;
+  Condition came_;
+  int number_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::jthread thread_;
 };
 
@@ -199,7 +204,7 @@ int run(const Arguments& arguments) {
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
   if (arguments.check) return check(server, arguments.config);
-  if (!server.problems.empty()) return refuse(refused("{}", fmt::join(server.problems, "\n")).value());
+  if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config);
   if (served) return 0;
@@ -211,12 +216,20 @@ int run(const Arguments& arguments) {
 }  // namespace trammel
 
 int main(int argc, char** argv) {
-  CLI::App app("Serves compensated robot models over DDS.", "trammeld");
+  CLI::App app("Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or SIGINT.",
+               "trammeld");
+  app.footer(
+      "Exit codes: 0 stopped by a signal, or checked and good; 2 wrong usage, or an address that this host does not\n"
+      "have; 3 a file, the store or the port is refused; 70 the process hung and ended itself (start it again:\n"
+      "deploy/supervise does). Each problem is a line of its own on standard error.");
   trammel::Arguments arguments;
-  app.add_option("--config", arguments.config, "server file, see config/server.yaml")->required();
-  app.add_flag("--check", arguments.check, "only say what a start or a first training would refuse; changes nothing");
-  app.add_option("--store", arguments.store, "database instead of the server file's");
-  app.add_option("--port", arguments.port, "UDP port instead of the server file's")->check(CLI::Range(1024, 65535));
+  app.add_option("--config", arguments.config, "Server file (YAML); config/server.yaml has every key with its default")
+      ->required();
+  app.add_flag("--check", arguments.check,
+               "Only say all that a start or a first training would refuse, and change nothing");
+  app.add_option("--store", arguments.store, "Store (SQLite file) instead of the server file's");
+  app.add_option("--port", arguments.port, "UDP port where clients look for it, instead of the server file's")
+      ->check(CLI::Range(1024, 65535));
   app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));
   try {
     app.parse(argc, argv);

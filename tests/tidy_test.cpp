@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <map>
 #include <optional>
 #include <regex>
@@ -62,7 +63,8 @@ const std::vector<Reserved> kReserved = {
     {"SQLite", std::regex("^(sqlite3\\.h|SQLiteCpp/.*)$"), std::regex("^server/store/.*")},
 };
 
-const std::set<std::string> kTestFoldersWithoutMirror = {"support", "end_to_end", "benchmarks", "fuzz", "clients"};
+const std::set<std::string> kTestFoldersWithoutMirror = {"support", "end_to_end", "benchmarks",
+                                                         "fuzz",    "package",    "clients"};
 
 std::string folder_of(const std::string& path) {
   const auto slash = path.rfind('/');
@@ -409,6 +411,30 @@ Complaints check_sleeps(const SourceTree& tree) {
   return complaints;
 }
 
+/// Complains of locks that clang does not see, and of mutexes that say neither by an annotation nor by a comment on
+/// their line what they guard.
+Complaints check_locks(const SourceTree& tree) {
+  static const std::regex kUnseen(
+      R"(\bstd\s*::\s*((recursive_|shared_|timed_)*mutex|(lock|scoped|unique|shared)_(guard|lock)|condition_variable(_any)?)\b)");
+  static const std::regex kMutex(R"(^ +(mutable )?Mutex (\w+_?);( *//.*)?$)");
+  Complaints complaints;
+  find_in_code(
+      tree, kUnseen, "a lock that is not of server/base/mutex.h",
+      [](const std::string& path) { return !is_under(path, "tests") && path != "server/base/mutex.h"; }, complaints);
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || is_under(path, "tests")) continue;
+    std::istringstream lines(text);
+    std::string line;
+    for (int number = 1; std::getline(lines, line); ++number) {
+      std::smatch mutex;
+      if (!std::regex_match(line, mutex, kMutex) || mutex[3].matched) continue;
+      if (text.find("TRAMMEL_GUARDED_BY(" + mutex.str(2) + ")") == std::string::npos)
+        complaints.push_back(path + ":" + std::to_string(number) + ": " + mutex.str(2) + " guards nothing");
+    }
+  }
+  return complaints;
+}
+
 Complaints check_mirror(const SourceTree& tree) {
   std::set<std::string> server, tests;
   for (const auto& [path, text] : tree) {
@@ -423,6 +449,134 @@ Complaints check_mirror(const SourceTree& tree) {
     complaints.push_back("tests/" + folder + ": there is no server/" + folder);
   }
   return complaints;
+}
+
+// How long functions are.
+
+/// The most lines of a function, from the first of its declaration to its closing brace.
+constexpr int kMostLines = 60;
+
+struct Function {
+  std::string name;
+  int line = 0;   ///< its first
+  int lines = 0;  ///< with the closing brace
+};
+
+/// Code without preprocessor lines; lines stay where they are.
+std::string without_directives(const std::string& code) {
+  std::istringstream lines(code);
+  std::string kept;
+  bool continued = false;
+  for (std::string line; std::getline(lines, line);) {
+    const auto first = line.find_first_not_of(" \t");
+    const bool directive = continued || (first != std::string::npos && line[first] == '#');
+    continued = directive && line.ends_with('\\');
+    kept += (directive ? "" : line) + "\n";
+  }
+  return kept;
+}
+
+/// `text` with what stands in round or square brackets left out, the brackets kept.
+std::string outside_brackets(const std::string& text) {
+  std::string outside;
+  int depth = 0;
+  for (const char c : text) {
+    if (c == ')' || c == ']') --depth;
+    if (depth <= 0) outside += c;
+    if (c == '(' || c == '[') ++depth;
+  }
+  return outside;
+}
+
+/// What a brace opens, by the text between it and the statement before.
+enum class Opens { kScope, kFunction, kMember, kOther };
+Opens opened_by(const std::string& header) {
+  static const std::regex kType(
+      R"(^(template\s*<.*>)?\s*(inline\s+)?((namespace|class|struct|union|enum)\b|extern\s*$))");
+  static const std::regex kOperator(R"(\boperator\s*(\(\)|\[\]|[^\s\w(]+))"),
+      kTemplate(R"(^\s*template\s*<[^()]*?>\s)");
+  static const std::regex kMember(R"(\(\)[^:]*:[^:].*[\w>]\s*$)");
+  const std::string plain = std::regex_replace(std::regex_replace(header, kOperator, "called"), kTemplate, "");
+  const std::string outside = outside_brackets(plain);
+  if (outside.find('=') != std::string::npos) return Opens::kOther;
+  if (std::regex_search(plain, kType)) return Opens::kScope;
+  if (std::regex_search(outside, kMember)) return Opens::kMember;
+  return outside.find("()") != std::string::npos ? Opens::kFunction : Opens::kOther;
+}
+
+std::string name_in(const std::string& header) {
+  static const std::regex kName(R"(([\w~]+|operator\s*[^\s\w(]+|operator\s*\(\))\s*\()");
+  std::smatch found;
+  return std::regex_search(header, found, kName) ? std::string(found[1]) : header;
+}
+
+/// The functions of a file; what stands inside a function, lambdas and local types, is part of it.
+std::vector<Function> functions_of(std::string_view text) {
+  const std::string code = without_directives(code_of(text));
+  std::vector<Function> functions;
+  std::string header;  // since the last statement or brace of a scope
+  int line = 1, first = 1, inside = 0;
+  bool is_function = false;
+  for (const char c : code) {
+    if (c == '\n') ++line;
+    if (inside > 0) {
+      inside += c == '{' ? 1 : c == '}' ? -1 : 0;
+      if (inside > 0) continue;
+      if (is_function) functions.push_back({name_in(header), first, line - first + 1});
+      if (is_function) header.clear();
+      continue;
+    }
+    const Opens opens = c == '{' ? opened_by(header) : Opens::kScope;
+    if (c == '{' && opens != Opens::kScope) {
+      inside = 1;
+      is_function = opens == Opens::kFunction;
+    } else if (c == '{' || c == '}' || (c == ';' && outside_brackets(header + ";").ends_with(';'))) {
+      header.clear();
+    } else if (!header.empty() || !std::isspace(static_cast<unsigned char>(c))) {
+      if (header.empty()) first = line;
+      header += c;
+      if (header == "public:" || header == "private:" || header == "protected:") header.clear();
+    }
+  }
+  return functions;
+}
+
+/// Of server/ and clients/, those of three lines and more: shorter ones are names for an expression.
+std::vector<Function> functions_of(const SourceTree& tree) {
+  std::vector<Function> all;
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || !(is_under(path, "server") || is_under(path, "clients"))) continue;
+    for (Function& function : functions_of(text)) {
+      function.name = path + ":" + std::to_string(function.line) + ": " + function.name;
+      if (function.lines >= 3) all.push_back(std::move(function));
+    }
+  }
+  return all;
+}
+
+Complaints check_lengths(const std::vector<Function>& functions) {
+  Complaints complaints;
+  for (const Function& function : functions) {
+    if (function.lines <= kMostLines) continue;
+    complaints.push_back(function.name + ": " + std::to_string(function.lines) + " lines, limit " +
+                         std::to_string(kMostLines));
+  }
+  return complaints;
+}
+
+/// `1234 functions, median 8 lines, 90 % at most 23, longest 60`; of one room where `folder` says it.
+std::string lengths_in(const std::vector<Function>& functions, const std::string& folder) {
+  std::vector<int> lines;
+  for (const Function& function : functions) {
+    if (function.name.starts_with(folder + "/")) lines.push_back(function.lines);
+  }
+  std::sort(lines.begin(), lines.end());
+  if (lines.empty()) return "no functions";
+  const auto at = [&](double share) {
+    return std::to_string(lines[static_cast<std::size_t>(share * static_cast<double>(lines.size() - 1))]);
+  };
+  return std::to_string(lines.size()) + " functions, median " + at(0.5) + " lines, 90 % at most " + at(0.9) +
+         ", longest " + at(1);
 }
 
 Rooms read_rooms() {
@@ -484,6 +638,21 @@ TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
 TEST(Tidy, NobodySleeps) { EXPECT_EQ(shown(check_sleeps(read_source_tree())), ""); }
+
+TEST(Tidy, NoFunctionIsLongerThanAScreen) {
+  const SourceTree tree = read_source_tree();
+  const std::vector<Function> all = functions_of(tree);
+  EXPECT_EQ(shown(check_lengths(all)), "");
+  std::set<std::string> rooms;
+  for (const auto& [path, text] : tree) rooms.insert(room_of(folder_of(path)));
+  for (const std::string& room : rooms) {
+    if (is_under(room, "server") || is_under(room, "clients"))
+      std::cout << room << ": " << lengths_in(all, room) << "\n";
+  }
+  std::cout << "server: " << lengths_in(all, "server") << "\nclients: " << lengths_in(all, "clients") << "\n";
+}
+
+TEST(Tidy, EveryLockIsOneThatTheCompilerChecks) { EXPECT_EQ(shown(check_locks(read_source_tree())), ""); }
 
 TEST(Tidy, TestFoldersMirrorTheServer) { EXPECT_EQ(shown(check_mirror(read_source_tree())), ""); }
 
@@ -667,12 +836,76 @@ TEST(TidyChecks, TellCodeFromCommentsAndLiterals) {
   EXPECT_EQ(code_of("'\"' a '\\'' 1'000'000 b"), " a  1'000'000 b");
 }
 
+std::string functions(std::string_view text) {
+  std::string all;
+  for (const Function& function : functions_of(text))
+    all += function.name + " " + std::to_string(function.line) + " " + std::to_string(function.lines) + "\n";
+  return all;
+}
+
+TEST(TidyChecks, CountTheLinesOfFunctionsFromTheirFirstToTheirBrace) {
+  EXPECT_EQ(functions("#include <a>\nnamespace a {\n\nint one() { return 1; }\n\n"
+                      "// { not code\ntemplate <int N = 3>\nint\ntwo(int a = 3) {\n  return a;\n}\n}\n"),
+            "one 4 1\ntwo 7 5\n");
+  EXPECT_EQ(functions("class CAPABILITY(1) A final : public B {\n  A() : a_{1}, b_(2) {\n    a_ = b_;\n  }\n  bool "
+                      "operator==(A b) const {\n"
+                      "    return true;\n  }\n private:\n  int f() const override {\n    return 3;\n  }\n};\n"),
+            "A 2 3\noperator== 5 3\nf 9 3\n");
+}
+
+TEST(TidyChecks, TakeWhatStandsInAFunctionForAPartOfIt) {
+  EXPECT_EQ(functions("void f() {\n  const auto g = [](int a) {\n    return a;\n  };\n  struct B {\n    int h() {\n"
+                      "      return 1;\n    }\n  };\n  if (g(1)) {\n    for (;;) {\n    }\n  }\n}\n"),
+            "f 1 14\n");
+}
+
+TEST(TidyChecks, TakeTablesAndTypesForNoFunctions) {
+  EXPECT_EQ(functions("const A kTable[] = {\n  {f(1), {2}},\n  {g()}};\nenum class E {\n  kA,\n  kB };\n"
+                      "int x{3};\nstd::array<int, 2> y() {\n  return {1, 2};\n}\n"),
+            "y 8 3\n");
+}
+
+TEST(TidyChecks, ComplainOfFunctionsThatAreTooLong) {
+  const auto lines = [](int count) {
+    std::string text = "void f() {\n";
+    for (int i = 2; i < count; ++i) text += "  g();\n";
+    return text + "}\n";
+  };
+  EXPECT_EQ(
+      shown(check_lengths(functions_of(SourceTree{{"server/a/a.cpp", lines(60)}, {"tests/a/a.cpp", lines(100)}}))), "");
+  EXPECT_EQ(shown(check_lengths(functions_of(
+                SourceTree{{"server/a/a.cpp", "\n" + lines(61)}, {"clients/b/b.h", lines(3) + lines(70)}}))),
+            "clients/b/b.h:4: f: 70 lines, limit 60\nserver/a/a.cpp:2: f: 61 lines, limit 60\n");
+}
+
+TEST(TidyChecks, TellMedianAndLongestOfARoom) {
+  EXPECT_EQ(
+      lengths_in(functions_of(SourceTree{
+                     {"server/a/a.cpp", "void f() {\n  g();\n}\nvoid h() {\n  g();\n\n}\nint i() { return 1; }\n"}}),
+                 "server/a"),
+      "2 functions, median 3 lines, 90 % at most 3, longest 4");
+}
+
 TEST(TidyChecks, FindSleepsEverywhere) {
   EXPECT_EQ(shown(check_sleeps({{"tests/bias/a_test.cpp", "/* one\ntwo */ std::this_thread::sleep_for(1s);\n"},
                                 {"clients/cli/a.cpp", "usleep(10);\n"},
                                 {"server/base/a.cpp", "const char* s = R\"(usleep(10))\"; // sleep(1)\n"}})),
             "clients/cli/a.cpp:1: sleeps instead of waiting for a state\n"
             "tests/bias/a_test.cpp:2: sleeps instead of waiting for a state\n");
+}
+
+TEST(TidyChecks, FindLocksThatTheCompilerDoesNotCheck) {
+  EXPECT_EQ(shown(check_locks({{"server/base/mutex.h", "std::mutex mutex_;\n"},
+                               {"server/a/a.h", "  std::mutex mutex_;\n  std::condition_variable_any c_;\n"},
+                               {"server/b/b.cpp", "const std::lock_guard lock(mutex_);\nstd::once_flag once;\n"},
+                               {"tests/b/b_test.cpp", "std::mutex mutex_;\n"}})),
+            "server/a/a.h:1: a lock that is not of server/base/mutex.h\n"
+            "server/a/a.h:2: a lock that is not of server/base/mutex.h\n"
+            "server/b/b.cpp:1: a lock that is not of server/base/mutex.h\n");
+  EXPECT_EQ(shown(check_locks({{"server/a/a.h", "  Mutex mutex_;\n  int n_ TRAMMEL_GUARDED_BY(mutex_);\n"},
+                               {"server/b/b.h", "  Mutex mutex_;  // one at a time\n"},
+                               {"server/c/c.h", "  mutable Mutex mutex_;\n  int n_;\n"}})),
+            "server/c/c.h:1: mutex_ guards nothing\n");
 }
 
 TEST(TidyChecks, ComplainOfATestFolderWithoutItsServerFolder) {

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/output.h"
 
 namespace trammel::cli {
 
@@ -32,14 +33,25 @@ int exit_code(ErrorCode code) {
   return kRefusedData;
 }
 
+namespace {
+
+/// Where a command was asked to write its result for programs; empty where it was not.
+std::string json_path_of(const CLI::App& command) {
+  const CLI::Option* option = command.get_option_no_throw("--json");
+  return option == nullptr || option->empty() ? std::string() : option->as<std::string>();
+}
+
+}  // namespace
+
 int run_command_line(int argc, const char* const* argv) {
   CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
   app.set_version_flag("--version", TRAMMEL_VERSION);
   app.require_subcommand(0, 1);
   app.footer(
-      "Exit codes: 0 done, 1 done but not all (targets left as they were, a model not in force), 2 wrong usage,\n"
-      "3 refused data, 4 unreachable or busy service.\n"
-      "A file named '-' is standard output.");
+      "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of what they belong to.\n"
+      "An output file named '-' is standard output. Errors go to standard error and name file, row, value and limit.\n"
+      "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong usage;\n"
+      "3 refused data; 4 service unreachable or busy.");
   Action chosen;
   add_plan_command(app, chosen);
   add_pose_commands(app, chosen);
@@ -59,10 +71,13 @@ int run_command_line(int argc, const char* const* argv) {
     fmt::print(stderr, "A command is required\n{}", app.help());
     return kWrongUsage;
   }
-  const std::string command = app.get_subcommands().front()->get_name();
+  const CLI::App& command = *app.get_subcommands().front();
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  fmt::print(stderr, "trammel {}: {}\n", command, sentence(done.error()));
+  for (const Error& one : apart(done.error())) {
+    fmt::print(stderr, "trammel {}: {}\n", command.get_name(), sentence(one));
+  }
+  tell_refusal(done.error(), json_path_of(command));
   return exit_code(done.error().code);
 }
 

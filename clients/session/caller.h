@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <condition_variable>
 #include <cstdint>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -17,6 +15,7 @@
 
 #include "clients/session/server_watch.h"
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 
 namespace trammel::client {
 
@@ -70,16 +69,16 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     request.header().reply_partition(partition_);
     auto& id = request.header().request_id();
     id.writer_guid(guid_);
-    const auto waiting = std::make_shared<Waiting>();
-    std::unique_lock lock(mutex_);
-    if (!room_.wait_until(lock, deadline, [this] { return waiting_.size() < wire::kReplyDepth; })) {
+    MutexLock lock(mutex_);
+    if (!room_.wait_until(lock, deadline,
+                          [this]() TRAMMEL_REQUIRES(mutex_) { return waiting_.size() < wire::kReplyDepth; })) {
       return failure(ErrorCode::kBusy, "{}: {} calls of this session are unanswered", Operation::kName,
                      wire::kReplyDepth);
     }
     id.sequence_number(++last_sequence_);
-    waiting_.emplace(last_sequence_, waiting);
+    waiting_.try_emplace(last_sequence_);
     lock.unlock();
-    auto answer = attempt_twice(request, route, *waiting, deadline);
+    auto answer = attempt_twice(request, route, deadline);
     lock.lock();
     waiting_.erase(id.sequence_number());
     room_.notify_one();
@@ -87,15 +86,16 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
  private:
+  /// A call under way; one of waiting_, and guarded with it.
   struct Waiting {
-    std::condition_variable changed;
-    std::optional<Reply> reply;  // guarded by the caller's mutex_
+    Condition changed;
+    std::optional<Reply> reply;
   };
 
   Caller(wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, std::string partition, ServerWatch& watch)
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
-  Result<Reply> attempt_twice(Request& request, const Route& route, Waiting& waiting, Clock::time_point deadline) {
+  Result<Reply> attempt_twice(Request& request, const Route& route, Clock::time_point deadline) {
     const auto now = Clock::now();
     std::string asked;
     for (const bool again : {false, true}) {
@@ -111,8 +111,11 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       if (!writer_->write(&request)) {
         return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
       }
-      std::unique_lock lock(mutex_);
-      waiting.changed.wait_until(lock, until, [&] { return waiting.reply || !readers_.contains(server->participant); });
+      MutexLock lock(mutex_);
+      Waiting& waiting = waiting_.at(request.header().request_id().sequence_number());
+      waiting.changed.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
+        return waiting.reply || !readers_.contains(server->participant);
+      });
       if (waiting.reply) return std::move(*waiting.reply);
     }
     return asked.empty()
@@ -121,30 +124,35 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
   [[nodiscard]] bool reachable(const std::string& participant, bool and_back) const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return readers_.contains(participant) && (!and_back || writers_.contains(participant));
   }
 
   void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
-    matched(readers_, status.last_subscription_handle, status.current_count_change);
+    {
+      const MutexLock lock(mutex_);
+      matched(readers_, status.last_subscription_handle, status.current_count_change);
+    }
+    watch_.wake();
   }
 
   void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
-    matched(writers_, status.last_publication_handle, status.current_count_change);
-  }
-
-  void matched(std::set<std::string>& peers, const wire::dds::InstanceHandle_t& peer, int change) {
-    const std::string participant = wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(peer));
     {
-      const std::lock_guard lock(mutex_);
-      if (change > 0) {
-        peers.insert(participant);
-      } else {
-        peers.erase(participant);
-        for (const auto& [sequence, waiting] : waiting_) waiting->changed.notify_all();
-      }
+      const MutexLock lock(mutex_);
+      matched(writers_, status.last_publication_handle, status.current_count_change);
     }
     watch_.wake();
+  }
+
+  void matched(std::set<std::string>& peers, const wire::dds::InstanceHandle_t& peer, int change)
+      TRAMMEL_REQUIRES(mutex_) {
+    const std::string participant = wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(peer));
+    if (change > 0) {
+      peers.insert(participant);
+    } else {
+      peers.erase(participant);
+      for (auto& [sequence, waiting] : waiting_) waiting.changed.notify_all();
+    }
   }
 
   void on_data_available(wire::dds::DataReader* reader) override {
@@ -152,12 +160,12 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     wire::dds::SampleInfo info;
     while (reader->take_next_sample(&reply, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
       if (!info.valid_data) continue;
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       const wire::SampleIdentity& id = reply.header().related_request_id();
       const auto found = waiting_.find(id.sequence_number());
-      if (found == waiting_.end() || found->second->reply || id.writer_guid() != guid_) continue;
-      found->second->reply = std::move(reply);
-      found->second->changed.notify_all();
+      if (found == waiting_.end() || found->second.reply || id.writer_guid() != guid_) continue;
+      found->second.reply = std::move(reply);
+      found->second.changed.notify_all();
       reply = Reply();
     }
   }
@@ -169,12 +177,12 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   wire::dds::DataWriter* writer_ = nullptr;
   wire::dds::DataReader* reader_ = nullptr;
   std::array<std::uint8_t, 16> guid_{};  // of writer_
-  mutable std::mutex mutex_;
-  std::condition_variable room_;   // waiting_ has become smaller
-  std::set<std::string> readers_;  // guarded by mutex_: participants that read our requests
-  std::set<std::string> writers_;  // guarded by mutex_: participants that write replies to us
-  std::map<std::int64_t, std::shared_ptr<Waiting>> waiting_;  // guarded by mutex_; by sequence number
-  std::int64_t last_sequence_ = 0;                            // guarded by mutex_
+  mutable Mutex mutex_;
+  Condition room_;                                                      // waiting_ has become smaller
+  std::set<std::string> readers_ TRAMMEL_GUARDED_BY(mutex_);            // participants that read our requests
+  std::set<std::string> writers_ TRAMMEL_GUARDED_BY(mutex_);            // participants that write replies to us
+  std::map<std::int64_t, Waiting> waiting_ TRAMMEL_GUARDED_BY(mutex_);  // by sequence number
+  std::int64_t last_sequence_ TRAMMEL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace trammel::client

@@ -2,8 +2,9 @@
 
 #include <string>
 
-#include "clients/session/session.h"
+#include "clients/session/session_types.h"
 #include "idl/valid.h"
+#include "server/base/result.h"
 
 /// Between the session's types and the wire's.
 namespace trammel::client {

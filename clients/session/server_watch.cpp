@@ -41,9 +41,9 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
 std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
                                                         Clock::time_point deadline,
                                                         const std::function<bool(const KnownServer&)>& reachable) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
-  changed_.wait_until(lock, deadline, [&] {
+  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
     chosen = choose(cell, avoid, reachable);
     return chosen != nullptr;
   });
@@ -67,30 +67,33 @@ const KnownServer* ServerWatch::choose(const std::string& cell, const std::strin
 }
 
 void ServerWatch::wake() {
-  { const std::lock_guard lock(mutex_); }
+  { const MutexLock lock(mutex_); }
   changed_.notify_all();
 }
 
 std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, deadline, [&] { return !servers_.empty(); });
+  MutexLock lock(mutex_);
+  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
   changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
-                      [&] { return servers_.size() >= count; });
+                      [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count; });
   std::vector<KnownServer> servers;
   for (const auto& [id, server] : servers_) servers.push_back(server);
   return servers;
 }
 
+bool ServerWatch::knows_all_models() const {
+  for (const auto& [id, server] : servers_) {
+    int known = 0;
+    for (const auto& [key, model] : models_) known += key.first == server.participant ? 1 : 0;
+    if (known < server.status.models_in_force()) return false;
+  }
+  return true;
+}
+
 std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod, [&] {
-    return std::all_of(servers_.begin(), servers_.end(), [&](const auto& entry) {
-      const auto known = std::count_if(models_.begin(), models_.end(), [&](const auto& model) {
-        return model.first.first == entry.second.participant;
-      });
-      return known >= entry.second.status.models_in_force();
-    });
-  });
+  MutexLock lock(mutex_);
+  changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod,
+                      [this]() TRAMMEL_REQUIRES(mutex_) { return knows_all_models(); });
   std::map<std::string, wire::ModelInfo> newest;
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
@@ -105,9 +108,9 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
 
 std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& server, std::int64_t job,
                                                         std::uint64_t& seen, Clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   std::optional<wire::Job> news;
-  changed_.wait_until(lock, deadline, [&] {
+  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
     for (const auto& [from, progress] : jobs_[job]) {
       if ((!server.empty() && from != server) || progress.first <= seen) continue;
       seen = progress.first;
@@ -120,7 +123,7 @@ std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& serve
 
 void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (status != nullptr) {
       servers_[status->server().to_string()] = {participant, *status, Clock::now()};
     } else {
@@ -132,7 +135,7 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
 
 void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (status != nullptr) {
       models_[{participant, status->cell().to_string()}] = {status->model(), written_unix_s};
     } else {
@@ -145,7 +148,7 @@ void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& p
 void ServerWatch::on_progress(const wire::TrainingProgress* progress) {
   if (progress == nullptr) return;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     jobs_[progress->number()][progress->server().to_string()] = {++progress_count_, progress->job()};
     if (jobs_.size() > kJobsRemembered) jobs_.erase(jobs_.begin());
   }

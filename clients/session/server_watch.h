@@ -1,20 +1,19 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 
 namespace trammel::client {
 
@@ -116,14 +115,19 @@ class ServerWatch {
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
   void on_progress(const wire::TrainingProgress* progress);
   [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
-                                          const std::function<bool(const KnownServer&)>& reachable) const;
+                                          const std::function<bool(const KnownServer&)>& reachable) const
+      TRAMMEL_REQUIRES(mutex_);
+  /// As many of each server as it says it has.
+  [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::map<std::string, KnownServer> servers_;                        // guarded by mutex_; by id
-  std::map<std::pair<std::string, std::string>, KnownModel> models_;  // guarded; by participant and cell
-  std::map<std::int64_t, std::map<std::string, std::pair<std::uint64_t, wire::Job>>> jobs_;  // guarded; by server
-  std::uint64_t progress_count_ = 0;                                                         // guarded by mutex_
+  Mutex mutex_;
+  Condition changed_;
+  std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
+  std::map<std::pair<std::string, std::string>, KnownModel> models_
+      TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell
+  std::map<std::int64_t, std::map<std::string, std::pair<std::uint64_t, wire::Job>>> jobs_
+      TRAMMEL_GUARDED_BY(mutex_);  // by number, then by server
+  std::uint64_t progress_count_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<StateReader<wire::ServiceStatusTopic>> status_reader_;
   std::unique_ptr<StateReader<wire::ModelStatusTopic>> model_reader_;
   std::unique_ptr<StateReader<wire::TrainingProgressTopic>> progress_reader_;

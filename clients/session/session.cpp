@@ -1,24 +1,26 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
-#include <mutex>
 #include <random>
 #include <utility>
 
 #include "clients/session/caller.h"
 #include "clients/session/convert.h"
+#include "clients/session/parts.h"
 #include "clients/session/server_watch.h"
 #include "idl/limits.h"
+#include "idl/manage_text.h"
 
 namespace trammel::client {
 namespace {
 
-constexpr int kAttemptsAtOneModel = 5;
+/// That the answer to one part of a long call takes: far from half of it, when a request is sent once more.
+constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
 /// Room for everything but the text in the largest sample.
 constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
-/// Nobody else's, on any host.
+/// A name that no other client has, on whatever host: 128 random bits.
 std::string make_partition() {
   std::random_device random;
   return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
@@ -28,10 +30,12 @@ std::string make_partition() {
 Status check_text(const std::string& what, const std::string& text) {
   if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
-    return refused("{} row {}: a NUL byte, not text", what, line);
+    return refused("a NUL byte, not text").in(what).at_row(line);
   }
   if (text.size() <= kMaxText) return {};
-  return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, text.size(), kMaxText);
+  return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), kMaxText)
+      .in(what)
+      .beyond(text.size(), kMaxText);
 }
 
 bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed"; }
@@ -76,20 +80,17 @@ struct Session::Participant {
                                                              const Route& route) {
     auto reply = caller.call(std::move(request), route, deadline());
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
-      return failure(ErrorCode::kUnreachable, "{} ({})", sentence(reply.error()), where_it_looked());
+      Error error = reply.error();
+      error.message += fmt::format(" ({})", where_it_looked());
+      return Failure(std::move(error)).of("server").with_text(where_it_looked());
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
   }
 
-  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action, int version,
-                                                       const std::string& text = {}) {
-    wire::ManageModelsRequest request;
+  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageModelsRequest request) {
     request.about().cell(cell);
-    request.action(action);
-    request.version(version);
-    request.text(text);
-    const bool looks_only = action == wire::MANAGE_LIST || action == wire::MANAGE_EXPORT;
+    const bool looks_only = request.action() == wire::MANAGE_LIST || request.action() == wire::MANAGE_EXPORT;
     return call<wire::ManageModels>(*manage_models, std::move(request), {cell, {}, !looks_only});
   }
 
@@ -117,34 +118,26 @@ struct Session::Participant {
   /// Sends `items` in parts, all to be answered by one model.
   template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
   [[nodiscard]] Result<Answer<Item>> call_in_parts(Caller<Operation>& caller, const CallContext& context,
-                                                   const std::vector<Wire>& items, const Put& put, const Get& get) {
-    for (int attempt = 0; attempt < kAttemptsAtOneModel; ++attempt) {
-      Answer<Item> answer;
-      bool one_model = true;
-      for (std::size_t first = 0; one_model && (first == 0 || first < items.size());
-           first += wire::kTargetsPerRequest) {
-        const std::size_t count = std::min(wire::kTargetsPerRequest, items.size() - first);
-        typename Operation::Request::type request;
-        request.about(to_wire(context));
-        for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-        auto reply = call(caller, std::move(request), {context.cell, {}, false});
-        if (!reply) {
-          if (first == 0 || reply.error().code == ErrorCode::kUnreachable) return tl::make_unexpected(reply.error());
-          return failure(reply.error().code, "after the first {}: {}", first, sentence(reply.error()));
-        }
-        if (get(*reply).size() != count) {
-          return failure(ErrorCode::kInternal, "server {} answered {} items for {}",
-                         reply->header().server().to_string(), get(*reply).size(), count);
-        }
-        const ModelInfo model = from_wire(reply->model());
-        one_model = first == 0 || (model.hash == answer.model.hash && model.version == answer.model.version);
-        if (first == 0) answer.model = model;
-        for (const auto& item : get(*reply)) answer.items.push_back(from_wire(item));
+                                                   const std::vector<Wire>& items, const ShareListener& progress,
+                                                   const Put& put, const Get& get) {
+    const AskPart<Item> ask = [&](std::size_t first, std::size_t count) -> Result<Answer<Item>> {
+      typename Operation::Request::type request;
+      request.about(to_wire(context));
+      for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
+      const auto reply = call(caller, std::move(request), {context.cell, {}, false});
+      if (!reply) return tl::make_unexpected(reply.error());
+      if (get(*reply).size() != count) {
+        return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),
+                       get(*reply).size(), count);
       }
-      if (one_model) return answer;
-    }
-    return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", context.cell,
-                   kAttemptsAtOneModel);
+      Answer<Item> answer;
+      answer.model = from_wire(reply->model());
+      for (const auto& item : get(*reply)) answer.items.push_back(from_wire(item));
+      return answer;
+    };
+    const PartSize size(kShareOfTimeout * PartSize::Seconds(options.timeout), wire::kTargetsPerRequest);
+    return ask_in_parts<Item>(items.size(), context.cell, size, ask, progress,
+                              [] { return PartSize::Seconds(Clock::now().time_since_epoch()); });
   }
 };
 
@@ -183,20 +176,22 @@ Session::Session(std::unique_ptr<Participant> participant) : participant_(std::m
 Session::~Session() = default;
 
 Result<Answer<PredictedError>> Session::predict_error(const CallContext& context,
-                                                      const std::vector<std::vector<double>>& joints_rad) {
+                                                      const std::vector<std::vector<double>>& joints_rad,
+                                                      const ShareListener& progress) {
   return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      *participant_->predict_error, context, joints_rad,
+      *participant_->predict_error, context, joints_rad, progress,
       [](wire::PredictErrorRequest & request) -> auto& { return request.joints_rad(); },
       [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
 }
 
 Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& context,
-                                                         const std::vector<TargetMm>& targets) {
+                                                         const std::vector<TargetMm>& targets,
+                                                         const ShareListener& progress) {
   std::vector<wire::Target> items;
   items.reserve(targets.size());
   for (const TargetMm& target : targets) items.push_back(to_wire(target));
   return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
-      *participant_->correct_target, context, items,
+      *participant_->correct_target, context, items, progress,
       [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
       [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
 }
@@ -271,15 +266,14 @@ Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cel
 }
 
 Status Session::release(const std::string& cell, const std::string& batch_id) {
-  const auto reply = participant_->manage(cell, wire::MANAGE_RELEASE, 0, batch_id);
+  const auto reply = participant_->manage(cell, wire::release_of_batch(batch_id));
   if (!reply) return tl::make_unexpected(reply.error());
   return {};
 }
 
 Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,
                                                 const std::string& level, const std::string& bias) {
-  const auto reply =
-      participant_->manage(cell, wire::MANAGE_RELEASE_AND_TRAIN, 0, release_text(batch_ids, level, bias));
+  const auto reply = participant_->manage(cell, wire::release_and_train_of(release_text(batch_ids, level, bias)));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job().number();
 }
@@ -303,7 +297,7 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
-  const auto reply = participant_->manage(cell, wire::MANAGE_LIST, 0);
+  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_LIST));
   if (!reply) return tl::make_unexpected(reply.error());
   std::vector<ModelInfo> models;
   for (const wire::ModelInfo& model : reply->models()) models.push_back(from_wire(model));
@@ -311,26 +305,26 @@ Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
 }
 
 Result<int> Session::activate(const std::string& cell, int version) {
-  const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, version);
+  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_ACTIVATE, version));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }
 
 Result<int> Session::rollback(const std::string& cell) {
-  const auto reply = participant_->manage(cell, wire::MANAGE_ROLLBACK, 0);
+  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_ROLLBACK));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }
 
 Result<std::string> Session::export_model(const std::string& cell, int version) {
-  auto reply = participant_->manage(cell, wire::MANAGE_EXPORT, version);
+  auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_EXPORT, version));
   if (!reply) return tl::make_unexpected(reply.error());
   return std::move(reply->text());
 }
 
 Result<int> Session::import_model(const std::string& cell, const std::string& text) {
   if (const Status fits = check_text("the model", text); !fits) return tl::make_unexpected(fits.error());
-  const auto reply = participant_->manage(cell, wire::MANAGE_IMPORT, 0, text);
+  const auto reply = participant_->manage(cell, wire::import_of_model(text));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }

@@ -77,7 +77,7 @@ class Scanner {
           return within("arrays and objects", ++containers_, limits_.containers);
         });
       case Piece::kClose:
-        if (depth_ == 0) return refused("{}: not JSON: byte {} closes what was not opened", where_, token.begin);
+        if (depth_ == 0) return refused("not JSON: byte {} closes what was not opened", token.begin).in(where_);
         --depth_;
         return {};
       case Piece::kText:
@@ -95,7 +95,7 @@ class Scanner {
 
   Status within(const char* what, std::size_t count, std::size_t limit) const {
     if (count <= limit) return {};
-    return failure(ErrorCode::kTooLarge, "{}: {} {}, limit {}", where_, count, what, limit);
+    return failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit).in(where_).beyond(count, limit);
   }
 
   std::string_view json_;
@@ -106,7 +106,9 @@ class Scanner {
 
 Status check_size(std::string_view json, const std::string& where, const JsonLimits& limits) {
   if (json.size() <= limits.bytes) return {};
-  return failure(ErrorCode::kTooLarge, "{}: {} bytes, limit {}", where, json.size(), limits.bytes);
+  return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", json.size(), limits.bytes)
+      .in(where)
+      .beyond(json.size(), limits.bytes);
 }
 
 /// Collects the members of the outermost object while the pieces go by.
@@ -154,14 +156,14 @@ class Members {
   Status end_member() {
     if (!key_ || !begin_) return no_object();
     if (!found_.emplace(*key_, json_.substr(*begin_, end_ - *begin_)).second) {
-      return refused("{}: not JSON: the key {} comes twice", where_, *key_);
+      return refused("not JSON: the key {} comes twice", *key_).in(where_).of(*key_);
     }
     key_.reset();
     begin_.reset();
     return {};
   }
 
-  [[nodiscard]] Status no_object() const { return refused("{}: not a JSON object with keys and values", where_); }
+  [[nodiscard]] Status no_object() const { return refused("not a JSON object with keys and values").in(where_); }
 
   std::string_view json_;
   const std::string& where_;

@@ -4,8 +4,10 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 namespace trammel {
 
@@ -21,6 +23,9 @@ enum class ErrorCode {
   kInternal      ///< the disk, the database, a corrupt file of our own (exit 3)
 };
 
+/// As programs read it: `refused`, `not_found`.
+[[nodiscard]] const char* to_text(ErrorCode code);
+
 /// An expected failure, as data: programs and tests ask the members, people read `sentence()`. What is not known is
 /// left empty.
 struct Error {
@@ -28,14 +33,22 @@ struct Error {
   std::string message;          ///< one clause that says what, with value and limit: `joint 3 is 241.2 deg, limit 70.0`
   std::string file;             ///< path or id of what was read: a file, a batch, a model
   std::optional<long> row;      ///< line of the file, counted from 1 with its header
-  std::string field;            ///< column, key or option
+  std::string field;            ///< column, key (`tools: spindle: xyz_mm`) or option
   std::optional<double> value;  ///< as read, in the unit of the field
   std::optional<double> limit;  ///< that the value should have kept, in the same unit
+  std::string text;             ///< the value as read, where it is a word
   std::string next;             ///< what to do about it, as one clause
+  std::vector<Error> also;      ///< what else is wrong, found in the same reading
 };
 
 /// The one sentence of an error, for people: `lt-07.csv row 12: joint 3 is 241.2 deg, limit 70.0; teach it again`.
+/// A line each of what else is wrong.
 [[nodiscard]] std::string sentence(const Error& error);
+
+/// All of them as one: the first, and the others as what else is wrong. `problems` is not empty.
+[[nodiscard]] Error together(std::vector<Error> problems);
+/// Each by itself, none with what else is wrong.
+[[nodiscard]] std::vector<Error> apart(const Error& error);
 
 template <typename T>
 using Result = tl::expected<T, Error>;
@@ -47,6 +60,11 @@ class Failure : public tl::unexpected<Error> {
  public:
   explicit Failure(Error error) : tl::unexpected<Error>(std::move(error)) {}
 
+  /// Of another kind to whoever asked: a word in a file is no wrong usage of a command.
+  Failure&& as(ErrorCode code) && {
+    value().code = code;
+    return std::move(*this);
+  }
   Failure&& in(std::string file) && {
     if (value().file.empty()) value().file = std::move(file);
     return std::move(*this);
@@ -59,9 +77,27 @@ class Failure : public tl::unexpected<Error> {
     if (value().field.empty()) value().field = std::move(field);
     return std::move(*this);
   }
-  Failure&& beyond(double is, double limit) && {
-    value().value = is;
-    value().limit = limit;
+  /// The key, column or option that all this is of: stands before the clause and before an inner field.
+  Failure&& under(const std::string& key) && {
+    value().message = key + ": " + value().message;
+    value().field = value().field.empty() ? key : key + ": " + value().field;
+    return std::move(*this);
+  }
+  template <typename Number, typename Limit>
+  Failure&& beyond(Number is, Limit limit) && {
+    if (!value().limit) {
+      value().value = static_cast<double>(is);
+      value().limit = static_cast<double>(limit);
+    }
+    return std::move(*this);
+  }
+  template <typename Number>
+  Failure&& with_value(Number is) && {
+    if (!value().value) value().value = static_cast<double>(is);
+    return std::move(*this);
+  }
+  Failure&& with_text(std::string_view is) && {
+    if (value().text.empty()) value().text = is;
     return std::move(*this);
   }
   Failure&& next(std::string advice) && {

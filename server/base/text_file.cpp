@@ -25,10 +25,12 @@ Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes)
   while (in.read(part.data(), static_cast<std::streamsize>(part.size())) || in.gcount() > 0) {
     text.append(part.data(), static_cast<std::size_t>(in.gcount()));
     if (text.size() > limit_bytes) {
-      return failure(ErrorCode::kTooLarge, "{}: more than {} bytes, its limit", path, limit_bytes);
+      return failure(ErrorCode::kTooLarge, "more than {} bytes, its limit", limit_bytes)
+          .in(path)
+          .beyond(text.size(), limit_bytes);
     }
   }
-  if (!in.eof()) return refused("{}: cannot be read: {}", path, std::strerror(errno));
+  if (!in.eof()) return refused("cannot be read: {}", std::strerror(errno)).in(path);
   return text;
 }
 
@@ -37,10 +39,11 @@ Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes)
 Result<std::string> read_text_file(const std::string& path, std::size_t limit_bytes) {
   std::error_code error;
   if (!fs::is_regular_file(path, error) && !fs::is_fifo(path, error) && !fs::is_character_file(path, error)) {
-    return refused("{}: no such file", path);
+    return refused("no such file").in(path);
   }
   if (fs::is_regular_file(path, error) && fs::file_size(path, error) > limit_bytes) {
-    return failure(ErrorCode::kTooLarge, "{}: {} bytes, limit {}", path, fs::file_size(path, error), limit_bytes);
+    const std::uintmax_t bytes = fs::file_size(path, error);
+    return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", bytes, limit_bytes).in(path).beyond(bytes, limit_bytes);
   }
   return read_up_to(path, limit_bytes);
 }
@@ -81,8 +84,8 @@ void remove_parts(const std::vector<TextFile>& files) {
   }
 }
 
-Status cannot_be_written(const std::string& path, const std::string& why) {
-  return refused("{}: cannot be written: {}", path, why);
+Failure cannot_be_written(const std::string& path, const std::string& why) {
+  return refused("cannot be written: {}", why).in(path);
 }
 
 }  // namespace
@@ -109,7 +112,7 @@ Status write_text_files(const std::vector<TextFile>& files) {
     }
     if (!why.empty()) {
       remove_parts(files);
-      return cannot_be_written(file.path, why + (done.empty() ? "" : "; already written:" + done));
+      return cannot_be_written(file.path, why).next(done.empty() ? "" : "already written:" + done);
     }
     done += " " + file.path;
   }

@@ -43,40 +43,69 @@ class Counter final : public YAML::EventHandler {
     within("lists and mappings inside one another", ++depth_, kMostDepth);
   }
   void within(const char* what, int count, int limit) const {
-    if (count > limit) throw YamlRefusal{fmt::format("{}: {} {}, limit {}", where_, count, what, limit)};
+    if (count <= limit) return;
+    throw YamlRefusal{
+        failure(ErrorCode::kTooLarge, "{} {}, limit {}", count, what, limit).in(where_).beyond(count, limit).value()};
   }
 
   const std::string& where_;
   int depth_ = 0, entries_ = 0, aliases_ = 0;
 };
 
+std::string below(const std::string& path, const std::string& key) { return path.empty() ? key : path + ": " + key; }
+
+/// `expected a number`, with what stands there instead.
+Failure expected(const char* what, const YAML::Node& found) {
+  if (!found.IsScalar() || found.Scalar().empty()) return refused("expected {}", what);
+  return refused("'{}', expected {}", found.Scalar(), what).with_text(found.Scalar());
+}
+
 }  // namespace
 
 Status check_yaml_limits(const std::string& text, const std::string& where) {
   if (text.size() > kMostBytes) {
-    return failure(ErrorCode::kTooLarge, "{}: {} bytes, limit {}", where, text.size(), kMostBytes);
+    return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), kMostBytes)
+        .in(where)
+        .beyond(text.size(), kMostBytes);
   }
   std::istringstream stream(text);
   Counter counter(where);
   try {
     YAML::Parser(stream).HandleNextDocument(counter);
   } catch (const YamlRefusal& refusal) {
-    return failure(ErrorCode::kTooLarge, "{}", refusal.message);
+    return Failure(refusal.error);
   }
   return {};
 }
 
-YamlMap::YamlMap(YAML::Node node, std::string where)
-    : YamlMap(std::move(node), std::move(where), std::make_shared<std::vector<std::string>>()) {}
+YamlMap::YamlMap(YAML::Node node, std::string file)
+    : YamlMap(std::move(node), std::move(file), "", std::make_shared<std::vector<Error>>()) {}
 
-YamlMap::YamlMap(YAML::Node node, std::string where, std::shared_ptr<std::vector<std::string>> problems)
-    : node_(std::move(node)), where_(std::move(where)), problems_(std::move(problems)) {
-  if (!node_.IsMap()) throw YamlRefusal{fmt::format("{}: expected keys and values", where_)};
+YamlMap::YamlMap(YAML::Node node, std::string file, std::string path, std::shared_ptr<std::vector<Error>> problems)
+    : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)), problems_(std::move(problems)) {
+  if (!node_.IsMap()) refuse_at(trammel::line_of(node_.Mark()), refused("expected keys and values"));
 }
 
-void YamlMap::refuse(const std::string& key, const std::string& why) const {
-  throw YamlRefusal{fmt::format("{}: {}: {}", where_, key, why)};
+std::optional<long> line_of(const YAML::Mark& mark) {
+  if (mark.is_null()) return std::nullopt;
+  return mark.line + 1;
 }
+
+std::optional<long> YamlMap::line_of(const std::string& key) const {
+  for (const auto& entry : node_) {
+    if (entry.first.IsScalar() && entry.first.Scalar() == key) return trammel::line_of(entry.first.Mark());
+  }
+  return trammel::line_of(node_.Mark());
+}
+
+void YamlMap::refuse_at(std::optional<long> line, Failure why) const {
+  if (!why.value().row) why.value().row = line;
+  throw YamlRefusal{(path_.empty() ? std::move(why) : std::move(why).under(path_)).in(file_).value()};
+}
+
+void YamlMap::refuse(const std::string& key, const std::string& why) const { refuse(key, refused("{}", why)); }
+
+void YamlMap::refuse(const std::string& key, Failure why) const { refuse_at(line_of(key), std::move(why).under(key)); }
 
 void YamlMap::only(std::initializer_list<const char*> known) const {
   const std::vector<std::string> names(known.begin(), known.end());
@@ -84,7 +113,8 @@ void YamlMap::only(std::initializer_list<const char*> known) const {
     for (const std::string& key : keys()) {
       if (std::find(names.begin(), names.end(), key) != names.end()) continue;
       attempt([&] {
-        refuse(key, fmt::format("unknown key{}; known here: {}", did_you_mean(key, names), fmt::join(names, " ")));
+        refuse(key, refused("unknown key{}", did_you_mean(key, names))
+                        .next(fmt::format("known here: {}", fmt::join(names, " "))));
       });
     }
   });
@@ -112,8 +142,8 @@ YAML::Node YamlMap::at(const std::string& key) const {
 
 double YamlMap::number_of(const YAML::Node& node, const std::string& key) const {
   double value = 0;
-  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) refuse(key, "expected a number");
-  if (!std::isfinite(value)) refuse(key, fmt::format("{} is not finite", node.Scalar()));
+  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) refuse(key, expected("a number", node));
+  if (!std::isfinite(value)) refuse(key, refused("{} is not finite", node.Scalar()).with_text(node.Scalar()));
   return value;
 }
 
@@ -123,14 +153,16 @@ double YamlMap::number(const std::string& key, double otherwise) const { return 
 int YamlMap::integer(const std::string& key, int otherwise) const {
   if (!has(key)) return otherwise;
   int value = 0;
-  if (!at(key).IsScalar() || !YAML::convert<int>::decode(at(key), value)) refuse(key, "expected a whole number");
+  if (!at(key).IsScalar() || !YAML::convert<int>::decode(at(key), value))
+    refuse(key, expected("a whole number", at(key)));
   return value;
 }
 
 bool YamlMap::boolean(const std::string& key, bool otherwise) const {
   if (!has(key)) return otherwise;
   bool value = false;
-  if (!at(key).IsScalar() || !YAML::convert<bool>::decode(at(key), value)) refuse(key, "expected true or false");
+  if (!at(key).IsScalar() || !YAML::convert<bool>::decode(at(key), value))
+    refuse(key, expected("true or false", at(key)));
   return value;
 }
 
@@ -144,7 +176,9 @@ std::string YamlMap::text(const std::string& key, const std::string& otherwise) 
 
 std::vector<double> YamlMap::numbers(const std::string& key, std::size_t count) const {
   const YAML::Node node = at(key);
-  if (!node.IsSequence() || node.size() != count) refuse(key, fmt::format("expected a list of {} numbers", count));
+  if (!node.IsSequence() || node.size() != count) {
+    refuse(key, refused("expected a list of {} numbers", count).beyond(node.IsSequence() ? node.size() : 0, count));
+  }
   std::vector<double> values;
   for (const YAML::Node& item : node) values.push_back(number_of(item, key));
   return values;
@@ -161,14 +195,14 @@ std::vector<std::string> YamlMap::texts(const std::string& key) const {
   return values;
 }
 
-YamlMap YamlMap::map(const std::string& key) const { return {at(key), where_ + ": " + key, problems_}; }
+YamlMap YamlMap::map(const std::string& key) const { return {at(key), file_, below(path_, key), problems_}; }
 
 std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
   const YAML::Node node = at(key);
   if (!node.IsSequence()) refuse(key, "expected a list");
   std::vector<YamlMap> list;
   for (std::size_t i = 0; i < node.size(); ++i)
-    list.push_back(YamlMap(node[i], fmt::format("{}: {} {}", where_, key, i + 1), problems_));
+    list.push_back(YamlMap(node[i], file_, below(path_, fmt::format("{} {}", key, i + 1)), problems_));
   return list;
 }
 

@@ -16,13 +16,13 @@ namespace trammel {
 
 /// Thrown by YamlMap, caught by read_yaml(); never leaves a reader.
 struct YamlRefusal {
-  std::string message;
+  Error error;
 };
 
 /// A mapping in a file, with the path of keys that led to it.
 class YamlMap {
  public:
-  YamlMap(YAML::Node node, std::string where);
+  YamlMap(YAML::Node node, std::string file);
 
   /// Refuses keys that are not in `known`, all of them, and goes on.
   void only(std::initializer_list<const char*> known) const;
@@ -32,11 +32,11 @@ class YamlMap {
     try {
       read();
     } catch (const YamlRefusal& refusal) {
-      problems_->push_back(refusal.message);
+      problems_->push_back(refusal.error);
     }
   }
   /// Noted so far, of the whole file.
-  [[nodiscard]] const std::vector<std::string>& problems() const { return *problems_; }
+  [[nodiscard]] const std::vector<Error>& problems() const { return *problems_; }
   [[nodiscard]] bool has(const std::string& key) const;
   /// Present and `null` (or absent).
   [[nodiscard]] bool is_null(const std::string& key) const;
@@ -52,22 +52,30 @@ class YamlMap {
   [[nodiscard]] std::vector<YamlMap> maps(const std::string& key) const;
   [[nodiscard]] std::vector<std::string> keys() const;
   [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
+  /// With what is known of it beside the words; its file, its line and the way to `key` are added here.
+  [[noreturn]] void refuse(const std::string& key, Failure why) const;
 
  private:
-  YamlMap(YAML::Node node, std::string where, std::shared_ptr<std::vector<std::string>> problems);
+  YamlMap(YAML::Node node, std::string file, std::string path, std::shared_ptr<std::vector<Error>> problems);
+  [[noreturn]] void refuse_at(std::optional<long> line, Failure why) const;
+  [[nodiscard]] std::optional<long> line_of(const std::string& key) const;
   [[nodiscard]] YAML::Node at(const std::string& key) const;
   [[nodiscard]] double number_of(const YAML::Node& node, const std::string& key) const;
 
   YAML::Node node_;
-  std::string where_;
-  std::shared_ptr<std::vector<std::string>> problems_;
+  std::string file_;
+  std::string path_;  // the keys that led here, `tools: spindle`; empty at the top
+  std::shared_ptr<std::vector<Error>> problems_;
 };
 
 /// Refuses a text that nobody wrote by hand (kTooLarge): over a megabyte, 20 lists and mappings inside one another,
 /// 20,000 entries or 100 aliases. Goes through it once and keeps nothing. Throws what the parser throws.
 [[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
 
-/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into an Error, a line each.
+/// Line of the text, counted from 1; none where the parser does not know it.
+[[nodiscard]] std::optional<long> line_of(const YAML::Mark& mark);
+
+/// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one Error that holds all.
 template <typename Read>
 auto read_yaml(const std::string& text, const std::string& where, Read&& read)
     -> Result<decltype(read(std::declval<const YamlMap&>()))> {
@@ -76,12 +84,14 @@ auto read_yaml(const std::string& text, const std::string& where, Read&& read)
     const YamlMap map(YAML::Load(text), where);
     std::optional<decltype(read(map))> value;
     map.attempt([&] { value.emplace(read(map)); });
-    if (!map.problems().empty()) return refused("{}", fmt::join(map.problems(), "\n"));
+    if (!map.problems().empty()) return Failure(together(map.problems()));
     return std::move(*value);
   } catch (const YamlRefusal& refusal) {
-    return refused("{}", refusal.message);
+    return Failure(refusal.error);
   } catch (const YAML::Exception& error) {
-    return refused("{}: not YAML: {}", where, error.what());
+    Failure damaged = refused("not YAML: {}", error.msg).in(where);
+    damaged.value().row = line_of(error.mark);
+    return damaged;
   }
 }
 

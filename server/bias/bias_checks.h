@@ -3,21 +3,22 @@
 #include <string>
 #include <vector>
 
-#include "server/bias/bias_model.h"
+#include "server/base/result.h"
+#include "server/bias/bias_data.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// What a bias cannot be learned or restored from, in sentences that name row, value and limit.
+/// Refuses what no bias can be learned or restored from.
 namespace trammel {
 
-/// Observations that a kernel with blocks may have: half a gigabyte while they are learned from.
+/// Most observations of a kernel with blocks: learning from so many takes half a gigabyte.
 inline constexpr Eigen::Index kMostCoupled = 4000;
 
 [[nodiscard]] Status check_observations(const Eigen::MatrixXd& q, const Eigen::MatrixXd& residual_B,
                                         const Eigen::VectorXd& sigma);
-/// Of a kernel with blocks and `n` observations.
+/// The features of `n` observations for a kernel with blocks.
 [[nodiscard]] Status check_features(const std::string& kernel, const std::vector<BiasFeatures>& features,
                                     Eigen::Index n);
-/// Against what `bias` and, where it has blocks, the state's own features ask for.
+/// Whether the hyperparameters of `state` have the shape that `bias` asks for, and its features where it has blocks.
 [[nodiscard]] Status check_hyperparameters(const BiasState& state, const SpelledBias& bias);
 
 }  // namespace trammel

@@ -14,9 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kOutputs = 3;
-constexpr double kSmallestSigma = 1e-7;  // m; no tracker knows a point better, whatever its file says
-constexpr double kNoiseRatioMax = 4.0;   // of variance, either way: no point dominates by claiming 2 µm
+constexpr double kSmallestSigma = 1e-7;  // m: no tracker knows a point better, whatever its file says
+constexpr double kMostNoiseRatio = 4.0;  // of variances: no point may dominate by claiming a sigma of 2 µm
 constexpr std::string_view kNone = "none";
 
 double median(VectorXd values) {
@@ -27,13 +26,13 @@ double median(VectorXd values) {
 
 VectorXd clipped(const VectorXd& sigma) { return sigma.cwiseMax(kSmallestSigma); }
 
-// Noise variance of each point relative to the learned one: metrology's ratios, within reason.
+// Noise variance of each point relative to the learned one: as the instrument says, within reason.
 VectorXd noise_shape(const VectorXd& sigma) {
   const VectorXd ratio = (clipped(sigma) / median(clipped(sigma))).cwiseAbs2();
-  return ratio.cwiseMax(1.0 / kNoiseRatioMax).cwiseMin(kNoiseRatioMax);
+  return ratio.cwiseMax(1.0 / kMostNoiseRatio).cwiseMin(kMostNoiseRatio);
 }
 
-// As BiasState keeps them: a column an output, rows kernel, log σ_f, log σ_n.
+// As BiasState has them: a column for each coordinate; rows kernel, log σ_f, log σ_n.
 MatrixXd as_columns(const std::vector<GpHyperparameters>& outputs) {
   MatrixXd columns(outputs.front().kernel.size() + 2, static_cast<Index>(outputs.size()));
   for (std::size_t d = 0; d < outputs.size(); ++d)
@@ -63,7 +62,7 @@ struct BiasModel::Fitted {
   BiasFitReport report;
   bool coupled = false;
   BiasOutputsPtr outputs;
-  double mean_noise_shape = 1;  // of a measurement like these, whose sigmas may differ much
+  double mean_noise_shape = 1;  // noise variance of an average measurement, relative to the learned one
 
   Fitted(BiasState of, bool with_blocks, BiasOutputsPtr conditioned)
       : state(std::move(of)), coupled(with_blocks), outputs(std::move(conditioned)) {
@@ -82,7 +81,7 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
     return tl::make_unexpected(fine.error());
   if (state.kernel == kNone) {
     BiasState silent = state;
-    silent.offset = VectorXd::Zero(kOutputs);
+    silent.offset = VectorXd::Zero(kCoordinates);
     return std::make_shared<Fitted>(std::move(silent), false, make_silent_outputs(state.residual_B));
   }
   const auto bias = spelled_bias(state.kernel);
@@ -119,11 +118,12 @@ Result<BiasModel> BiasModel::refit(const BiasOptions& options) const {
 Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOptions& options, const BiasState* last) {
   if (const Status fine = check_observations(problem.q, problem.residual_B, problem.sigma); !fine)
     return tl::make_unexpected(fine.error());
-  BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kOutputs), {}};
+  BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kCoordinates), {}};
   if (options.kernel == kNone) return restore(state);
   const auto bias = spelled_bias(options.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
-  if (options.starts < 1) return refused("bias fit: {} starts, at least 1", options.starts);
+  if (options.starts < 1)
+    return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
   const bool coupled = !bias->blocks.empty();
   if (coupled) {
     const Status fine = check_features(options.kernel, problem.features, problem.q.rows());
@@ -133,7 +133,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
 
   state.offset = problem.residual_B.colwise().mean().transpose();
   const OutputData data = data_of(state);
-  const VectorXd metrology_stddev = VectorXd::Constant(kOutputs, median(clipped(problem.sigma)));
+  const VectorXd metrology_stddev = VectorXd::Constant(kCoordinates, median(clipped(problem.sigma)));
   const SearchOptions search{options.starts, options.seed, options.progress, {}};
   std::optional<CoupledHyperparameters> from;
   if (last != nullptr) from = hyperparameters_of(*last);
@@ -147,7 +147,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   state.hyperparameters = as_columns(found->found.outputs);
   state.block_hyperparameters = found->found.blocks;
 
-  // The same way in as a stored model, so that a restored one cannot differ.
+  // By the same way as a stored model, so that a restored one cannot differ.
   const auto fitted = Fitted::from(state);
   if (!fitted) return tl::make_unexpected(fitted.error());
   (*fitted)->report.starts_at_best = found->starts_at_best;
@@ -158,14 +158,19 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
 Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
   const BiasState& old = fitted_->state;
   if (more.q.cols() != old.q.cols())
-    return refused("bias data: {} joints, the model has {}", more.q.cols(), old.q.cols());
+    return refused("{} joints, the model has {}", more.q.cols(), old.q.cols())
+        .in("bias data")
+        .beyond(more.q.cols(), old.q.cols());
   const Index n = old.q.rows() + more.q.rows();
   BiasState state = old;
   state.q.conservativeResize(n, Eigen::NoChange);
   state.q.bottomRows(more.q.rows()) = more.q;
-  if (more.residual_B.rows() != more.q.rows() || more.residual_B.cols() != kOutputs ||
+  if (more.residual_B.rows() != more.q.rows() || more.residual_B.cols() != kCoordinates ||
       more.sigma.size() != more.q.rows())
-    return refused("bias data: residual or sigma does not have {} rows", more.q.rows());
+    return refused("residual or sigma does not have {} rows", more.q.rows())
+        .in("bias data")
+        .of("residual")
+        .beyond(more.residual_B.rows(), more.q.rows());
   state.residual_B.conservativeResize(n, Eigen::NoChange);
   state.residual_B.bottomRows(more.q.rows()) = more.residual_B;
   state.sigma.conservativeResize(n);
@@ -192,7 +197,10 @@ Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) con
     }
   }
   if (gone != observations.end())
-    return refused("bias data: observation {} is not one of {} in rising order", *gone, old.q.rows());
+    return refused("observation {} is not one of {} in rising order", *gone, old.q.rows())
+        .in("bias data")
+        .of("observation")
+        .beyond(*gone, old.q.rows());
   BiasState state = old;
   state.q = old.q(kept, Eigen::all);
   state.residual_B = old.residual_B(kept, Eigen::all);

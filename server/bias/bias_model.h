@@ -1,106 +1,51 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/bias/kernels/linear_block.h"
-#include "server/robot/pose.h"
+#include "server/bias/bias_data.h"
 
-/// What the physics leaves over, learned: joints -> residual of the tool position, with its uncertainty.
+/// What the physics leaves over, learned: joints in, residual of the tool position with its uncertainty out.
 namespace trammel {
 
 class BiasOutputs;
 
-/// N observations of the residual measured - calibrated.
-struct BiasProblem {
-  Eigen::MatrixXd q;                        ///< N x n, rad
-  Eigen::MatrixXd residual_B;               ///< N x 3, m, expressed in B
-  Eigen::VectorXd sigma;                    ///< N, m: what metrology says of one coordinate of each observation
-  std::vector<BiasFeatures> features = {};  ///< N; none where the kernel has no blocks
-};
-
-struct BiasOptions {
-  std::string kernel = "se";  ///< `se`, `matern52 + joint_map`, `none`, ... as spelled in the cell file
-  int starts = 20;            ///< of the hyperparameter search, log-uniform
-  std::uint64_t seed = 1;
-  /// Called between steps with the share done in [0, 1]; return false to give up.
-  std::function<bool(double)> progress;
-};
-
-/// At one joint vector, for the three coordinates in B.
-struct BiasPrediction {
-  Vector3 mean_B = Vector3::Zero();  ///< m
-  /// m: what of mean_B rests on training poses nearby: what the kernel says, without blocks all of it. The rest is H w
-  /// of the blocks and the mean residual.
-  Vector3 nearby_B = Vector3::Zero();
-  Vector3 stddev_B = Vector3::Zero();           ///< m, of the function itself
-  Vector3 measured_stddev_B = Vector3::Zero();  ///< m, of one measurement as noisy as the mean of them
-  Matrix3 covariance_B = Matrix3::Zero();  ///< m^2, of the function itself; diagonal where no block couples the axes
-  double prior_share =
-      1.0;  ///< posterior variance of the function / prior variance, largest coordinate; 0 known, 1 not
-};
-
-/// All that must be kept to restore a fitted model exactly: no factor, no table. Who knows the physics need not keep
-/// `features`, but must give the same ones again.
-struct BiasState {
-  std::string kernel;
-  Eigen::MatrixXd q;                ///< N x n, rad
-  Eigen::MatrixXd residual_B;       ///< N x 3, m
-  Eigen::VectorXd sigma;            ///< N, m
-  Eigen::VectorXd offset;           ///< per output, m: the mean residual, what the model says far from all data
-  Eigen::MatrixXd hyperparameters;  ///< one column per output; rows as the kernel orders them, natural logarithms
-  Eigen::VectorXd block_hyperparameters = {};  ///< of the blocks one after the other, natural logarithms
-  std::vector<BiasFeatures> features = {};     ///< N; none where the kernel has no blocks
-};
-
-/// How the fit went, for the report.
-struct BiasFitReport {
-  Eigen::VectorXd log_likelihood;  ///< nat: of each output, or one number where blocks couple them
-  Eigen::VectorXd noise_stddev;    ///< m, of each output
-  double leave_one_out_rms = 0;    ///< m, Euclidean
-  int starts_at_best = 0;          ///< how many starts reached the best optimum of the subset within 0.1 nat
-  int evaluations = 0;             ///< of the full likelihood and gradient
-};
-
-/// A fitted Gaussian process for each coordinate (source section 3.4, eqs. 3.15-3.26); where the kernel has blocks
-/// (kernel_spelling.h) the coordinates share their weights, and whoever asks says the features of each pose. An
-/// immutable value; copies share their tables. Thread-safe.
+/// A fitted Gaussian process for each coordinate (source section 3.4, eqs. 3.15-3.26). Where the kernel has blocks
+/// (kernel_spelling.h) the coordinates share the weights of the blocks, and each prediction needs the features of its
+/// pose. An immutable value; copies share their tables. Thread-safe.
 class BiasModel {
  public:
-  /// Same problem, options and build of numerics.h, same model bit for bit. `none` predicts zero, with the rms of the
-  /// residual as its stddev. The noise of observation i has variance σ_n² sigma_i²/median(sigma²), the ratio kept
-  /// within [1/4, 4]; σ_n is learned for each output, with a weak prior against values below metrology's. Refuses fewer
-  /// than 10 observations, non-finite numbers, a kernel that cannot be spelled, more than 4000 observations or missing
-  /// features where it has blocks; kBusy when `progress` gives up.
+  /// Fits kernel and noise to the observations. The same problem, options and build of numerics.h give the same model,
+  /// bit for bit. The kernel `none` predicts zero, with the rms of the residual as its standard deviation. Observation
+  /// i has the noise variance σ_n² sigma_i² / median(sigma²), the ratio kept within [1/4, 4]. σ_n is learned for each
+  /// coordinate; a weak prior speaks against values below the instrument's.
+  /// Refuses fewer than 10 observations, numbers that are not finite, and a kernel that cannot be read; of a kernel
+  /// with blocks also more than 4000 observations and missing features. kBusy when `progress` gives up.
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
-  /// Same state, same predictions, bit for bit on processors that run the same build of numerics.h (the last bits
-  /// differ between AVX2 and AVX-512). Refuses what fit refuses, and hyperparameters of the wrong shape.
+  /// The model of a state. It predicts bit for bit as before on processors that run the same build of numerics.h; the
+  /// last bits differ between AVX2 and AVX-512. Refuses what fit() refuses, and hyperparameters of the wrong shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
-  /// More observations with the hyperparameters as they are: N² operations for each where the median sigma stays what
-  /// it was and the kernel has no blocks, N³ otherwise. Equal to restoring the longer state, to rounding. Refuses what
-  /// fit refuses.
+  /// With more observations, the hyperparameters as they are. Takes N² operations for each where the kernel has no
+  /// blocks and the median sigma stays the same, else N³. Equal to restoring the longer state, to rounding. Refuses
+  /// what fit() refuses.
   [[nodiscard]] Result<BiasModel> with(const BiasProblem& more) const;
-  /// Without these observations (rising indices), likewise; refuses to keep fewer than 10.
+  /// Without these observations (rising indices), at the same cost. Refuses to keep fewer than 10.
   [[nodiscard]] Result<BiasModel> without(const std::vector<Eigen::Index>& observations) const;
-  /// Fitted to its own observations again, from where the last fit ended: a few evaluations, no new starts.
+  /// Fitted again to its own observations, starting where the last fit ended: a few evaluations, no new starts.
   [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
 
-  /// Whether the kernel has blocks, so that features must be given; otherwise they are ignored.
+  /// Whether the kernel has blocks. Only then features must be given; else they are ignored.
   [[nodiscard]] bool needs_features() const;
   [[nodiscard]] BiasPrediction predict(const JointVector& q, const BiasFeatures& features = {}) const;
-  /// The mean alone: what an iteration needs.
+  /// The mean alone, much cheaper: what the iteration of a correction needs.
   [[nodiscard]] Vector3 mean_B(const JointVector& q, const BiasFeatures& features = {}) const;
   /// M x 3, m: BiasPrediction::nearby_B alone; rows of `q` are joint vectors.
   [[nodiscard]] Eigen::MatrixXd nearby_mean_all_B(const Eigen::MatrixXd& q) const;
-  /// P: what the block `parameters` found of each parameter, in standard deviations that it had before any data; empty
-  /// without that block.
+  /// P: what the block `parameters` found of each parameter, in prior standard deviations; empty without that block.
   [[nodiscard]] Eigen::VectorXd parameter_weights() const;
   /// M x 3, m: the means alone of many; rows of `q` are joint vectors.
   [[nodiscard]] Eigen::MatrixXd mean_all_B(const Eigen::MatrixXd& q,
@@ -109,15 +54,17 @@ class BiasModel {
   [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q,
                                                         const std::vector<BiasFeatures>& features = {}) const;
 
-  /// N, in [0, 1]: `prior_share` of every training pose when it is left out: what "known" looks like. A target whose
-  /// own share is above, say, the 99 % quantile of these is farther from the data than they are from each other.
+  /// N, in [0, 1]: `prior_share` of every training pose when it is left out. A target whose share is above the 99 %
+  /// quantile of these is farther from the data than the data are from each other.
   [[nodiscard]] Eigen::VectorXd leave_one_out_prior_share() const;
-  /// N x 3: prediction of every training pose from all the others, m.
+  /// N x 3, m: every training pose predicted from all the others.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
-  /// N x 3: of the measurement of every training pose given all the others (beyond 5000, of its expert), m.
+  /// N x 3, m: standard deviation of the measurement of every training pose, given all the others. With more than 5000
+  /// poses: given the others of its expert (local_experts.h).
   [[nodiscard]] Eigen::MatrixXd leave_one_out_stddev_B() const;
-  /// What of `residual_B` (N x 3, m; measured instead of what it was fitted to) these observations miss by when they
-  /// are predicted from all others, hyperparameters as found; empty where the kernel has blocks and beyond 5000.
+  /// Errors of these observations when they are predicted from all others, with the hyperparameters as found;
+  /// `residual_B` (N x 3, m) takes the place of what the model was fitted to. Empty for a kernel with blocks and for
+  /// more than 5000 poses.
   [[nodiscard]] std::optional<Eigen::MatrixXd> left_out_error_B(const Eigen::MatrixXd& residual_B,
                                                                 const std::vector<Eigen::Index>& observations) const;
 

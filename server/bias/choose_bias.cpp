@@ -19,14 +19,14 @@ using Eigen::VectorXd;
 
 constexpr std::array kCheap = {"se", "matern52", "se + parameters"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
-constexpr Index kBlocks = 8;
-constexpr std::size_t kFewestBlocks = 4;  // to judge by
-constexpr Index kFewest = 30;             // observations; of fewer no block could be left out and judged
-constexpr double kBeyondChance = 2;       // standard errors
-constexpr double kOfNone = 3;             // hyperparameters: the residual's stddev, of each coordinate
-constexpr double kFit = 0.5;              // of the time that a candidate takes
-constexpr double kPhysics = 0.9;          // of what a bias without parameters leaves
-constexpr double kLeavesMore = 1.3;       // of metrology's noise, rms: worth the dear ones
+constexpr Index kBlocks = 8;                  // eight give a standard error, and seven eighths still show the physics
+constexpr std::size_t kFewestBlocks = 4;      // half of them: of fewer the standard error means little
+constexpr Index kFewestToJudge = 30;          // observations: blocks of fewer than four tell nothing
+constexpr double kStandardErrors = 2;         // chance alone exceeds them in 1 of 40 cases
+constexpr double kHyperparametersOfNone = 3;  // the standard deviation of each coordinate
+constexpr double kFitShare = 0.5;             // of the time for one candidate: the rest goes into leaving out blocks
+constexpr double kGainOfPhysics = 0.9;        // rms with parameters over rms without: a tenth less is worth a diagnosis
+constexpr double kAboveNoise = 1.3;           // rms over the instrument's noise, which a cell's file knows to a tenth
 
 std::vector<Index> in_order(Index count) {
   std::vector<Index> all(static_cast<std::size_t>(count));
@@ -43,13 +43,14 @@ VectorXd negative_log_density(const MatrixXd& error, const MatrixXd& stddev) {
   return (0.5 * z.square() + stddev.array().log() + constant).rowwise().sum();
 }
 
-/// One of the blocks, and all residuals as they are without it.
+/// One block left out: the rest, and all residuals with the physics identified from the rest.
 struct Fold {
   std::vector<Index> block, rest;
   MatrixXd residual_B;  // N x 3
 };
 
-/// Eighths of the observations that are neighbours in `table`, N x n; without those that the physics cannot spare.
+/// The blocks: observations that are neighbours in `table` (N x n). Those that the physics cannot be identified without
+/// are left out.
 std::vector<Fold> folds(const BiasProblem& problem, const MatrixXd& table, const ResidualWithout& residual_without) {
   const std::vector<Index> observations = in_order(problem.q.rows());
   std::vector<Fold> all;
@@ -64,7 +65,7 @@ std::vector<Fold> folds(const BiasProblem& problem, const MatrixXd& table, const
   return all;
 }
 
-/// What is missed of the observations of each fold's block.
+/// The errors of the observations of each fold's block.
 using Missed = std::vector<MatrixXd>;
 
 Missed missed_by_none(const std::vector<Fold>& folds) {
@@ -92,7 +93,7 @@ std::vector<T> at(const std::vector<T>& all, const std::vector<Index>& rows) {
   return some;
 }
 
-/// The block of `fold` from a bias conditioned on the rest; the hyperparameters stay.
+/// Errors of the block of `fold`, predicted by a bias conditioned on the rest; the hyperparameters stay.
 Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
   if (auto error = model.left_out_error_B(fold.residual_B, fold.block)) return *std::move(error);
   const BiasState& state = model.state();
@@ -107,7 +108,7 @@ Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
          rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
 }
 
-/// `progress` is told the share done.
+/// The same of all folds; `progress` is told the share done.
 Result<Missed> missed(const BiasModel& model, const std::vector<Fold>& folds,
                       const std::function<bool(double)>& progress) {
   Missed error;
@@ -131,7 +132,7 @@ Mean mean_of(const VectorXd& samples) {
   return {mean, std::sqrt((samples.array() - mean).square().sum() / (n - 1) / n)};
 }
 
-/// By how much the mean square of `without` falls in `with`, block by block, m².
+/// m²: by how much the mean square error falls from `without` to `with`, mean over the blocks.
 Mean gain_of(const Missed& without, const Missed& with) {
   VectorXd gain(static_cast<Index>(without.size()));
   for (std::size_t b = 0; b < without.size(); ++b)
@@ -140,7 +141,7 @@ Mean gain_of(const Missed& without, const Missed& with) {
   return mean_of(gain);
 }
 
-/// What an observation is expected to be without a bias: the residual's deviation, of each coordinate.
+/// Without a bias each coordinate is expected to spread as the residual does.
 VectorXd negative_log_density_of_none(const MatrixXd& error) {
   const Vector3 stddev = (error.colwise().squaredNorm() / static_cast<double>(error.rows())).cwiseSqrt().cwiseMax(1e-9);
   return negative_log_density(error, stddev.transpose().replicate(error.rows(), 1));
@@ -155,18 +156,18 @@ double hyperparameters_of(const BiasModel& model) {
   return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
 }
 
-/// Of each observation. The hyperparameters were found with the one left out, too: each lends the sum a nat (Akaike
-/// 1974).
+/// Whether `nlpd` (of each observation) is clearly below `other`. The hyperparameters were found with the observation
+/// that is left out, so each of them raises the sum by one nat (Akaike 1974).
 bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
   const Mean likelier = mean_of(other - nlpd);
-  return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) > kBeyondChance * likelier.stddev;
+  return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) > kStandardErrors * likelier.stddev;
 }
 
-/// The one that no other asked so far beats.
+/// The best candidate so far.
 struct Best {
   std::size_t candidate = 0;
   VectorXd nlpd;  // of each observation
-  double hyperparameters = kOfNone;
+  double hyperparameters = kHyperparametersOfNone;
   std::optional<BiasModel> model;
 };
 
@@ -175,16 +176,16 @@ class Choosing {
   Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without,
            Index most_coupled)
       : problem_(problem), options_(options), most_coupled_(most_coupled) {
-    if (problem.q.rows() < kFewest) return;
+    if (problem.q.rows() < kFewestToJudge) return;
     const Index count = problem.q.rows();
     in_time_ = folds(problem, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
     in_joint_space_ = folds(problem, problem.q, residual_without);
   }
 
   Result<ChosenBias> run() {
-    if (problem_.q.rows() < kFewest) {
-      choice_.sentence =
-          fmt::format("no bias: {} observations are too few to judge one, at least {}", problem_.q.rows(), kFewest);
+    if (problem_.q.rows() < kFewestToJudge) {
+      choice_.sentence = fmt::format("no bias: {} observations are too few to judge one, at least {}",
+                                     problem_.q.rows(), kFewestToJudge);
       choice_.kernel = "none";
       return ChosenBias{choice_, std::nullopt};
     }
@@ -201,7 +202,7 @@ class Choosing {
     }
     const double noise = std::sqrt(3 * problem_.sigma.squaredNorm() / static_cast<double>(problem_.sigma.size()));
     for (const char* kernel : kDear) {
-      if (choice_.candidates[best_.candidate].leave_one_out_rms < kLeavesMore * noise) break;
+      if (choice_.candidates[best_.candidate].leave_one_out_rms < kAboveNoise * noise) break;
       if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
     }
     return chosen();
@@ -232,13 +233,13 @@ class Choosing {
     const auto report = [this, most, done = asked_++](double share) {
       return !options_.progress || options_.progress((done + share) / most);
     };
-    options.progress = [&](double share) { return report(kFit * share); };
+    options.progress = [&](double share) { return report(kFitShare * share); };
     Result<BiasModel> model = BiasModel::fit(problem_, options);
     if (!model) return tl::make_unexpected(model.error());
     const MatrixXd error = problem_.residual_B - model->leave_one_out_mean_B();
     const VectorXd nlpd = negative_log_density_left_out(problem_, *model);
-    constexpr double kBoth = (1 - kFit) / 2;
-    const auto in_time = missed(*model, in_time_, [&](double share) { return report(kFit + kBoth * share); });
+    constexpr double kBoth = (1 - kFitShare) / 2;
+    const auto in_time = missed(*model, in_time_, [&](double share) { return report(kFitShare + kBoth * share); });
     if (!in_time) return tl::make_unexpected(in_time.error());
     const auto in_joint_space =
         missed(*model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); });
@@ -252,9 +253,9 @@ class Choosing {
     const double hyperparameters = hyperparameters_of(*model);
     if (!clearly_likelier(nlpd, best_.nlpd, hyperparameters - best_.hyperparameters)) {
       candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
-    } else if (gain.value <= kBeyondChance * gain.stddev) {
+    } else if (gain.value <= kStandardErrors * gain.stddev) {
       candidate.verdict = "does not help beyond chance where neighbours in time are left out";
-    } else if (far.value < -kBeyondChance * far.stddev) {
+    } else if (far.value < -kStandardErrors * far.stddev) {
       candidate.verdict = "harms where neighbours in joint space are left out";
     } else {
       best_ = {choice_.candidates.size() - 1, nlpd, hyperparameters, std::move(*model)};
@@ -298,13 +299,13 @@ class Choosing {
     return {std::move(choice_), std::move(best_.model)};
   }
 
-  /// Whether the derivatives by parameters leave far less than the same kernel without them.
+  /// Whether the block `parameters` leaves clearly less than the same kernel without it.
   [[nodiscard]] bool learns_physics() const {
     const BiasCandidate& taken = choice_.candidates[best_.candidate];
     const auto plain = std::find_if(choice_.candidates.begin(), choice_.candidates.end(),
                                     [](const BiasCandidate& one) { return one.kernel == "se"; });
     return taken.kernel == "se + parameters" && plain != choice_.candidates.end() &&
-           taken.leave_one_out_rms < kPhysics * plain->leave_one_out_rms;
+           taken.leave_one_out_rms < kGainOfPhysics * plain->leave_one_out_rms;
   }
 
   const BiasProblem& problem_;
@@ -321,7 +322,8 @@ class Choosing {
 
 bool is_worth_it(const BiasProblem& problem, const BiasModel& model) {
   return clearly_likelier(negative_log_density_left_out(problem, model),
-                          negative_log_density_of_none(problem.residual_B), hyperparameters_of(model) - kOfNone);
+                          negative_log_density_of_none(problem.residual_B),
+                          hyperparameters_of(model) - kHyperparametersOfNone);
 }
 
 Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,

@@ -39,7 +39,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
-    return refused("batch {}: no measurements to calibrate with", problem.batch.id);
+    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
   CalibrationProblem complete = problem;
   if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {
@@ -52,26 +52,31 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   return identify(complete, options);
 }
 
-Eigen::MatrixXd CalibrationResult::correlation() const {
-  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
-}
+namespace {
 
-Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
-                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
-  std::vector<std::vector<std::string>> candidates = {{}};
+/// Every combination of the forms that the causes in `specs` have.
+std::vector<std::vector<std::string>> combinations(const std::vector<std::string>& specs, const Cell& cell) {
+  std::vector<std::vector<std::string>> all = {{}};
   for (const std::string& spec : specs) {
     std::vector<std::vector<std::string>> longer;
-    for (const auto& candidate : candidates) {
-      for (const std::string& form : alternatives(spec, *cell)) {
-        longer.push_back(candidate);
+    for (const auto& one : all) {
+      for (const std::string& form : alternatives(spec, cell)) {
+        longer.push_back(one);
         longer.back().push_back(form);
       }
     }
-    candidates = std::move(longer);
+    all = std::move(longer);
   }
+  return all;
+}
+
+}  // namespace
+
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
   std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
+  std::vector<std::vector<std::string>> candidates = combinations(specs, *cell);
   for (std::vector<std::string>& candidate : candidates) {
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;

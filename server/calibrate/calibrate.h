@@ -5,71 +5,20 @@
 #include <vector>
 
 #include "server/base/result.h"
-#include "server/calibrate/identify/identifiability.h"
-#include "server/error_sources/physical_model.h"
-#include "server/measurement/measurement.h"
+#include "server/calibrate/calibration.h"
 
 namespace trammel {
 
-/// A model to start from and the measurements to explain. Unknown base and tools are found first.
-struct CalibrationProblem {
-  PhysicalModel model;
-  MeasurementBatch batch;  ///< checked against the cell
-};
-
-struct CalibrateOptions {
-  int max_iterations = 100;
-  std::vector<bool> held;  ///< parameters that stay as the model has them, one flag each; empty: none
-  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds, so that a bad pose pulls little
-};
-
-/// A pose that the identified model misses by far more than its sigma.
-struct SuspectPose {
-  std::string pose_id;
-  int row = 0;          ///< in its file
-  double distance = 0;  ///< m, of the position
-  double sigmas = 0;    ///< the same over the expected deviation of one axis
-};
-
-struct IdentifiedParameter {
-  Parameter parameter;
-  double value = 0;         ///< SI
-  double stddev = 0;        ///< SI, of the posterior
-  bool identified = false;  ///< false: more than half of the prior's standard deviation is left
-};
-
-struct CalibrationResult {
-  PhysicalModel model;  ///< with identified values
-  std::vector<IdentifiedParameter> parameters;
-  Eigen::MatrixXd covariance;  ///< P x P, SI
-  /// P x P, in [-1, 1].
-  [[nodiscard]] Eigen::MatrixXd correlation() const;
-  int rank = 0;  ///< directions with singular value >= 1
-  std::vector<UnidentifiableCombination> unidentifiable;
-  double condition_number = 0;      ///< of the identified directions, prior units
-  double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
-  double rms = 0;                   ///< m, Euclidean residual of the training positions
-  double discrepancy = 0;           ///< m per axis: what the model leaves over beyond the measurement's sigma
-  double discrepancy_rotation = 0;  ///< rad per axis
-  double observability_index =
-      0;  ///< geometric mean of the identified singular values over sqrt(poses) (Borm and Menq)
-  std::vector<SuspectPose> suspects;  ///< farthest first
-  std::vector<double> cost_record;  ///< half the weighted sum of squares, iteration by iteration, over all reweightings
-  bool converged = false;
-  int iterations = 0;
-  std::string message;  ///< of the solver
-};
-
-/// Identifies the parameters of the model's sources by maximum a posteriori (Gaussian priors in the parameters' own
-/// scales, residuals in units of sigma), source section 3.3.2. Orientation errors are rotation vectors. Where the model
-/// cannot reach the measurement's sigma, the surplus is estimated as a discrepancy and added to it, so that positions
-/// and orientations, good and bad points keep their proper weights. Refuses: fewer equations than identifiable
-/// parameters; a base or tool that the data cannot determine; joints that do not lead to the positions (more than 25 mm
-/// rms and 5 % of their spread are left).
+/// Identifies the parameters of the model's sources by maximum a posteriori (source section 3.3.2): Gaussian priors,
+/// residuals in units of sigma, orientation errors as rotation vectors. Where the model leaves more than the
+/// measurement's sigma, the surplus is estimated as a discrepancy and added to sigma: positions, orientations, good and
+/// bad points keep their proper weights.
+/// Refuses a source whose needs no pose meets, a base or tool that the data do not determine, and joints that do not
+/// lead to the positions (more than 25 mm rms and 5 % of their spread are left).
 [[nodiscard]] Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options);
 
-/// Calibrates `cell` with the sources that `specs` name. Where a cause has several forms, the one under which the data
-/// are likeliest is kept (all have the same number of parameters).
+/// Calibrates `cell` with the sources that `specs` name. Of a cause with several forms the one is kept under which the
+/// data are most likely; all forms have the same number of parameters.
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);

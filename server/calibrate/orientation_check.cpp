@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/base/units.h"
+#include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
 #include "server/robot/rigid_fit.h"
 
@@ -16,19 +17,20 @@ namespace {
 using Quaternion = Eigen::Quaterniond;
 using Quaternions = std::vector<Quaternion>;
 
-constexpr std::size_t kFewestPoses = 3;
-constexpr double kMostOff = from_deg(5);        // rms, of one pose, and of a tool: no nominal arm is farther off
-constexpr double kFarRow = 5;                   // times the median of all poses
-constexpr double kWorthAsking = from_deg(0.2);  // rms, below which no reading can be told from another
-constexpr double kMuchBetter = 0.25;            // of the rms as given, that another reading leaves at most
-constexpr double kCap = from_deg(30);           // off is off
-constexpr double kNoModelError = 0.025;         // m rms: what no model of a robot leaves,
-constexpr double kNoModelShare = 0.05;          // and of how far the positions spread
-constexpr double kLeastLever = 20;  // times the residual: spread of positions that tells where the base points
-constexpr double kBadPosition = 6;  // times the median residual: a pose that is out as a whole
-constexpr double kMostBadPositions = 0.1;
-constexpr std::size_t kMostTries = 40;       // poses whose own R_FT is tried
-constexpr std::size_t kMostPositions = 300;  // evenly drawn beyond
+// Angles, rms of all poses or of one pose.
+constexpr double kMostOff = from_deg(5);        // no nominal arm, and no mounted tool, is farther off
+constexpr double kWorthAsking = from_deg(0.2);  // below it one way of reading cannot be told from another
+constexpr double kMostCounted = from_deg(30);   // more counts as much: wrong is wrong, and few rows must not decide
+constexpr double kMuchBetter = 0.25;            // of the rms as given: another way of reading that was surely meant
+constexpr double kFarRow = 5;                   // times the median of all poses: a row of another pose
+// Positions.
+constexpr double kTellingSpread = 20;      // spread over residual: the base's direction is then known to 3 degrees
+constexpr double kBadPosition = 6;         // times the median residual: a pose that is wrong as a whole
+constexpr double kMostBadPositions = 0.1;  // of all: more are no outliers, and none is left out
+// Numbers of poses.
+constexpr std::size_t kFewestOriented = 3;   // of a tool: two orientations agree with too many readings
+constexpr std::size_t kMostTries = 40;       // poses whose own R_FT is tried: half may be wrong, one must be right
+constexpr std::size_t kMostPositions = 300;  // evenly drawn beyond: more do not make the base more certain
 
 /// What was measured of one tool.
 struct Oriented {
@@ -37,11 +39,11 @@ struct Oriented {
   std::vector<Pose> X_BF;
 };
 
-/// How the numbers may have been meant.
+/// One way in which the numbers may have been meant.
 struct Reading {
   std::string name;      ///< after "read "
   Quaternions q_FT;      ///< R_BF' R_WB' R_WT of each pose
-  bool by_order = true;  ///< of the same numbers: may be judged by a few tenths of a degree, and row by row
+  bool by_order = true;  ///< the same numbers in another order: a few tenths of a degree decide, and row by row
 };
 
 double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
@@ -68,7 +70,7 @@ std::vector<double> angles(const Quaternions& q_FT, const Quaternion& about) {
   return all;
 }
 
-/// Every pose by the reading that brings it nearer.
+/// Angle of every pose from `about`, by that of two readings which brings it nearer.
 std::vector<double> nearer(const Reading& one, const Reading& other, const Quaternion& about) {
   std::vector<double> all = angles(one.q_FT, about);
   const std::vector<double> others = angles(other.q_FT, about);
@@ -76,8 +78,8 @@ std::vector<double> nearer(const Reading& one, const Reading& other, const Quate
   return all;
 }
 
-/// The rotation that most poses have in common, each by the nearer of two readings: the best of those that single poses
-/// say, then the mean of the poses near it.
+/// The rotation that most poses have in common, each by the nearer of two readings. First the best of those of single
+/// poses, then the mean of the poses near it.
 Quaternion common(const Reading& one, const Reading& other) {
   const std::size_t n = one.q_FT.size();
   const std::size_t step = std::max<std::size_t>(1, n / kMostTries);
@@ -86,7 +88,7 @@ Quaternion common(const Reading& one, const Reading& other) {
   for (std::size_t i = 0; i < n; i += step) {
     for (const Quaternion& tried : {one.q_FT[i], other.q_FT[i]}) {
       double sum = 0;
-      for (const double off : nearer(one, other, tried)) sum += std::min(off, kCap);
+      for (const double off : nearer(one, other, tried)) sum += std::min(off, kMostCounted);
       if (least < 0 || sum < least) least = sum, best = tried;
     }
   }
@@ -105,7 +107,7 @@ Quaternion common(const Reading& one, const Reading& other) {
   return best;
 }
 
-/// Of every `step`-th pose, positions as measured and as the nominal arm has them.
+/// Some of the poses: positions as measured, and the nominal flange.
 struct Positions {
   Eigen::Matrix3Xd p_W;
   std::vector<Pose> X_BF;
@@ -149,7 +151,7 @@ Result<BaseAndTool> located(const Positions& positions, const std::optional<Pose
   return BaseAndTool{*X_WB, *X_FT};
 }
 
-/// What the positions say of the base; `belong` false where they are not of these joints.
+/// What the positions tell of the base; `belong`: whether they are of these joints.
 struct Located {
   std::optional<Turned> turned;
   bool belong = true;
@@ -163,7 +165,7 @@ Located by_positions(const Oriented& group, const std::optional<Pose>& X_FT) {
     off.push_back((found->X_WB * (group.X_BF[i] * found->X_FT.translation()) - group.rows[i]->p_W).norm());
   const double typical = median(off);
   if (typical > std::max(kNoModelError, kNoModelShare * spread(positions.p_W))) return {std::nullopt, false};
-  if (typical * kLeastLever > spread_across(positions.p_W)) return {};
+  if (typical * kTellingSpread > spread_across(positions.p_W)) return {};
   Turned turned{Quaternion(found->X_WB.linear()), std::vector<bool>(off.size(), false)};
   const double limit = std::max(kNoModelError, kBadPosition * typical);
   for (std::size_t i = 0; i < off.size(); ++i) turned.bad[i] = off[i] > limit;
@@ -221,7 +223,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
   return all;
 }
 
-/// How well a reading does, alone and beside the numbers as given.
+/// How well one way of reading fits, alone or together with the numbers as given.
 struct Judged {
   Quaternion q_FT = Quaternion::Identity();  ///< what the poses have in common
   std::vector<double> off;                   ///< rad, of each pose: from the cell's tool, or from q_FT
@@ -243,7 +245,7 @@ Judged judged(const Reading& one, const Reading& other, const std::optional<Pose
 
 std::string deg(double radians) { return fmt::format("{:.{}f} deg", to_deg(radians), radians < from_deg(10) ? 2 : 0); }
 
-/// One tool's poses against one way of turning the base.
+/// Whether the orientations of one tool follow the joints, for one rotation of the base.
 class Question {
  public:
   Question(const Oriented& group, const Quaternion& q_WB, const Cell& cell)
@@ -258,7 +260,7 @@ class Question {
   }
   double fit() const { return given_.fit; }
 
-  std::optional<std::string> doubt() const {
+  std::optional<Error> doubt() const {
     if (follow()) return std::nullopt;
     const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
     if (two_orders_ > 0 && !better) return of_two_orders();
@@ -267,12 +269,18 @@ class Question {
     if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();
     if (!better && !far.empty() && 2 * far.size() < group_.rows.size() && given_.offset <= kMostOff && !reads_better())
       return of_rows(far);
-    return fmt::format("orientations do not follow the joints: {} rms; {}: xyzw order? another tool frame?",
-                       deg(given_.fit), otherwise());
+    return doubted(fmt::format("orientations do not follow the joints: {} rms; {}", deg(given_.fit), otherwise()),
+                   given_.fit)
+        .with_text(reads_better() ? all_[best_].name : "")
+        .next("xyzw order? another tool frame?")
+        .value();
   }
 
  private:
-  /// So well that nothing else needs to be asked.
+  static Failure doubted(const std::string& what, double off) {
+    return refused("{}", what).of("qw,qx,qy,qz").beyond(to_deg(off), to_deg(kMostOff));
+  }
+  /// Whether they fit so well that no other reading needs to be tried.
   bool follow() const { return given_.fit <= kWorthAsking && far_rows().empty(); }
   bool by_order() const { return all_[best_].by_order; }
   bool reads_better() const { return of_best_.fit < std::min(kMostOff, 0.5 * given_.fit); }
@@ -284,7 +292,7 @@ class Question {
       if (two_orders_ == 0 || both.fit < of_both_.fit) two_orders_ = k, of_both_ = both;
     }
   }
-  /// Rows that lie far off what the others have in common.
+  /// Rows far from what the others have in common.
   std::vector<std::size_t> far_rows() const {
     const std::vector<double> off = angles(all_.front().q_FT, given_.q_FT);
     const double limit = std::max(kMostOff, kFarRow * median(off));
@@ -298,7 +306,7 @@ class Question {
     if (reads_better()) return fmt::format("read {} they would fit to {}", all_[best_].name, deg(of_best_.fit));
     return fmt::format("no other reading fits either (best: {}, {})", all_[best_].name, deg(of_best_.fit));
   }
-  std::string of_two_orders() const {
+  Error of_two_orders() const {
     const Quaternion about = X_FT_ ? Quaternion(X_FT_->linear()) : of_both_.q_FT;
     std::vector<double> off;
     int first = 0;
@@ -308,28 +316,41 @@ class Question {
       if (off.empty()) first = group_.rows[i]->row;
       off.push_back(as_given);
     }
-    return fmt::format(
-        "{} of {} orientations (the first in row {}) do not follow the joints: {} rms; read {} they would fit to {}, "
-        "as the others do: two files of different order in one? xyzw order? another tool frame?",
-        off.size(), group_.rows.size(), first, deg(off.empty() ? given_.fit : rms(off)), all_[two_orders_].name,
-        deg(of_both_.fit));
+    const double far = off.empty() ? given_.fit : rms(off);
+    return doubted(fmt::format("the first of {} of {} orientations that do not follow the joints: {} rms; read {} they "
+                               "would fit to {}, as the others do",
+                               off.size(), group_.rows.size(), deg(far), all_[two_orders_].name, deg(of_both_.fit)),
+                   far)
+        .at_row(first)
+        .with_text(all_[two_orders_].name)
+        .next("two files of different order in one? xyzw order? another tool frame?")
+        .value();
   }
-  std::string of_tool() const {
+  Error of_tool() const {
     const Quaternion q = given_.q_FT.w() < 0 ? Quaternion(-given_.q_FT.coeffs()) : given_.q_FT;
-    return fmt::format(
-        "orientations follow the joints to {}, but turned by {} against tool '{}' of the cell file: another tool "
-        "frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]; {}",
-        deg(given_.scatter), deg(given_.offset), group_.tool, q.w(), q.x(), q.y(), q.z(), otherwise());
+    return doubted(fmt::format("orientations follow the joints to {}, but turned by {} against tool '{}' of the cell "
+                               "file; {}",
+                               deg(given_.scatter), deg(given_.offset), group_.tool, otherwise()),
+                   given_.offset)
+        .with_text(fmt::format("against tool '{}'", group_.tool))
+        .next(fmt::format("another tool frame? xyzw order? Its q_wxyz would be [{:.4f}, {:.4f}, {:.4f}, {:.4f}]", q.w(),
+                          q.x(), q.y(), q.z()))
+        .value();
   }
-  std::string of_rows(const std::vector<std::size_t>& far) const {
+  Error of_rows(const std::vector<std::size_t>& far) const {
     std::vector<double> off;
     for (const std::size_t i : far) off.push_back(angle(all_.front().q_FT[i], given_.q_FT));
     const Measurement& first = *group_.rows[far.front()];
-    return fmt::format(
-        "{} of {} orientations (the first in row {}, pose {}) do not follow the joints: {} rms, the others {}: xyzw "
-        "order? another tool frame? the joints of another pose?",
-        far.size(), group_.rows.size(), first.row, first.pose_id, deg(rms(off)),
-        deg(median(angles(all_.front().q_FT, given_.q_FT))));
+    return doubted(
+               fmt::format("pose {} is the first of {} of {} orientations that do not follow the joints: {} rms, the "
+                           "others {}",
+                           first.pose_id, far.size(), group_.rows.size(), deg(rms(off)),
+                           deg(median(angles(all_.front().q_FT, given_.q_FT)))),
+               rms(off))
+        .at_row(first.row)
+        .with_text("pose " + first.pose_id)
+        .next("xyzw order? another tool frame? the joints of another pose?")
+        .value();
   }
 
   const Oriented& group_;
@@ -352,7 +373,7 @@ std::vector<Oriented> by_tool(const MeasurementBatch& batch, const Chain& robot)
   }
   std::vector<Oriented> all;
   for (auto& [tool, group] : groups) {
-    if (group.rows.size() >= kFewestPoses) all.push_back(std::move(group));
+    if (group.rows.size() >= kFewestOriented) all.push_back(std::move(group));
   }
   return all;
 }
@@ -367,7 +388,7 @@ Oriented without(const Oriented& group, const std::vector<bool>& bad) {
   return kept;
 }
 
-/// Base and tool by the orientations themselves, where nothing else says how the base is turned.
+/// The base's rotation from the orientations themselves, where nothing else tells it.
 std::optional<Quaternion> by_orientations(const Oriented& group) {
   std::vector<Pose> X_WT;
   for (const Measurement* m : group.rows) X_WT.push_back(make_pose(*m->R_WT, m->p_W));
@@ -376,7 +397,7 @@ std::optional<Quaternion> by_orientations(const Oriented& group) {
   return Quaternion(found->X_WB.linear());
 }
 
-/// Whether the positions are those of a base at `X_WB`, to what a model of a robot may leave.
+/// Whether the positions fit a base at `X_WB`, but for what a model of a robot may leave.
 bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented& group) {
   const Positions positions = positions_of(group);
   Eigen::Matrix3Xd p_F(3, positions.p_W.cols());
@@ -388,7 +409,7 @@ bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented
   return median(off) <= kNoModelError;
 }
 
-std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
+std::optional<Error> doubt_of(Oriented group, const Cell& cell) {
   const std::optional<Pose>& X_FT = cell.tools.at(group.tool);
   const Located located = by_positions(group, X_FT);
   if (!located.belong) return std::nullopt;  // the joints themselves are in question
@@ -397,13 +418,13 @@ std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
     turned.push_back(located.turned->q_WB);
     group = without(group, located.turned->bad);
   }
-  // The cell's base is the finer of the two, unless the tracker stands elsewhere.
+  // The base of the cell file is more exact, unless the tracker stands elsewhere now.
   const auto base = cell.X_WB ? std::optional<Quaternion>(cell.X_WB->linear()) : std::nullopt;
   if (base && (turned.empty() || angle(*base, turned.front()) < kMostOff)) turned.push_back(*base);
   if (!located.turned && !(cell.X_WB && stands_at(*cell.X_WB, X_FT, group))) {
     if (const auto q_WB = by_orientations(group)) turned.push_back(*q_WB);
   }
-  // The base that suits the numbers as given is theirs.
+  // The base under which the numbers as given fit best is the right one.
   std::optional<Question> best;
   for (const Quaternion& q_WB : turned) {
     Question question(group, q_WB, cell);
@@ -414,7 +435,7 @@ std::optional<std::string> doubt_of(Oriented group, const Cell& cell) {
 
 }  // namespace
 
-std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
+std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
   for (const Oriented& group : by_tool(batch, cell.robot)) {
     if (auto doubt = doubt_of(group, cell)) return doubt;
   }
@@ -422,9 +443,9 @@ std::optional<std::string> orientation_doubt(const MeasurementBatch& batch, cons
 }
 
 Status check_orientations(const MeasurementBatch& batch, const Cell& cell) {
-  const std::optional<std::string> doubt = orientation_doubt(batch, cell);
+  std::optional<Error> doubt = orientation_doubt(batch, cell);
   if (!doubt) return {};
-  return refused("batch {}: {}", batch.id, *doubt);
+  return Failure(std::move(*doubt)).in("batch " + batch.id);
 }
 
 }  // namespace trammel

@@ -34,11 +34,12 @@ std::vector<std::string> owners(const ErrorSource& source, const Cell& cell) {
 
 Status check_has_all(const PhysicalModel& model, const Cell& cell) {
   for (const auto& [id, X_FT] : model.tools) {
-    if (!cell.tools.contains(id)) return refused("cell {}: the model to start from knows tool '{}'", cell.name, id);
+    if (!cell.tools.contains(id))
+      return refused("cell {}: the model to start from knows tool '{}'", cell.name, id).of("tools").with_text(id);
   }
   for (const auto& [id, payload] : model.cell->payloads) {
     if (!cell.payloads.contains(id))
-      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id);
+      return refused("cell {}: the model to start from knows payload '{}'", cell.name, id).of("payloads").with_text(id);
   }
   return {};
 }
@@ -60,8 +61,8 @@ std::vector<Index> places(const ErrorSource& before, const Cell& cell_before, co
   return place;
 }
 
-/// The source that `name` means in the model (a cause stands for the form that is there), added where the model has
-/// none of it: `place` makes room. Returns its full name.
+/// The full name of the source that `name` means in the model; a cause means the form that is there. Where the model
+/// has none, it is added, and the indices in `place` move.
 Result<std::string> named_source(PhysicalModel& model, const std::string& name, std::vector<Index>& place) {
   std::vector<std::string> names = alternatives(name, *model.cell);
   names.insert(names.begin(), name);
@@ -77,7 +78,7 @@ Result<std::string> named_source(PhysicalModel& model, const std::string& name, 
   return full_name;
 }
 
-/// One flag a parameter: whether a source in `names` has it and, of tools and payloads, a pose of `batch` too.
+/// A flag for each parameter: whether it is of a source in `names` and, of tools and payloads, of one that `batch` has.
 std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<std::string>& names,
                                 const MeasurementBatch& batch) {
   std::set<std::string> tools, payloads;
@@ -98,7 +99,7 @@ std::vector<bool> parameters_of(const PhysicalModel& model, const std::vector<st
   return chosen;
 }
 
-/// How what is anew follows from the poses and hangs on the rest, about the solution.
+/// How what is anew depends on the poses and on the rest, to first order about the solution.
 void add_dependence(Refit& refit, const CalibrationProblem& problem) {
   const CalibrationResult& found = refit.result;
   const std::vector<bool> none_held(static_cast<std::size_t>(found.model.values.size()), false);
@@ -116,7 +117,7 @@ void add_dependence(Refit& refit, const CalibrationProblem& problem) {
   for (const Index k : refit.anew) refit.by_rest.col(k).setZero();
 }
 
-/// What the poses do not tell of what is anew, beside what was not known of the rest before.
+/// Adds the combinations of the rest that were not identifiable before.
 void add_unidentifiable(CalibrationResult& result, const CalibrationResult& known, const std::set<std::string>& anew) {
   std::vector<UnidentifiableCombination> rest = known.unidentifiable;
   std::erase_if(rest, [&](const UnidentifiableCombination& one) {
@@ -126,7 +127,7 @@ void add_unidentifiable(CalibrationResult& result, const CalibrationResult& know
   result.unidentifiable.insert(result.unidentifiable.end(), rest.begin(), rest.end());
 }
 
-/// Everything that `known` says of what was kept, in its place.
+/// Takes over from `known` all that was kept.
 void keep_rest(Refit& refit, const CalibrationResult& known) {
   CalibrationResult& result = refit.result;
   const std::set<Index> anew(refit.anew.begin(), refit.anew.end());
@@ -189,48 +190,72 @@ Result<PhysicalModel> in_cell(const PhysicalModel& model, const std::shared_ptr<
   return moved;
 }
 
+namespace {
+
+/// What to identify anew, and where it starts.
+struct Anew {
+  std::vector<std::string> sources;  ///< full names
+  std::vector<bool> parameters;      ///< a flag each
+};
+
+/// Finds the sources in `only`, adds those that the model has not, and puts their parameters at the priors. `refit`
+/// learns the places and prior variances.
+Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::string>& only, Refit& refit) {
+  Anew anew;
+  for (const std::string& name : only) {
+    Result<std::string> source = named_source(problem.model, name, refit.place);
+    if (!source) return tl::make_unexpected(source.error());
+    anew.sources.push_back(std::move(*source));
+  }
+  if (const Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
+  anew.parameters = parameters_of(problem.model, anew.sources, problem.batch);
+  const std::vector<Parameter> parameters = problem.model.parameters();
+  refit.prior_variance = VectorXd::Zero(static_cast<Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    const auto at = static_cast<Index>(k);
+    refit.prior_variance(at) = std::pow(parameters[k].prior_scale, 2);
+    if (anew.parameters[k]) refit.anew.push_back(at);
+  }
+  return anew;
+}
+
+/// Base and tools that are anew start where the poses put them, by the arm as it is known; all else at its prior.
+Status place_anew(CalibrationProblem& problem, const Anew& anew, const Refit& refit) {
+  const PhysicalModel before = problem.model;
+  const std::vector<Parameter> parameters = problem.model.parameters();
+  for (const Index at : refit.anew) problem.model.values(at) = parameters[static_cast<std::size_t>(at)].prior;
+  const bool base = corrects(anew.sources, Part::kBase);
+  const bool tool = corrects(anew.sources, Part::kTool);
+  for (const Measurement& m : problem.batch.measurements) {
+    const auto& X_FT = problem.model.cell->tools.at(m.context.tool);
+    if (tool && X_FT) problem.model.tools[m.context.tool] = *X_FT;
+  }
+  const Status located = locate_refitted_frames(before, problem.batch, base, tool, problem.model);
+  if (!located) return Failure(located.error()).in("batch " + problem.batch.id);
+  return {};
+}
+
+}  // namespace
+
 Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const Cell>& cell,
                     const MeasurementBatch& batch, const std::vector<std::string>& only, CalibrateOptions options) {
-  if (batch.measurements.empty()) return refused("batch {}: no measurements to calibrate with", batch.id);
+  if (batch.measurements.empty())
+    return refused("no measurements to calibrate with").in("batch " + batch.id).beyond(0, 1);
   if (only.empty()) return failure(ErrorCode::kUsage, "no error source is named to be identified anew");
   Refit refit;
   Result<PhysicalModel> model = in_cell(known.model, cell, &refit.place);
   if (!model) return tl::make_unexpected(model.error());
   CalibrationProblem problem{std::move(*model), batch};
-  std::vector<std::string> names;
-  for (const std::string& name : only) {
-    Result<std::string> source = named_source(problem.model, name, refit.place);
-    if (!source) return tl::make_unexpected(source.error());
-    names.push_back(std::move(*source));
-  }
-  if (Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
-  const PhysicalModel before = problem.model;
-  const std::vector<bool> anew = parameters_of(problem.model, names, batch);
-  const std::vector<Parameter> parameters = problem.model.parameters();
-  refit.prior_variance = VectorXd::Zero(static_cast<Index>(parameters.size()));
-  for (std::size_t k = 0; k < anew.size(); ++k) {
-    options.held.push_back(!anew[k]);
-    const auto at = static_cast<Index>(k);
-    refit.prior_variance(at) = std::pow(parameters[k].prior_scale, 2);
-    if (!anew[k]) continue;
-    refit.anew.push_back(at);
-    problem.model.values(at) = parameters[k].prior;
-  }
-  if (corrects(names, Part::kTool)) {
-    for (const Measurement& m : batch.measurements) {
-      if (const auto& X_FT = cell->tools.at(m.context.tool)) problem.model.tools[m.context.tool] = *X_FT;
-    }
-  }
-  if (Status located = locate_refitted_frames(before, batch, corrects(names, Part::kBase), corrects(names, Part::kTool),
-                                              problem.model);
-      !located) {
-    return Failure(located.error()).in("batch " + batch.id);
-  }
+  const Result<Anew> anew = begin_anew(problem, only, refit);
+  if (!anew) return tl::make_unexpected(anew.error());
+  if (const Status placed = place_anew(problem, *anew, refit); !placed) return tl::make_unexpected(placed.error());
+  for (const bool one : anew->parameters) options.held.push_back(!one);
   Result<CalibrationResult> found = identify(problem, options);
   if (!found) return tl::make_unexpected(found.error());
   refit.result = std::move(*found);
-  for (std::size_t k = 0; k < anew.size(); ++k) {
-    if (!anew[k]) refit.result.model.values(static_cast<Index>(k)) = problem.model.values(static_cast<Index>(k));
+  for (std::size_t k = 0; k < anew->parameters.size(); ++k) {
+    if (!anew->parameters[k])
+      refit.result.model.values(static_cast<Index>(k)) = problem.model.values(static_cast<Index>(k));
   }
   add_dependence(refit, problem);
   keep_rest(refit, known);

@@ -30,7 +30,7 @@ PhysicalModel with_standard_sources(PhysicalModel physics) {
     TRAMMEL_CHECK(source.has_value());
     const auto count = static_cast<Eigen::Index>((*source)->parameters().size());
     const Eigen::Index first = add_source(physics, *std::move(source));
-    physics.values.segment(first, count).setZero();  // not at their priors: the residual was measured without them
+    physics.values.segment(first, count).setZero();  // not at the priors: the residual was taken without them
   }
   return physics;
 }
@@ -72,7 +72,7 @@ BiasPhysics BiasPhysics::with_tools_of(const PhysicalModel& now) const {
     const Pose X_FT_now = served_tool(now, name);
     const Pose X_FT_then = served_tool(whole_, name);
     if (X_FT_now.matrix() == X_FT_then.matrix()) continue;
-    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // a motion in F stands before the nominal tool
+    X_FT = X_FT * X_FT_then.inverse() * X_FT_now;  // the errors of a tool come before its nominal frame
   }
   return BiasPhysics(std::move(moved), {});
 }

@@ -2,57 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "server/base/check.h"
-#include "server/base/coverage.h"
-#include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
-#include "server/compensate/model_file.h"
-#include "server/compensate/paired_gain.h"
+#include "server/compensate/file/write_parts.h"
 
 namespace trammel {
 
 namespace {
 
-/// Mean over the coordinates of minus the log density of errors in normal distributions of these stddevs, nat.
-std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
-  const auto z = error.array() / stddev.array();
-  const double mean = (0.5 * z.square() + stddev.array().log()).mean() + 0.5 * std::log(2 * std::numbers::pi);
-  return std::isfinite(mean) ? std::optional(mean) : std::nullopt;
-}
-
-/// Share of coordinates inside their 95 % interval.
-double coverage_95(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
-  return (error.array().abs() <= kInterval95 * stddev.array()).cast<double>().mean();
-}
-
-}  // namespace
-
-double nlpd_in_mm(double nlpd_in_m) { return nlpd_in_m + std::log(to_mm(1.0)); }
-
-ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
-  const auto n = e_B.cols();
-  TRAMMEL_CHECK(n > 0);
-  Eigen::VectorXd length = e_B.colwise().norm().transpose();
-  std::sort(length.begin(), length.end());
-  ErrorFigures figures;
-  figures.rms = std::sqrt(length.squaredNorm() / static_cast<double>(n));
-  figures.mean = length.mean();
-  const double place = 0.997 * static_cast<double>(n - 1);
-  const auto below = static_cast<Eigen::Index>(place);
-  const auto above = std::min(below + 1, n - 1);
-  figures.p997 = length(below) + (place - static_cast<double>(below)) * (length(above) - length(below));
-  figures.max = length(n - 1);
-  figures.axis_mean = e_B.rowwise().mean();
-  if (n > 1) {
-    figures.axis_stddev =
-        ((e_B.colwise() - figures.axis_mean).rowwise().squaredNorm() / static_cast<double>(n - 1)).cwiseSqrt();
-  }
-  return figures;
-}
-
-namespace {
+constexpr std::size_t kIdLength = 12;  // of a model, in digits of its hash: enough to tell every model of a plant
 
 Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
@@ -63,28 +21,40 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
   const auto not_finite = [](const std::optional<double>& value) { return value && !std::isfinite(*value); };
   const std::vector<int>& directions = context.direction;
   if (!directions.empty() && static_cast<Eigen::Index>(directions.size()) != joints)
-    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints);
+    return refused("model: pose {} of the bias has {} directions for {} joints", row, directions.size(), joints)
+        .of("direction")
+        .beyond(directions.size(), joints);
   for (const int direction : directions) {
     if (direction < -1 || direction > 1)
-      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction);
+      return refused("model: pose {} of the bias has a direction {}, expected -1, 0 or 1", row, direction)
+          .of("direction")
+          .beyond(direction, direction < 0 ? -1 : 1);
   }
   if (context.velocity && context.velocity->size() != joints)
-    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints);
+    return refused("model: pose {} of the bias has {} velocities for {} joints", row, context.velocity->size(), joints)
+        .of("velocity")
+        .beyond(context.velocity->size(), joints);
   if (context.velocity && !context.velocity->allFinite())
-    return refused("model: pose {} of the bias has a velocity that is not finite", row);
-  if (not_finite(context.time)) return refused("model: pose {} of the bias has a time that is not finite", row);
+    return refused("model: pose {} of the bias has a velocity that is not finite", row).of("velocity");
+  if (not_finite(context.time))
+    return refused("model: pose {} of the bias has a time that is not finite", row).of("time");
   if (not_finite(context.temperature))
-    return refused("model: pose {} of the bias has a temperature that is not finite", row);
-  if (context.index < 0) return refused("model: pose {} of the bias has the index {}", row, context.index);
+    return refused("model: pose {} of the bias has a temperature that is not finite", row).of("temperature");
+  if (context.index < 0)
+    return refused("model: pose {} of the bias has the index {}", row, context.index)
+        .of("index")
+        .beyond(context.index, 0);
   return {};
 }
 
 /// At the observations of a bias with blocks.
-Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& parts, const BiasPhysics& physics) {
+Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const BiasPhysics& physics) {
   const BiasState& bias = *parts.bias;
   if (static_cast<Eigen::Index>(parts.bias_contexts.size()) != bias.q.rows()) {
     return refused("model: {} poses are described for {} observations of the bias", parts.bias_contexts.size(),
-                   bias.q.rows());
+                   bias.q.rows())
+        .of("bias")
+        .beyond(parts.bias_contexts.size(), bias.q.rows());
   }
   std::vector<BiasFeatures> features;
   for (std::size_t i = 0; i < parts.bias_contexts.size(); ++i) {
@@ -95,20 +65,22 @@ Result<std::vector<BiasFeatures>> features_of(const CompensatedModel::Parts& par
     const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
     if (!parts.physics.tools.contains(context.tool) || !known_payload) {
       return refused("model: the bias learned at tool '{}' and payload '{}', which its cell does not have",
-                     context.tool, context.payload);
+                     context.tool, context.payload)
+          .of("bias")
+          .with_text(context.tool + " " + context.payload);
     }
     features.push_back(physics.at(context));
   }
   return features;
 }
 
-BiasPhysics physics_of_bias(const CompensatedModel::Parts& parts) {
+BiasPhysics physics_of_bias(const ModelParts& parts) {
   return parts.bias_origin ? BiasPhysics::learned_at(parts.bias_origin->physics) : BiasPhysics(parts.physics);
 }
 
-Status check_origin(const CompensatedModel::Parts& parts) {
+Status check_origin(const ModelParts& parts) {
   if (!parts.bias_origin) return {};
-  const CompensatedModel::Parts::BiasOrigin& origin = *parts.bias_origin;
+  const ModelParts::BiasOrigin& origin = *parts.bias_origin;
   const auto P = parts.covariance.rows();
   if (origin.covariance.rows() != P || origin.covariance.cols() != P || !origin.covariance.allFinite() ||
       origin.physics.values.size() != origin.physics.parameter_count() || !origin.physics.values.allFinite()) {
@@ -117,9 +89,8 @@ Status check_origin(const CompensatedModel::Parts& parts) {
   return {};
 }
 
-}  // namespace
-
-Result<CompensatedModel> CompensatedModel::make(Parts parts) {
+/// Whether the parts are of one robot.
+Status check_fit(const ModelParts& parts) {
   const int n = parts.physics.cell->robot.size();
   const auto P = static_cast<Eigen::Index>(parts.physics.parameter_count());
   if (parts.q_min.size() != n || parts.q_max.size() != n || parts.physics.values.size() != P ||
@@ -131,44 +102,59 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
     return refused("model: {} extrapolation slopes for {} joints", parts.extrapolation_slope.size(), n);
   }
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
-    return refused("model: a parameter is not finite");
+    return refused("model: a parameter is not finite").of("parameters");
   }
-  if (const Status fits = check_origin(parts); !fits) return tl::make_unexpected(fits.error());
+  if (Status origin = check_origin(parts); !origin) return origin;
+  if (parts.bias && parts.bias->q.cols() != n)
+    return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
+  return {};
+}
+
+/// The bias of the orientation, told what that of the position, `of_position`, is told.
+Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_position) {
+  if (rotation.kernel != of_position.kernel || rotation.q != of_position.q)
+    return refused("model: the bias of the orientation is not of the same poses and kernel as that of the position");
+  for (const BiasFeatures& features : of_position.features) rotation.features.push_back(turned(features));
+  return BiasModel::restore(rotation);
+}
+
+}  // namespace
+
+Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside) {
+  BiasState state = *parts.bias;
+  const Result<SpelledBias> spelled = spelled_bias(state.kernel);
+  if (spelled && !spelled->blocks.empty()) {
+    Result<std::vector<BiasFeatures>> features = features_of(parts, then);
+    if (!features) return tl::make_unexpected(features.error());
+    state.features = std::move(*features);
+    inside->bias_has_parameters = spelled->has("parameters");
+  }
+  if (parts.bias_origin) inside->bias_turn = then.turn_to(parts.physics);
+  const auto turned_rms = [&](const Eigen::MatrixXd& residual_B) {
+    return column_rms(inside->bias_turn ? residual_B * inside->bias_turn->transpose() : residual_B);
+  };
+  Result<BiasModel> bias = BiasModel::restore(state);
+  if (!bias) return tl::make_unexpected(bias.error());
+  inside->bias = std::move(*bias);
+  if (!inside->bias->needs_features()) inside->bias_size_B = turned_rms(state.residual_B);
+  if (!parts.rotation_bias) return {};
+  Result<BiasModel> rotation = restored_rotation(*parts.rotation_bias, state);
+  if (!rotation) return tl::make_unexpected(rotation.error());
+  if (!inside->bias_has_parameters) inside->rotation_bias_size_B = turned_rms(parts.rotation_bias->residual_B);
+  inside->rotation_bias = std::move(*rotation);
+  return {};
+}
+
+Result<CompensatedModel> CompensatedModel::make(Parts parts) {
+  if (const Status fits = check_fit(parts); !fits) return tl::make_unexpected(fits.error());
   const BiasPhysics then = physics_of_bias(parts);
   auto inside = std::make_shared<Inside>(parts.bias_origin ? then.with_tools_of(parts.physics) : then);
   if (parts.bias) {
-    if (parts.bias->q.cols() != n)
-      return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
-    BiasState state = *parts.bias;
-    const Result<SpelledBias> spelled = spelled_bias(state.kernel);
-    if (spelled && !spelled->blocks.empty()) {
-      Result<std::vector<BiasFeatures>> features = features_of(parts, then);
-      if (!features) return tl::make_unexpected(features.error());
-      state.features = std::move(*features);
-      inside->bias_has_parameters = spelled->has("parameters");
-    }
-    if (parts.bias_origin) inside->bias_turn = then.turn_to(parts.physics);
-    const auto turned_rms = [&](const Eigen::MatrixXd& residual_B) {
-      return column_rms(inside->bias_turn ? residual_B * inside->bias_turn->transpose() : residual_B);
-    };
-    Result<BiasModel> bias = BiasModel::restore(state);
-    if (!bias) return tl::make_unexpected(bias.error());
-    inside->bias = std::move(*bias);
-    if (!inside->bias->needs_features()) inside->bias_size_B = turned_rms(state.residual_B);
-    if (parts.rotation_bias) {
-      BiasState rotation = *parts.rotation_bias;
-      if (rotation.kernel != state.kernel || rotation.q != state.q)
-        return refused(
-            "model: the bias of the orientation is not of the same poses and kernel as that of the position");
-      for (const BiasFeatures& features : state.features) rotation.features.push_back(turned(features));
-      Result<BiasModel> turning = BiasModel::restore(rotation);
-      if (!turning) return tl::make_unexpected(turning.error());
-      if (!inside->bias_has_parameters) inside->rotation_bias_size_B = turned_rms(rotation.residual_B);
-      inside->rotation_bias = std::move(*turning);
-    }
+    if (const Status restored = restore_biases(parts, then, inside.get()); !restored)
+      return tl::make_unexpected(restored.error());
   }
-  parts.provenance.hash = content_hash(parts);
-  parts.provenance.id = parts.provenance.hash.substr(0, 12);
+  parts.provenance.hash = model_file::content_hash(parts);
+  parts.provenance.id = parts.provenance.hash.substr(0, kIdLength);
   inside->parts = std::move(parts);
   return CompensatedModel(std::move(inside));
 }
@@ -182,7 +168,9 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
     known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);
   }
   return refused("model {} of cell {}: was not trained with tool '{}' and payload '{}', only with {}", provenance().id,
-                 cell().name, tool, payload, known);
+                 cell().name, tool, payload, known)
+      .of("tool_id")
+      .with_text(tool);
 }
 
 bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
@@ -263,6 +251,10 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
       evaluation.orientation->coverage_95 = coverage_95(rotation.compensated, rotation.stddev);
   }
   return evaluation;
+}
+
+PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after, const MeasurementBatch& batch) {
+  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated);
 }
 
 }  // namespace trammel

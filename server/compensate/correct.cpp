@@ -10,16 +10,16 @@ namespace trammel {
 
 namespace {
 
-constexpr double kRotationTolerance = 1e-7;  // rad, of a corrected target
-constexpr int kHighestConf = 7;
-constexpr int kJointsNamed = 2;  // of those outside their limits, in one message
-constexpr int kMostDecimals = 9;
+constexpr double kRotationTolerance = 1e-7;  // rad: 0.1 µm at 1 m
+constexpr int kHighestConf = 7;              // three signs, inverse_kinematics.h
+constexpr int kJointsNamed = 2;              // of those outside their limits, in one message: more is not read
+constexpr int kDecimalsTold = 9;             // more than a controller takes
 
-/// A joint value with as many decimals as tell it from the limit that it is beyond.
+/// A joint value with so many decimals that it differs from the limit it is beyond.
 std::string told_from(double limit, double value) {
   if (std::abs(value) > 1e6) return fmt::format("{:.6g}", value);
   std::string text;
-  for (int decimals = 1; decimals <= kMostDecimals; ++decimals) {
+  for (int decimals = 1; decimals <= kDecimalsTold; ++decimals) {
     text = fmt::format("{:.{}f}", value, decimals);
     if (std::abs(std::stod(text) - limit) > 0.5 * std::abs(value - limit)) break;
   }
@@ -79,7 +79,7 @@ std::string why_not(const Chain& robot, const InverseResult& joints, const std::
   }
 }
 
-/// Of a target out of domain.
+/// The message of a target out of domain.
 std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
   const bool has_blocks = bias && bias->needs_features();
   return fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
@@ -92,36 +92,16 @@ double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.s
 
 }  // namespace
 
-std::string_view to_string(CorrectionStatus status) {
-  switch (status) {
-    case CorrectionStatus::kOk:
-      return "ok";
-    case CorrectionStatus::kOutOfDomain:
-      return "out_of_domain";
-    case CorrectionStatus::kJointLimit:
-      return "joint_limit";
-    case CorrectionStatus::kUnreachable:
-      return "unreachable";
-    case CorrectionStatus::kSingular:
-      return "singular";
-    case CorrectionStatus::kNotConverged:
-      return "not_converged";
-    case CorrectionStatus::kRefused:
-      return "refused";
-  }
-  return "refused";
-}
-
 Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
   const Chain& robot = cell().robot;
   if (target.joint_target) {
-    if (!target.seed) return refused("a joint target without joints");
+    if (!target.seed) return refused("a joint target without joints").of("joints");
     const bool outside = robot.joint_outside_limits(*target.seed).has_value();
     return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed, 0};
   }
   if (target.conf) return inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
   if (target.seed) return inverse_kinematics(robot, target.X_BT * X_TF, *target.seed);
-  return refused("a target needs a branch (conf) or joints as a seed");
+  return refused("a target needs a branch (conf) or joints as a seed").of("conf");
 }
 
 CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, PoseContext context,
@@ -132,7 +112,7 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   const auto settled = [&] {
     return now.missing.head<3>().norm() < options.tolerance && now.missing.tail<3>().norm() < kRotationTolerance;
   };
-  // Until it settles only the mean is asked for: the variance costs a hundred times as much.
+  // The iteration asks for the mean only: the variance takes a hundred times as long.
   while (!settled() && now.iterations < options.max_iterations) {
     ++now.iterations;
     now.X_BT_commanded.translation() += now.missing.head<3>();
@@ -184,7 +164,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   context.q = start->q;
   result.X_BT_wanted =
       target.joint_target ? parts().physics.X_WB.inverse() * parts().physics.nominal_pose_W(context) : target.X_BT;
-  // Left alone, the arm is sent where the target says.
+  // Where nothing is corrected, the wanted pose is commanded.
   result.X_BT_commanded = result.X_BT_wanted;
   result.q = start->q;
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
@@ -196,7 +176,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
   if (start->status != InverseStatus::kOk) return not_reached(*start);
 
-  // Decided once, at the target: what the bias is worth there does not change by the little that a correction moves.
+  // The weight is that at the target: a correction moves too little to change it.
   const double bias_weight = before.bias_weight;
   const Approach found = approach(result.X_BT_wanted, context, before.X_BT_predicted, bias_weight, options);
   result.iterations = found.iterations;

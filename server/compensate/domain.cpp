@@ -8,13 +8,13 @@ namespace trammel {
 
 namespace {
 
-constexpr double kRangeMargin = 0.05;  // of a joint's training range, on either side
-constexpr double kLeastMargin = 1e-9;  // rad, for a joint that stood still
-constexpr double kRangeFade = 0.20;    // of a joint's training range, from the margin to where nothing is taken
-constexpr double kLeastFade = 0.01;    // rad, for a joint that stood still: several times what a correction moves it
-constexpr double kUnknownShare = 0.5;  // half of the prior variance left: the bias says little more than nothing
-constexpr double kLeastFadeOfShare = 2.0;
-constexpr double kLeastShare = 1e-12;
+constexpr double kDomainMargin = 0.05;  // of a joint's training range: a Latin hypercube leaves as much at its edges
+constexpr double kLeastMargin = 1e-9;   // rad, for a joint that stood still: rounding
+constexpr double kRangeFade = 0.20;     // of the range, from the margin to where nothing is taken
+constexpr double kLeastFade = 0.01;     // rad, for a joint that stood still: several times what a correction moves it
+constexpr double kUnknownShare = 0.5;   // half of the prior variance is left: the bias knows little
+constexpr double kLeastFadeOfShare = 2.0;  // times the limit, where the limit itself is high
+constexpr double kKnownExactly = 1e-12;    // of the prior variance; keeps the logarithm finite
 
 /// 1 up to `from`, 0 beyond `to`, smooth between.
 double fading(double x, double from, double to) {
@@ -25,7 +25,7 @@ double fading(double x, double from, double to) {
 }  // namespace
 
 bool Domain::in_range(const JointVector& q) const {
-  const Eigen::ArrayXd margin = kRangeMargin * (q_max - q_min).array() + kLeastMargin;
+  const Eigen::ArrayXd margin = kDomainMargin * (q_max - q_min).array() + kLeastMargin;
   return (q.array() >= q_min.array() - margin).all() && (q.array() <= q_max.array() + margin).all();
 }
 
@@ -34,13 +34,13 @@ double Domain::bias_weight(const JointVector& q, double prior_share) const {
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const double range = q_max(j) - q_min(j);
     const double beyond = std::max(q_min(j) - q(j), q(j) - q_max(j));
-    const double margin = kRangeMargin * range + kLeastMargin;
+    const double margin = kDomainMargin * range + kLeastMargin;
     weight *= fading(beyond, margin, margin + kRangeFade * range + kLeastFade);
   }
-  // Shares span decades: what counts is how many times less is known than at the edge.
-  const double limit = std::max(prior_share_limit, kLeastShare);
+  // Shares span decades, so the fade is one of their logarithm.
+  const double limit = std::max(prior_share_limit, kKnownExactly);
   const double unknown = std::max(kUnknownShare, kLeastFadeOfShare * limit);
-  return weight * fading(std::log(std::max(prior_share, kLeastShare)), std::log(limit), std::log(unknown));
+  return weight * fading(std::log(std::max(prior_share, kKnownExactly)), std::log(limit), std::log(unknown));
 }
 
 double Domain::growth(const JointVector& q, const JointVector& slope, const Chain& robot) const {

@@ -2,11 +2,17 @@
 
 #include <string>
 
+#include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 
+/// A model as a file; MODEL_FILE.md says what stands in it.
 namespace trammel {
 
-/// SHA-256 of everything that decides what the model answers and where it comes from, except the moment it was made.
-[[nodiscard]] std::string content_hash(const CompensatedModel::Parts& parts);
+/// The model as text: JSON, one object. Same data, same seed, same content, same hash, same id.
+[[nodiscard]] std::string serialize(const CompensatedModel& model);
+/// The model that `text` holds; `where` names the file in messages. Refuses a text that is no model, whose hash does
+/// not fit its content, or whose numbers no model can have.
+[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where);
+[[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
 
 }  // namespace trammel

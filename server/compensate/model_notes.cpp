@@ -10,19 +10,19 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNothing = 1e-9;    // m and rad that one prior standard deviation of a parameter moves the tool by
-constexpr double kElsewhere = 1e-3;  // m: a tool's point that moved by more
-constexpr int kAskedPoses = 5;       // along the diagonal of the joints' ranges
+constexpr double kNothing = 1e-9;    // m, rad: a parameter whose prior moves the tool by less has no effect
+constexpr double kElsewhere = 1e-3;  // m: a tool that moved by more turns through other errors of the arm
+constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
-constexpr int kAfterEverything = 1 << 20;  // index of a pose after all that began during a batch
+constexpr int kAfterEverything = 1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
 
-/// Everything recorded that any source could ask for.
+/// A pose with everything recorded that a source may need.
 PoseContext eventful(const CompensatedModel::Parts& parts, int k) {
   PoseContext context;
   const auto joints = parts.q_min.size();
   context.q = parts.q_min;
   for (Eigen::Index j = 0; j < joints; ++j) {
-    // A different place of its range for every joint: no posture in which axes are parallel by chance.
+    // Each joint is at another share of its range, so that no axes are parallel by chance.
     const double share = 0.37 + 0.61 * static_cast<double>(k) + 0.29 * static_cast<double>(j);
     context.q(j) += (share - std::floor(share)) * (parts.q_max(j) - parts.q_min(j));
   }
@@ -34,7 +34,7 @@ PoseContext eventful(const CompensatedModel::Parts& parts, int k) {
   return context;
 }
 
-/// For each parameter how far one standard deviation of its prior moves the tool, m or rad, at the most.
+/// For each parameter the most that one prior standard deviation moves the tool, m or rad.
 Eigen::VectorXd effects(const CompensatedModel::Parts& parts) {
   const std::vector<Parameter> parameters = parts.physics.parameters();
   Eigen::VectorXd most = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));

@@ -10,7 +10,7 @@ namespace trammel {
 
 namespace {
 
-/// 0 where nothing differs, or something is not finite.
+/// The statistic of ranks; 0 where nothing differs or a difference is not finite.
 double signed_rank_z(const Eigen::VectorXd& differences) {
   if (!differences.allFinite()) return 0;
   std::vector<double> d;
@@ -22,7 +22,8 @@ double signed_rank_z(const Eigen::VectorXd& differences) {
     const double rank = 0.5 * static_cast<double>(first + 1 + last);
     for (std::size_t i = first; i < last; ++i) sum += std::copysign(rank, d[i]);
   }
-  // Of ranks without ties: that of mean ranks is smaller, and nine equal differences would pass in 2 of 100 cases.
+  // The variance of ranks without ties. That of mean ranks is smaller: nine equal differences would pass in 2 of 100
+  // cases.
   const auto n = static_cast<double>(d.size());
   return d.empty() ? 0 : sum / std::sqrt(n * (n + 1) * (2 * n + 1) / 6);
 }
@@ -50,10 +51,6 @@ PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& a
   gain.z_ranks = signed_rank_z(square_before - square_after);
   gain.z_sum = sum_z(square_before - square_after);
   return gain;
-}
-
-PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after, const MeasurementBatch& batch) {
-  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated);
 }
 
 std::string to_string(const PairedGain& gain) {

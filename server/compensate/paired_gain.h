@@ -1,40 +1,40 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <string>
 #include <vector>
 
-#include "server/compensate/compensated_model.h"
-
 namespace trammel {
 
-/// What two models leave of the same poses, held against each other pose by pose.
+/// The errors of two models on the same poses, compared pose by pose.
 ///
-/// With d the difference of a pose's squared errors and no difference between the models, every d is as likely to have
-/// the other sign. Two statistics say whether they lean to one side, both about standard normal then: of ranks,
-/// W / sqrt(n (n + 1) (2n + 1) / 6) with W the sum of the ranks of the |d|, signed, ties at their mean rank, zeros left
-/// out (Wilcoxon, Individual comparisons by ranking methods, Biometrics Bulletin 1, 1945), which the few poses with
-/// the largest errors cannot decide alone; and of the sum, sum(d) / sqrt(sum(d²)) (Efron, Student's t-test under
-/// symmetry conditions, JASA 64, 1969), which sees a cause that acts at a few poses only. Either may pass, at half the
-/// chance each; with fewer than seven poses neither does.
+/// d is the difference of a pose's squared errors. Were the models equally good, each d would be as likely to have the
+/// other sign. Two statistics test this; both are about standard normal then.
+/// - Of ranks: W / sqrt(n (n + 1) (2n + 1) / 6), W the signed sum of the ranks of |d|, ties at their mean rank, zeros
+/// left
+///   out (Wilcoxon, Individual comparisons by ranking methods, Biometrics Bulletin 1, 1945). A few poses with large
+///   errors cannot decide it alone.
+/// - Of the sum: sum(d) / sqrt(sum(d²)) (Efron, Student's t-test under symmetry conditions, JASA 64, 1969). It sees a
+/// cause
+///   that acts at a few poses only.
+/// Either may pass, each at half the chance. With fewer than seven poses neither does.
 struct PairedGain {
   int poses = 0;
   double rms_before = 0, rms_after = 0;  ///< m, Euclidean
   double z_ranks = 0, z_sum = 0;
-  std::vector<std::string> left_out;  ///< pose ids held out as well, that fit neither model and judge none
+  std::vector<std::string> left_out;  ///< ids of poses that fit neither model and do not judge
 
   [[nodiscard]] double z() const { return z_ranks > z_sum ? z_ranks : z_sum; }
 
-  /// Chance alone would take one of the two there in one of a hundred cases.
+  /// Chance alone takes one of the two so far in one of a hundred cases.
   static constexpr double kBeyondChance = 2.576;
-  /// Nor does the rms rise: better at most poses is no gain where the others are much worse.
+  /// Whether the gain is beyond chance and the rms does not rise: better at most poses is no gain where others are much
+  /// worse.
   [[nodiscard]] bool beyond_chance() const { return z() > kBeyondChance && rms_after <= rms_before; }
 };
 
-/// `before`, `after`: 3 x N, m: errors of the same poses.
+/// `before`, `after`: 3 x N, m, errors of the same poses.
 [[nodiscard]] PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after);
-/// Of the compensated positions of `batch`, which both models know the tools of.
-[[nodiscard]] PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after,
-                                     const MeasurementBatch& batch);
 /// `0.0210 mm rms, before 0.0250 mm on the same 30 poses held out: better beyond chance (z 4.10, limit 2.58);
 /// judged without p7, which fits neither model`. Where only the rms speaks against it: `better at most poses,
 /// but much worse at others (...)`.

@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The same seen from axes that R turns it to; noise stays independent from axis to axis.
+/// The prediction turned by R; the noise of the axes stays independent.
 BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   const Vector3 noise = bias.measured_stddev_B.cwiseAbs2() - bias.stddev_B.cwiseAbs2();
   BiasPrediction now = bias;
@@ -19,8 +19,8 @@ BiasPrediction turned_by(const Matrix3& R, const BiasPrediction& bias) {
   return now;
 }
 
-/// How well the arm is known is asked as it was learned: a tool that is elsewhere now makes no pose a new one. Where
-/// its point goes is in the covariance.
+/// Sets the prior shares to those with the arm as it was learned: a tool that has moved since makes no pose an unknown
+/// one. The motion of the tool's point is in the covariance.
 void share_as_learned(const BiasModel& bias, const BiasPhysics& then, const std::vector<PoseContext>& poses,
                       const Eigen::MatrixXd& q, const std::vector<BiasFeatures>& now,
                       std::vector<BiasPrediction>& predictions) {
@@ -100,7 +100,7 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
 
 namespace {
 
-/// What is taken of a bias: what it knows only of poses nearby fades, what its blocks say lasts.
+/// The part of a bias that is taken: its kernel fades with `weight`, its blocks do not.
 Vector3 taken(const Vector3& mean_B, const Vector3& nearby_B, double weight) {
   return (mean_B - nearby_B) + weight * nearby_B;
 }
@@ -155,22 +155,23 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
 
 namespace {
 
-/// How far what is left after a bias is to be trusted: figures of one kind, m or rad.
+/// How uncertain a pose is beside its bias: of the position, m and m², or of the rotation, rad and rad².
 struct Uncertainty {
-  Matrix3 identified;  ///< what the parameters leave uncertain,
-  Matrix3 since;       ///< and of it what was identified after the bias was learned
-  double metrology;    ///< variances of one axis: of the instrument,
-  double unlearned;    ///< of what the physics leaves over where no bias is taken,
-  double growth;       ///< and of what is missed the farther out
-  Vector3 bias_size;   ///< rms over the training poses where no slope tells what is missed beyond
+  Matrix3 identified;  ///< covariance that the parameters leave
+  Matrix3 since;       ///< the part of it that was identified after the bias was learned
+  double metrology;    ///< variance of one axis: the instrument's
+  double unlearned;    ///< variance of one axis where no bias is taken: what the physics leaves over
+  double growth;       ///< variance of one axis that grows with the distance from the training poses
+  Vector3 bias_size;   ///< rms of the bias over the training poses, where no slope was learned
 };
 
-/// Covariance of one measurement. Noise is never less than the tracker's: a fit to few poses takes some of it for
-/// signal. What the parameters leave uncertain is part of a bias that has them (`has_parameters`); any other corrects
-/// it as far as it knows anything; where the bias does not count it counts in full. What was identified after the bias
-/// was learned no bias corrects. What of the bias is not taken may be missing: as much as it is there, and as it was at
-/// the training poses. The covariance of all that the bias knows stays: far from its poses a kernel has that of before
-/// any data, blocks what the data left them.
+/// Covariance of one measurement.
+/// - Noise is never less than the instrument's: a fit to few poses takes some of the noise for signal.
+/// - What the parameters leave uncertain: a bias that has the parameters (`has_parameters`) counts it itself. Any other
+///   bias corrects it as far as the bias is taken and knows the pose; the rest counts in full.
+/// - No bias corrects what was identified after it was learned.
+/// - What of the bias is not taken may be missing. It is as large as the bias is there, or was at the training poses.
+/// - The bias' own covariance stays: far from its poses a kernel has its prior, blocks what the data left them.
 Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters, const Uncertainty& of) {
   const Vector3 known = bias.stddev_B.cwiseAbs2();
   const Vector3 noise = (bias.measured_stddev_B.cwiseAbs2() - known).cwiseMax(of.metrology);
@@ -184,67 +185,89 @@ Matrix3 with_bias(const BiasPrediction& bias, double weight, bool has_parameters
 
 }  // namespace
 
+Matrix3 CompensatedModel::identified(const Eigen::MatrixXd& J_B) const {
+  return J_B * parts().covariance * J_B.transpose();
+}
+
+Matrix3 CompensatedModel::identified_since(const Eigen::MatrixXd& J_B) const {
+  if (!parts().bias_origin) return Matrix3::Zero();
+  return J_B * parts().bias_origin->covariance * J_B.transpose();
+}
+
+double CompensatedModel::unlearned(const CalibratedPose& pose) const {
+  const double metrology = cell().tracker.sigma * cell().tracker.sigma;
+  return metrology + parts().discrepancy * parts().discrepancy + pose.growth;
+}
+
+Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,
+                                            ErrorPrediction* prediction) const {
+  const double weight = prediction->bias_weight;
+  prediction->X_BT_predicted.translation() += taken(bias.mean_B, bias.nearby_B, weight);
+  const Eigen::MatrixXd J_B = pose.X_BW.linear() * pose.J_W.topRows<3>();
+  Uncertainty of{.identified = identified(J_B),
+                 .since = identified_since(J_B),
+                 .metrology = cell().tracker.sigma * cell().tracker.sigma,
+                 .unlearned = unlearned(pose),
+                 .growth = 0,
+                 .bias_size = inside_->bias_size_B};
+  if (inside_->bias->needs_features()) {
+    // With blocks the slope is of what the bias misses beyond its own covariance; else it is of the physics.
+    of.unlearned = of.metrology;
+    of.growth = pose.growth;
+  }
+  return with_bias(bias, weight, inside_->bias_has_parameters, of);
+}
+
+// No slope is learned of rotations: far out a map may miss as much as there was to learn.
+void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasPrediction& bias,
+                                         ErrorPrediction* prediction) const {
+  const double weight = prediction->bias_weight;
+  const Eigen::MatrixXd J_B = pose.X_BW.linear() * pose.J_W.bottomRows<3>();
+  const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
+  prediction->X_BT_predicted.linear() =
+      (rotation_exp(taken(bias.mean_B, bias.nearby_B, weight)) * prediction->X_BT_predicted.linear()).eval();
+  const Uncertainty of{.identified = identified(J_B),
+                       .since = identified_since(J_B),
+                       .metrology = instrument,
+                       .unlearned = instrument,
+                       .growth = 0,
+                       .bias_size = inside_->rotation_bias_size_B};
+  prediction->rotation_stddev_B = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
+}
+
 ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned,
                                           std::optional<double> bias_weight) const {
-  const PoseContext context = completed(asked);
   const PhysicalModel& physics = parts().physics;
-  const Pose X_BW = physics.X_WB.inverse();
-  Eigen::MatrixXd J_W;
+  CalibratedPose pose{completed(asked), physics.X_WB.inverse(), {}, 0};
+  const PoseContext& context = pose.context;
   ErrorPrediction prediction;
-  prediction.X_BT_nominal = X_BW * physics.nominal_pose_W(context);
-  prediction.X_BT_predicted = X_BW * physics.pose_W(context, physics.values, &J_W);
-  const Eigen::MatrixXd J_B = X_BW.linear() * J_W.topRows<3>();
-  const Matrix3 identified = J_B * parts().covariance * J_B.transpose();
-  const auto identified_since = [&](const Eigen::MatrixXd& by_parameters) -> Matrix3 {
-    if (!parts().bias_origin) return Matrix3::Zero();
-    return by_parameters * parts().bias_origin->covariance * by_parameters.transpose();
-  };
+  prediction.X_BT_nominal = pose.X_BW * physics.nominal_pose_W(context);
+  prediction.X_BT_predicted = pose.X_BW * physics.pose_W(context, physics.values, &pose.J_W);
   const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
-
   const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
   const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
   prediction.in_domain = trained_with && domain.in_range(context.q);
-  const double metrology = cell().tracker.sigma * cell().tracker.sigma;
-  const double growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
-  const double unlearned = metrology + parts().discrepancy * parts().discrepancy + growth;
-  Matrix3 covariance = identified + unsaid;
+  pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
+
+  Matrix3 covariance;
   if (learned == nullptr) {
-    covariance.diagonal().array() += unlearned;
+    covariance = identified(pose.X_BW.linear() * pose.J_W.topRows<3>()) + unsaid;
+    covariance.diagonal().array() += unlearned(pose);
   } else {
-    const BiasPrediction& bias = learned->position;
-    prediction.in_domain &= bias.prior_share <= parts().prior_share_limit;
-    const double weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, bias.prior_share) : 0.0);
-    prediction.bias_weight = weight;
-    prediction.X_BT_predicted.translation() += taken(bias.mean_B, bias.nearby_B, weight);
-    const bool has_parameters = inside_->bias_has_parameters;
-    // The slope of a bias with blocks is that of what it misses beyond its own covariance; the others' of the physics.
-    const Uncertainty of =
-        inside_->bias->needs_features()
-            ? Uncertainty{identified, identified_since(J_B), metrology, metrology, growth, inside_->bias_size_B}
-            : Uncertainty{identified, identified_since(J_B), metrology, unlearned, 0, inside_->bias_size_B};
-    covariance = with_bias(bias, weight, has_parameters, of) + unsaid;
-    if (has_parameters && weight < 1) {
-      // Near its poses the bias has learned it; part of it went into the weights, so its direction is not known.
+    const double share = learned->position.prior_share;
+    prediction.in_domain &= share <= parts().prior_share_limit;
+    prediction.bias_weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, share) : 0.0);
+    covariance = add_position_bias(pose, learned->position, &prediction) + unsaid;
+    if (inside_->bias_has_parameters && prediction.bias_weight < 1) {
+      // Near its poses the bias has learned this; part of it went into the weights, so its direction is not known.
       const Vector3 left_B = inside_->bias_physics.beyond_first_order(context, inside_->bias->parameter_weights());
-      covariance.diagonal().array() += (1 - weight) * left_B.squaredNorm();
+      covariance.diagonal().array() += (1 - prediction.bias_weight) * left_B.squaredNorm();
     }
-    if (learned->rotation) {
-      // No slope is learned of rotations: far out a map may miss as much as there was to learn.
-      const BiasPrediction& turn = *learned->rotation;
-      const Eigen::MatrixXd turned_B = X_BW.linear() * J_W.bottomRows<3>();
-      const double instrument = cell().tracker.sigma_rotation * cell().tracker.sigma_rotation;
-      prediction.X_BT_predicted.linear() =
-          (rotation_exp(taken(turn.mean_B, turn.nearby_B, weight)) * prediction.X_BT_predicted.linear()).eval();
-      prediction.rotation_stddev_B =
-          with_bias(turn, weight, has_parameters,
-                    {turned_B * parts().covariance * turned_B.transpose(), identified_since(turned_B), instrument,
-                     instrument, 0, inside_->rotation_bias_size_B})
-              .diagonal()
-              .cwiseSqrt();
-    }
+    if (learned->rotation) add_rotation_bias(pose, *learned->rotation, &prediction);
   }
   prediction.covariance_B = covariance;
   prediction.stddev_B = covariance.diagonal().cwiseSqrt();
+  const double metrology = cell().tracker.sigma * cell().tracker.sigma;
   prediction.true_stddev_B = (covariance.diagonal().array() - metrology).max(0.0).sqrt();
   prediction.error_B = prediction.X_BT_predicted.translation() - prediction.X_BT_nominal.translation();
   return prediction;

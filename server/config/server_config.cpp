@@ -23,13 +23,15 @@ constexpr int kMaxDomain = 232;          // beyond it DDS' port numbers overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
   const int value = map.integer(key, otherwise);
-  if (value < lower || value > upper) map.refuse(key, fmt::format("{}, limit {} to {}", value, lower, upper));
+  if (value < lower || value > upper)
+    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper).beyond(value, value < lower ? lower : upper));
   return value;
 }
 
 double number_within(const YamlMap& map, const std::string& key, double otherwise, double lower, double upper) {
   const double value = map.number(key, otherwise);
-  if (value < lower || value > upper) map.refuse(key, fmt::format("{}, limit {} to {}", value, lower, upper));
+  if (value < lower || value > upper)
+    map.refuse(key, refused("{}, limit {} to {}", value, lower, upper).beyond(value, value < lower ? lower : upper));
   return value;
 }
 
@@ -40,7 +42,7 @@ std::string server_id(const YamlMap& map, const std::string& key) {
            c == '-';
   };
   if (id.empty() || id.size() > kMaxName || !std::all_of(id.begin(), id.end(), allowed)) {
-    map.refuse(key, fmt::format("'{}', expected 1 to {} letters, digits, '.', '_', '-'", id, kMaxName));
+    map.refuse(key, refused("'{}', expected 1 to {} letters, digits, '.', '_', '-'", id, kMaxName).with_text(id));
   }
   return id;
 }
@@ -50,11 +52,12 @@ std::string address(const YamlMap& map, const std::string& otherwise) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
   if (::inet_pton(AF_INET, text.c_str(), &parsed) != 1) {
-    map.refuse("address", fmt::format("'{}' is no IPv4 address", text));
+    map.refuse("address", refused("'{}' is no IPv4 address", text).with_text(text));
   }
   const bool loopback = (ntohl(parsed.s_addr) >> 24) == 127;
   if (!loopback && !map.boolean("allow_network", false)) {
-    map.refuse("address", text + " leaves this host; say allow_network: true if that is meant");
+    map.refuse("address",
+               refused("{} leaves this host", text).with_text(text).next("say allow_network: true if that is meant"));
   }
   return text;
 }
@@ -66,11 +69,11 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
     int port = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
     if (error != std::errc{} || end != text.data() + text.size() || port < 1024 || port > 65535) {
-      map.refuse("peer_ports", fmt::format("'{}', expected a whole number, limit 1024 to 65535", text));
+      map.refuse("peer_ports", refused("'{}', expected a whole number, limit 1024 to 65535", text).with_text(text));
     }
-    if (port == own) map.refuse("peer_ports", fmt::format("{} is this server's own port", port));
+    if (port == own) map.refuse("peer_ports", refused("{} is this server's own port", port).with_value(port));
     if (std::find(ports.begin(), ports.end(), port) != ports.end())
-      map.refuse("peer_ports", fmt::format("{} is given twice", port));
+      map.refuse("peer_ports", refused("{} is given twice", port).with_value(port));
     ports.push_back(static_cast<std::uint16_t>(port));
   }
   return ports;
@@ -108,7 +111,8 @@ void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& 
     const std::vector<std::string> known = {"debug", "info", "warn", "error"};
     if (std::find(known.begin(), known.end(), log.level) == known.end()) {
       map.refuse("level",
-                 fmt::format("'{}', expected {}{}", log.level, fmt::join(known, ", "), did_you_mean(log.level, known)));
+                 refused("'{}', expected {}{}", log.level, fmt::join(known, ", "), did_you_mean(log.level, known))
+                     .with_text(log.level));
     }
   });
   map.attempt([&] {
@@ -126,7 +130,8 @@ std::vector<std::string> cell_files_of(const YamlMap& map, const std::filesystem
   std::vector<std::string> files;
   for (const std::string& cell : map.texts("cells")) files.push_back((folder / cell).string());
   if (files.empty() || files.size() > kMaxCells) {
-    map.refuse("cells", fmt::format("{} cell files, limit 1 to {}", files.size(), kMaxCells));
+    map.refuse("cells", refused("{} cell files, limit 1 to {}", files.size(), kMaxCells)
+                            .beyond(files.size(), files.empty() ? 1 : kMaxCells));
   }
   return files;
 }
@@ -140,7 +145,8 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
   map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
   map.attempt([&] {
-    if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+    if (map.integer("version", 0) != 1)
+      map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
   });
   ServerConfig& config = file.config;
   map.attempt([&] { config.dds.server_id = server_id(map, "server"); });
@@ -158,35 +164,46 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
 }
 
 /// What its first training would refuse.
-void check_training(const Cell& cell, const std::string& file, std::vector<std::string>& problems) {
-  const auto note = [&](const char* key, const std::string& why) {
-    problems.push_back(fmt::format("{}: model: {}: {}", file, key, why));
+void check_training(const Cell& cell, const std::string& file, std::vector<Error>& problems) {
+  const auto note = [&](const char* key, Error why) {
+    why.field.clear();
+    problems.push_back(Failure(std::move(why)).under(fmt::format("model: {}", key)).in(file).value());
   };
-  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", sentence(bias.error()));
+  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error());
   bool each_is_known = true;
   for (const std::string& source : cell.model.error_sources) {
     const auto made = make_error_source(source, cell);
-    if (!made) note("error_sources", sentence(made.error()));
+    if (!made) note("error_sources", made.error());
     each_is_known = each_is_known && made;
   }
   if (!each_is_known) return;
   const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
-  if (!together) note("error_sources", sentence(together.error()));
+  if (!together) note("error_sources", together.error());
 }
 
-void read_cells(const std::string& path, ServerFile& file, std::vector<std::string>& problems) {
+void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& problems) {
   std::map<std::string, std::string> file_of;
   for (const std::string& cell_file : file.cell_files) {
     auto cell = read_cell(cell_file);
     if (!cell) {
-      problems.push_back(fmt::format("{}: cells: {}", path, sentence(cell.error())));
+      for (Error& one : apart(cell.error())) {
+        problems.push_back(Failure(std::move(one)).next(fmt::format("{} names it as one of its cells", path)).value());
+      }
       continue;
     }
     const std::string name = cell->name;
     if (name.size() > kMaxName)
-      problems.push_back(fmt::format("{}: cell: name of {} bytes, limit {}", cell_file, name.size(), kMaxName));
+      problems.push_back(refused("name of {} bytes, limit {}", name.size(), kMaxName)
+                             .under("cell")
+                             .in(cell_file)
+                             .beyond(name.size(), kMaxName)
+                             .value());
     if (const auto [other, is_new] = file_of.emplace(name, cell_file); !is_new)
-      problems.push_back(fmt::format("{}: cells: {} and {} are both called {}", path, other->second, cell_file, name));
+      problems.push_back(refused("{} and {} are both called {}", other->second, cell_file, name)
+                             .under("cells")
+                             .in(path)
+                             .with_text(name)
+                             .value());
     check_training(*cell, cell_file, problems);
     file.config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
   }
@@ -196,22 +213,22 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<std::stri
 
 ServerReading read_server(const std::string& path) {
   const auto text = read_text_file(path);
-  if (!text) return {{}, {sentence(text.error())}};
+  if (!text) return {{}, {text.error()}};
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   ServerFile file;
-  std::vector<std::string> problems;
+  std::vector<Error> problems;
   const auto read = read_yaml(*text, path, [&](const YamlMap& map) {
     read_server_map(map, folder, file);
     return true;
   });
-  if (!read) problems.push_back(sentence(read.error()));
+  if (!read) problems = apart(read.error());
   read_cells(path, file, problems);
   return {std::move(file.config), std::move(problems)};
 }
 
 Result<ServerConfig> read_server_config(const std::string& path) {
   ServerReading reading = read_server(path);
-  if (!reading.problems.empty()) return refused("{}", fmt::join(reading.problems, "\n"));
+  if (!reading.problems.empty()) return Failure(together(std::move(reading.problems)));
   return std::move(reading.config);
 }
 

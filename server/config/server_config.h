@@ -35,7 +35,7 @@ struct ServerConfig {
 /// The same for those who want to know more: what could be read, and all that is wrong with the rest.
 struct ServerReading {
   ServerConfig config;
-  std::vector<std::string> problems;  ///< a line each
+  std::vector<Error> problems;  ///< each by itself
 };
 [[nodiscard]] ServerReading read_server(const std::string& path);
 

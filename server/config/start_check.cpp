@@ -1,6 +1,7 @@
 #include "server/config/start_check.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "server/base/text_file.h"
 #include "server/dds/port_lock.h"
@@ -12,9 +13,16 @@ namespace {
 
 /// A value that was refused is not looked for.
 bool was_read(const ServerReading& server, const std::string& section) {
-  return std::none_of(server.problems.begin(), server.problems.end(), [&](const std::string& problem) {
-    return problem.find(": " + section + ":") != std::string::npos;
-  });
+  return std::none_of(server.problems.begin(), server.problems.end(),
+                      [&](const Error& problem) { return problem.field.starts_with(section + ":"); });
+}
+
+/// What is wrong with the path or address that stands at `key` of the server file.
+Error at_key(const std::string& key, const std::string& path, Error found) {
+  const std::string named = std::exchange(found.file, "");
+  if (!named.empty()) found.message = named + ": " + found.message;
+  found.field.clear();
+  return Failure(std::move(found)).with_text(named).under(key).in(path).value();
 }
 
 }  // namespace
@@ -22,9 +30,7 @@ bool was_read(const ServerReading& server, const std::string& section) {
 StartCheck check_start(const ServerReading& server, const std::string& path) {
   const ServerConfig& config = server.config;
   StartCheck check{server.problems, {}};
-  const auto wrong = [&](const char* key, const Error& error) {
-    check.problems.push_back(fmt::format("{}: {}: {}", path, key, error.message));
-  };
+  const auto wrong = [&](const char* key, const Error& error) { check.problems.push_back(at_key(key, path, error)); };
   const Status store = config.store.empty() ? Status() : check_store(config.store);
   Status port;
   if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});

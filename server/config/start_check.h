@@ -9,8 +9,8 @@ namespace trammel {
 
 /// What a start would find on this host, seen without starting: nothing is changed, created or left.
 struct StartCheck {
-  std::vector<std::string> problems;  ///< a start would fail; with file, key and what to do
-  std::vector<std::string> notes;     ///< good to know
+  std::vector<Error> problems;     ///< a start would fail; with file, key and what to do
+  std::vector<std::string> notes;  ///< good to know
 };
 
 /// Looks for the store, the log file, the address and the port that the server file at `path` names, as far as they

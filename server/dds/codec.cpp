@@ -34,10 +34,13 @@ wire::PoseMm to_wire(const Pose& X) {
 Result<Pose> from_wire(const wire::PoseMm& pose, const std::string& where) {
   const Vector3 p_mm(pose.x_mm(), pose.y_mm(), pose.z_mm());
   const Eigen::Quaterniond rotation(pose.qw(), pose.qx(), pose.qy(), pose.qz());
-  if (!p_mm.allFinite() || !rotation.coeffs().allFinite()) return refused("{}: the pose is not finite", where);
+  if (!p_mm.allFinite() || !rotation.coeffs().allFinite())
+    return refused("the pose is not finite").in(where).of("pose");
   if (std::abs(rotation.norm() - 1) > kQuaternionTolerance) {
-    return refused("{}: the quaternion has length {:.4f}, must be 1 within {}", where, rotation.norm(),
-                   kQuaternionTolerance);
+    return refused("the quaternion has length {:.4f}, must be 1 within {}", rotation.norm(), kQuaternionTolerance)
+        .in(where)
+        .of("pose")
+        .beyond(rotation.norm(), 1);
   }
   return make_pose(rotation.normalized().toRotationMatrix(), p_mm * from_mm(1));
 }
@@ -53,12 +56,16 @@ wire::Joints to_wire(const JointVector& q, const Chain& chain) {
 
 Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where) {
   if (static_cast<int>(joints.size()) != chain.size()) {
-    return refused("{}: {} joint values, the robot {} has {}", where, joints.size(), chain.name(), chain.size());
+    return refused("{} joint values, the robot {} has {}", joints.size(), chain.name(), chain.size())
+        .in(where)
+        .of("joints_rad")
+        .beyond(joints.size(), chain.size());
   }
   JointVector q(chain.size());
   for (int i = 0; i < chain.size(); ++i) {
     const double value = joints[static_cast<std::size_t>(i)];
-    if (!std::isfinite(value)) return refused("{}: joint {} is not finite", where, i + 1);
+    if (!std::isfinite(value))
+      return refused("joint {} is not finite", i + 1).in(where).of("joints_rad").with_value(value);
     q[i] = chain.joint(i).type == JointType::kPrismatic ? from_mm(value) : value;
   }
   return q;

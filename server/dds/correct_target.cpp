@@ -19,7 +19,10 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
   }
   if (wanted.kind() == wire::TARGET_POSE_ON_BRANCH) {
     if (wanted.conf() < 0 || wanted.conf() > kMaxConf) {
-      return refused("{}: branch {} is not one of 0 to {}", where, wanted.conf(), kMaxConf);
+      return refused("branch {} is not one of 0 to {}", wanted.conf(), kMaxConf)
+          .in(where)
+          .of("conf")
+          .beyond(wanted.conf(), kMaxConf);
     }
     target.conf = wanted.conf();
     return target;
@@ -48,7 +51,8 @@ wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) 
 Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {
   const auto& wanted = request.targets();
   if (wanted.size() > wire::MAX_TARGETS) {
-    return failure(ErrorCode::kTooLarge, "{} targets in one request, limit {}", wanted.size(), wire::MAX_TARGETS);
+    return failure(ErrorCode::kTooLarge, "{} targets in one request, limit {}", wanted.size(), wire::MAX_TARGETS)
+        .beyond(wanted.size(), wire::MAX_TARGETS);
   }
   const auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());

@@ -5,7 +5,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <mutex>
+#include <map>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/port_lock.h"
@@ -31,14 +32,20 @@ using Clock = std::chrono::steady_clock;
 Status check_names(const DdsOptions& options, const Trainer& trainer) {
   if (!wire::valid_partition(options.server_id)) {
     return failure(ErrorCode::kUsage, "server id `{}`: must be 1 to {} letters, digits, `.`, `_`, `-`",
-                   options.server_id, wire::MAX_NAME);
+                   options.server_id, wire::MAX_NAME)
+        .of("server")
+        .with_text(options.server_id);
   }
   if (trainer.cells().size() > wire::MAX_CELLS) {
-    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS);
+    return failure(ErrorCode::kTooLarge, "{} cells, limit {}", trainer.cells().size(), wire::MAX_CELLS)
+        .of("cells")
+        .beyond(trainer.cells().size(), wire::MAX_CELLS);
   }
   for (const auto& [name, cell] : trainer.cells()) {
     if (name.empty() || name.size() > wire::MAX_NAME) {
-      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME);
+      return failure(ErrorCode::kUsage, "cell `{}`: its name must have 1 to {} characters", name, wire::MAX_NAME)
+          .of("cell")
+          .with_text(name);
     }
   }
   return {};
@@ -112,7 +119,7 @@ class DdsService::Running {
 
   void publish_model(const std::string& cell) {
     {
-      const std::lock_guard lock(mutex_);  // so that the last one published is the one in force
+      const MutexLock lock(publishing_.at(cell));  // so that the last one published is the one in force
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
@@ -132,7 +139,9 @@ class DdsService::Running {
         topics_(topics),
         echo_(std::move(echo)),
         channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
-        core_{options.server_id, *participant_, subscriber, handlers_, channels_} {}
+        core_{options.server_id, *participant_, subscriber, handlers_, channels_} {
+    for (const auto& [name, cell] : trainer.cells()) publishing_[name];
+  }
 
   Status open_endpoints() {
     const auto open = [this]<typename Operation>(Operation, int workers) -> Status {
@@ -204,7 +213,7 @@ class DdsService::Running {
   std::unique_ptr<StatusEcho> echo_;
   ReplyChannels channels_;
   ServiceCore core_;
-  std::mutex mutex_;  // one model published at a time
+  std::map<std::string, Mutex> publishing_;  // the map never changes; one model of a cell published at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::jthread status_thread_;
@@ -218,32 +227,46 @@ DdsService::~DdsService() { stop(); }
 
 Status DdsService::start() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
   auto started = Running::start(options_, trainer_, store_, registry_);
   if (!started) return tl::make_unexpected(started.error());
-  const std::lock_guard lock(mutex_);
-  running_ = std::move(*started);
-  for (const auto& model : registry_.all()) running_->publish_model(model->cell);
+  {
+    const MutexLock lock(mutex_);
+    running_ = std::move(*started);
+  }
+  for (const auto& model : registry_.all()) publish_model(model->cell);
   return {};
 }
 
 void DdsService::stop() {
   std::unique_ptr<Running> last;  // destroyed without the lock: its workers may publish
-  const std::lock_guard lock(mutex_);
+  MutexLock lock(mutex_);
   last.swap(running_);
+  published_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return publishing_ == 0; });
 }
 
 void DdsService::publish_progress(const JobProgress& progress) {
-  const std::lock_guard lock(mutex_);
-  if (running_) running_->publish_progress(progress);
+  publish([&](Running& running) { running.publish_progress(progress); });
 }
 
 void DdsService::publish_model(const std::string& cell) {
-  const std::lock_guard lock(mutex_);
-  if (running_) running_->publish_model(cell);
+  publish([&](Running& running) { running.publish_model(cell); });
+}
+
+template <typename Publish>
+void DdsService::publish(const Publish& publish) {
+  MutexLock lock(mutex_);
+  if (!running_) return;
+  Running& running = *running_;  // stop() lets it be until nobody publishes
+  ++publishing_;
+  lock.unlock();
+  publish(running);
+  lock.lock();
+  --publishing_;
+  published_.notify_all();
 }
 
 }  // namespace trammel

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "server/base/mutex.h"
 #include "server/base/result.h"
 #include "server/dds/dds_options.h"
 #include "server/registry/model_registry.h"
@@ -35,13 +35,18 @@ class DdsService {
 
  private:
   class Running;
+  /// `publish(running)` where the service runs. Without the lock: a large model holds nobody up.
+  template <typename Publish>
+  void publish(const Publish& publish);
 
   const DdsOptions options_;
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;
-  std::mutex mutex_;
-  std::unique_ptr<Running> running_;  // guarded by mutex_
+  Mutex mutex_;
+  Condition published_;  // publishing_ has become less
+  std::unique_ptr<Running> running_ TRAMMEL_GUARDED_BY(mutex_);
+  int publishing_ TRAMMEL_GUARDED_BY(mutex_) = 0;  // threads that publish, each without the lock
 };
 
 }  // namespace trammel

@@ -23,7 +23,10 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   }
   const auto asked = trainer_.progress(request.job());
   if (!asked) return tl::make_unexpected(asked.error());
-  if (asked->cell != cell) return failure(ErrorCode::kNotFound, "job {} is not of cell {}", request.job(), cell);
+  if (asked->cell != cell)
+    return failure(ErrorCode::kNotFound, "job {} is not of cell {}", request.job(), cell)
+        .of("job")
+        .with_value(request.job());
   auto found = trainer_.diagnosis(request.job());
   if (!found) return tl::make_unexpected(found.error());
   reply.job(request.job());

@@ -2,10 +2,10 @@
 
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "idl/valid.h"
+#include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -35,8 +35,8 @@ class SubjectFinder {
 
   const Trainer& trainer_;
   const ModelRegistry& registry_;
-  std::mutex mutex_;
-  std::deque<std::shared_ptr<const ServedModel>> loaded_;  // guarded by mutex_; newest first
+  Mutex mutex_;
+  std::deque<std::shared_ptr<const ServedModel>> loaded_ TRAMMEL_GUARDED_BY(mutex_);  // newest first
 };
 
 /// The answers to requests: a decoded request in, a reply or an error out. No DDS. Headers are the caller's business.
@@ -56,6 +56,12 @@ class Handlers {
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
 
  private:
+  [[nodiscard]] Result<wire::ManageModelsReply> answer_of_cell(const std::string& cell,
+                                                               const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<wire::ManageModelsReply> job_of(std::int64_t job) const;
+  [[nodiscard]] Result<wire::ManageModelsReply> models_of(const std::string& cell) const;
+  /// The text of a version's model file; of the one in force for version 0.
+  [[nodiscard]] Result<wire::ManageModelsReply> exported(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ManageModelsReply> release_and_train(const std::string& cell, const std::string& text);

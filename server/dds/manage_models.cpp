@@ -1,7 +1,9 @@
 #include <nlohmann/json.hpp>
 
 #include "idl/limits.h"
+#include "idl/manage_text.h"
 #include "server/base/check.h"
+#include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 
@@ -75,81 +77,84 @@ Result<ReleasedTraining> released_training(const std::string& text) {
   }
 }
 
+/// A reply that says a version, or why there is none.
+Result<wire::ManageModelsReply> with_version(const Result<int>& version) {
+  if (!version) return tl::make_unexpected(version.error());
+  wire::ManageModelsReply reply;
+  reply.version(*version);
+  return reply;
+}
+
 }  // namespace
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
-  wire::ManageModelsReply reply;
-  if (request.action() == wire::MANAGE_JOB) {
-    const auto progress = trainer_.progress(request.job());
-    if (!progress) return tl::make_unexpected(progress.error());
-    reply.job(to_wire(*progress));
-    return reply;
-  }
-
-  if (request.action() == wire::MANAGE_QUARANTINE && request.about().cell().empty()) return quarantine_of("");
-  if (request.action() == wire::MANAGE_JOBS && request.about().cell().empty()) return jobs_of("");
-
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  if (request.action() == wire::MANAGE_JOB) return job_of(request.job());
   const std::string& cell = request.about().cell();
+  if (cell.empty() && request.action() == wire::MANAGE_QUARANTINE) return quarantine_of("");
+  if (cell.empty() && request.action() == wire::MANAGE_JOBS) return jobs_of("");
+  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  return answer_of_cell(cell, request);
+}
+
+Result<wire::ManageModelsReply> Handlers::answer_of_cell(const std::string& cell,
+                                                         const wire::ManageModelsRequest& request) {
   switch (request.action()) {
-    case wire::MANAGE_LIST: {
-      const auto models = store_.models(cell);
-      if (!models) return tl::make_unexpected(models.error());
-      const std::int64_t now = unix_now_s();
-      const std::size_t skipped = models->size() > wire::MAX_VERSIONS ? models->size() - wire::MAX_VERSIONS : 0;
-      for (std::size_t i = skipped; i < models->size(); ++i) reply.models().push_back(to_wire((*models)[i], now));
-      return reply;
-    }
-    case wire::MANAGE_ACTIVATE: {
-      const Status activated = trainer_.activate(cell, request.version());
-      if (!activated) return tl::make_unexpected(activated.error());
-      reply.version(request.version());
-      return reply;
-    }
-    case wire::MANAGE_ROLLBACK: {
-      const auto version = trainer_.rollback(cell);
-      if (!version) return tl::make_unexpected(version.error());
-      reply.version(*version);
-      return reply;
-    }
-    case wire::MANAGE_EXPORT: {
-      const auto in_force = registry_.in_force(cell);
-      if (request.version() == 0 && !in_force) {
-        return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
-      }
-      const int version = request.version() == 0 ? in_force->version : request.version();
-      const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
-                                                                  : store_.model(cell, version);
-      if (!model) return tl::make_unexpected(model.error());
-      reply.version(version);
-      reply.text(serialize(*model));
-      if (reply.text().size() > kMaxText) {
-        return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version,
-                       reply.text().size(), kMaxText);
-      }
-      return reply;
-    }
-    case wire::MANAGE_IMPORT: {
-      const auto version = trainer_.import_model(cell, request.text());
-      if (!version) return tl::make_unexpected(version.error());
-      reply.version(*version);
-      return reply;
-    }
+    case wire::MANAGE_LIST:
+      return models_of(cell);
+    case wire::MANAGE_ACTIVATE:
+      return with_version(trainer_.activate(cell, request.version()).map([&] { return request.version(); }));
+    case wire::MANAGE_ROLLBACK:
+      return with_version(trainer_.rollback(cell));
+    case wire::MANAGE_EXPORT:
+      return exported(cell, request.version());
+    case wire::MANAGE_IMPORT:
+      return with_version(trainer_.import_model(cell, wire::imported_model(request)));
     case wire::MANAGE_QUARANTINE:
       return quarantine_of(cell);
-    case wire::MANAGE_RELEASE: {
-      const Status released = trainer_.release(cell, request.text());
-      if (!released) return tl::make_unexpected(released.error());
-      return reply;
-    }
+    case wire::MANAGE_RELEASE:
+      return trainer_.release(cell, wire::released_batch(request)).map([] { return wire::ManageModelsReply(); });
     case wire::MANAGE_RELEASE_AND_TRAIN:
-      return release_and_train(cell, request.text());
+      return release_and_train(cell, wire::released_training(request));
     case wire::MANAGE_JOBS:
       return jobs_of(cell);
     case wire::MANAGE_JOB:
-      break;
+      break;  // answered before: a job is of no cell
   }
   TRAMMEL_CHECK(false);
+}
+
+Result<wire::ManageModelsReply> Handlers::job_of(std::int64_t job) const {
+  const auto progress = trainer_.progress(job);
+  if (!progress) return tl::make_unexpected(progress.error());
+  wire::ManageModelsReply reply;
+  reply.job(to_wire(*progress));
+  return reply;
+}
+
+Result<wire::ManageModelsReply> Handlers::models_of(const std::string& cell) const {
+  const auto models = store_.models(cell);
+  if (!models) return tl::make_unexpected(models.error());
+  wire::ManageModelsReply reply;
+  const std::int64_t now = unix_now_s();
+  const std::size_t skipped = models->size() > wire::MAX_VERSIONS ? models->size() - wire::MAX_VERSIONS : 0;
+  for (std::size_t i = skipped; i < models->size(); ++i) reply.models().push_back(to_wire((*models)[i], now));
+  return reply;
+}
+
+Result<wire::ManageModelsReply> Handlers::exported(const std::string& cell, int asked) const {
+  const auto in_force = registry_.in_force(cell);
+  if (asked == 0 && !in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+  const int version = asked == 0 ? in_force->version : asked;
+  const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                              : store_.model(cell, version);
+  if (!model) return tl::make_unexpected(model.error());
+  wire::ManageModelsReply reply;
+  reply.version(version);
+  reply.text(serialize(*model));
+  if (reply.text().size() <= kMaxText) return reply;
+  return failure(ErrorCode::kTooLarge, "cell {} version {} has {} bytes, limit {}", cell, version, reply.text().size(),
+                 kMaxText)
+      .beyond(reply.text().size(), kMaxText);
 }
 
 Result<wire::ManageModelsReply> Handlers::jobs_of(const std::string& cell) const {
@@ -165,15 +170,13 @@ Result<wire::ManageModelsReply> Handlers::release_and_train(const std::string& c
   if (!wanted) return tl::make_unexpected(wanted.error());
   if (wanted->batches.size() > wire::MAX_BATCHES) {
     return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", wanted->batches.size(),
-                   wire::MAX_BATCHES);
+                   wire::MAX_BATCHES)
+        .of("batches")
+        .beyond(wanted->batches.size(), wire::MAX_BATCHES);
   }
   const auto job = trainer_.retrain(cell, wanted->batches, wanted->level, wanted->bias, Trainer::Quarantine::kReleased);
   if (!job) return tl::make_unexpected(job.error());
-  const auto progress = trainer_.progress(*job);
-  if (!progress) return tl::make_unexpected(progress.error());
-  wire::ManageModelsReply reply;
-  reply.job(to_wire(*progress));
-  return reply;
+  return job_of(*job);
 }
 
 Result<wire::ManageModelsReply> Handlers::quarantine_of(const std::string& cell) const {

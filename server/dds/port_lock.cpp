@@ -21,28 +21,36 @@ Result<PortLock> PortLock::take(const std::string& address, std::uint16_t port) 
   const std::size_t length = std::min(text.size(), sizeof name.sun_path - 1);
   std::copy_n(text.begin(), length, name.sun_path + 1);
   const int lock = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (lock < 0) return failure(ErrorCode::kInternal, "cannot open a socket to lock port {}", port);
+  if (lock < 0)
+    return failure(ErrorCode::kInternal, "cannot open a socket to lock port {}", port).of("port").with_value(port);
   PortLock result(lock);
   const auto name_size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
   if (bind(lock, reinterpret_cast<const sockaddr*>(&name), name_size) != 0) {
-    return failure(ErrorCode::kConflict, "another trammel server uses port {} on {}; give this one its own", port,
-                   address);
+    return failure(ErrorCode::kConflict, "another trammel server uses port {} on {}", port, address)
+        .of("port")
+        .with_value(port)
+        .next("give this one its own");
   }
 
   sockaddr_in place{};
   place.sin_family = AF_INET;
   place.sin_port = htons(port);
   if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1) {
-    return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address);
+    return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address).of("address").with_text(address);
   }
   const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const bool is_free = probe >= 0 && bind(probe, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0;
   const int why = errno;
   if (probe >= 0) close(probe);
   if (!is_free && why == EADDRNOTAVAIL) {
-    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address);
+    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address)
+        .of("address")
+        .with_text(address);
   }
-  if (!is_free) return failure(ErrorCode::kConflict, "UDP port {} on {} is taken by another program", port, address);
+  if (!is_free)
+    return failure(ErrorCode::kConflict, "UDP port {} on {} is taken by another program", port, address)
+        .of("port")
+        .with_value(port);
   return result;
 }
 

@@ -25,7 +25,8 @@ wire::PredictedError to_wire(const ErrorPrediction& prediction) {
 Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {
   const auto& joints = request.joints_rad();
   if (joints.size() > wire::MAX_TARGETS) {
-    return failure(ErrorCode::kTooLarge, "{} joint vectors in one request, limit {}", joints.size(), wire::MAX_TARGETS);
+    return failure(ErrorCode::kTooLarge, "{} joint vectors in one request, limit {}", joints.size(), wire::MAX_TARGETS)
+        .beyond(joints.size(), wire::MAX_TARGETS);
   }
   const auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());
@@ -41,8 +42,8 @@ Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest
     pose.q = *q;
     pose.tool = subject->tool;
     pose.payload = subject->payload;
-    const Status possible = check_pose(pose, model.cell(), fmt::format("joint vector {}", i + 1));
-    if (!possible) return tl::make_unexpected(possible.error());
+    const Status possible = check_pose(pose, model.cell());
+    if (!possible) return Failure(possible.error()).in(fmt::format("joint vector {}", i + 1));
     reply.predictions().push_back(to_wire(model.predict(*q, subject->tool, subject->payload)));
   }
   return reply;

@@ -1,16 +1,15 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <stop_token>
 #include <string>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 
 namespace trammel {
 
@@ -29,16 +28,17 @@ class ReplyWriter final : private wire::dds::DataWriterListener {
   [[nodiscard]] bool abandoned() const;
 
  private:
-  explicit ReplyWriter(wire::dds::Publisher& publisher) : publisher_(publisher) {}
+  explicit ReplyWriter(wire::dds::Publisher& publisher);
   void on_publication_matched(wire::dds::DataWriter* writer,
                               const wire::dds::PublicationMatchedStatus& status) override;
 
   wire::dds::Publisher& publisher_;
   wire::dds::DataWriter* writer_ = nullptr;
-  mutable std::mutex mutex_;
-  std::condition_variable_any matched_;
-  int readers_ = 0;                                      // guarded by mutex_
-  std::chrono::steady_clock::time_point patient_until_;  // guarded by mutex_: when there is no reader, wait until then
+  mutable Mutex mutex_;
+  Condition matched_;
+  int readers_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  std::chrono::steady_clock::time_point patient_until_
+      TRAMMEL_GUARDED_BY(mutex_);  // when there is no reader, wait until then
 };
 
 /// The way back to each client: a publisher in its partition and a writer for each operation it uses. Made on demand,
@@ -62,13 +62,17 @@ class ReplyChannels {
 
  private:
   class Client;
+  struct Known {
+    std::shared_ptr<Client> client;
+    std::chrono::steady_clock::time_point last_used;
+  };
   [[nodiscard]] std::shared_ptr<Client> client(const std::string& partition, bool crowd_out);
 
   wire::dds::DomainParticipant& participant_;
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::map<std::string, wire::dds::Topic*> topics_;         // guarded by mutex_; by name
-  std::map<std::string, std::shared_ptr<Client>> clients_;  // guarded by mutex_; by partition
+  mutable Mutex mutex_;
+  std::map<std::string, wire::dds::Topic*> topics_ TRAMMEL_GUARDED_BY(mutex_);  // by name
+  std::map<std::string, Known> clients_ TRAMMEL_GUARDED_BY(mutex_);             // by partition
 };
 
 }  // namespace trammel

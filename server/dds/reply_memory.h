@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
+
+#include "server/base/mutex.h"
 
 namespace trammel {
 
@@ -18,14 +20,14 @@ class ReplyMemory {
   explicit ReplyMemory(std::size_t capacity) : capacity_(capacity) {}
 
   [[nodiscard]] std::optional<Reply> find(const std::string& request_id) const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = replies_.find(request_id);
     if (found == replies_.end()) return std::nullopt;
     return found->second;
   }
 
   void remember(const std::string& request_id, Reply reply) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!replies_.emplace(request_id, std::move(reply)).second) return;
     order_.push_back(request_id);
     if (order_.size() > capacity_) {
@@ -36,9 +38,45 @@ class ReplyMemory {
 
  private:
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
-  std::unordered_map<std::string, Reply> replies_;  // guarded by mutex_
-  std::deque<std::string> order_;                   // guarded by mutex_; oldest first
+  mutable Mutex mutex_;
+  std::unordered_map<std::string, Reply> replies_ TRAMMEL_GUARDED_BY(mutex_);
+  std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
+};
+
+/// The requests that are being answered, so that a repeat is not answered beside them. Thread-safe.
+class UnderWay {
+ public:
+  /// One request while it is being answered.
+  class Piece {
+   public:
+    Piece(UnderWay& all, std::string request)
+        : all_(all), request_(std::move(request)), is_first_(all.begin(request_)) {}
+    ~Piece() {
+      if (is_first_) all_.end(request_);
+    }
+    Piece(const Piece&) = delete;
+    Piece& operator=(const Piece&) = delete;
+    /// False: it is being answered already.
+    [[nodiscard]] bool is_first() const { return is_first_; }
+
+   private:
+    UnderWay& all_;
+    const std::string request_;
+    const bool is_first_;
+  };
+
+ private:
+  [[nodiscard]] bool begin(const std::string& request) {
+    const MutexLock lock(mutex_);
+    return requests_.insert(request).second;
+  }
+  void end(const std::string& request) {
+    const MutexLock lock(mutex_);
+    requests_.erase(request);
+  }
+
+  Mutex mutex_;
+  std::unordered_set<std::string> requests_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

@@ -3,22 +3,22 @@
 #include <pthread.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/reply_channels.h"
@@ -77,7 +77,7 @@ template <typename Request, typename Reply>
       if (answer) {
         reply = std::move(*answer);
       } else {
-        refuse(to_wire(answer.error().code), answer.error().message);
+        refuse(to_wire(answer.error().code), sentence(answer.error()));
       }
     } catch (const std::exception& failed) {
       refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
@@ -132,12 +132,16 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   static constexpr std::size_t kRepliesRemembered = 1024;
+  static constexpr std::size_t kLately = 32;  // replies of targets may be large
+  /// Whether an answer takes long: a repeat is answered from memory.
+  static constexpr bool kComputes =
+      std::is_same_v<Operation, wire::PredictError> || std::is_same_v<Operation, wire::CorrectTarget>;
 
-  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered) {}
+  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered), lately_(kLately) {}
 
   void on_data_available(wire::dds::DataReader*) override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       ++arrivals_;
     }
     arrived_.notify_one();
@@ -148,11 +152,11 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     Request request;
     wire::dds::SampleInfo info;
     while (!stop.stop_requested()) {
-      std::unique_lock lock(mutex_);
+      MutexLock lock(mutex_);
       const std::uint64_t seen = arrivals_;
       lock.unlock();
       while (!stop.stop_requested() && take(request, info)) {
-        if (info.valid_data) serve(request, stop);
+        if (info.valid_data) serve(request, info.sample_identity.writer_guid(), stop);
       }
       ++idle_;
       lock.lock();
@@ -167,10 +171,19 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     return reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
-  void serve(const Request& request, const std::stop_token& stop) {
+  void serve(const Request& request, const eprosima::fastrtps::rtps::GUID_t& writer, const std::stop_token& stop) {
     const std::string wanted = request.header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
-    Reply reply = reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    // By who wrote it, not by who the request says it is of: a client may be careless with its ids.
+    const std::string sent = wire::participant_of(writer) +
+                             std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
+                             request_id_text(request.header().request_id());
+    const UnderWay::Piece piece_of_work(under_way_, sent);
+    if (!piece_of_work.is_first()) return;  // a repeat: its reply is on the way
+    std::optional<Reply> known = lately_.find(sent);
+    Reply reply =
+        known ? std::move(*known) : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    if (kComputes && !known && reply.header().result() == wire::RESULT_OK) lately_.remember(sent, reply);
     ++core_.requests;
     if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
     const WorkUnderWay::Piece piece = core_.replying.begin();
@@ -182,9 +195,11 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   ServiceCore& core_;
   wire::dds::Topic* reply_topic_ = nullptr;
   wire::dds::DataReader* reader_ = nullptr;
-  ReplyMemory<Reply> memory_;
-  std::mutex mutex_;
-  std::condition_variable_any arrived_;
+  ReplyMemory<Reply> memory_;  // of what must not be carried out again
+  ReplyMemory<Reply> lately_;  // of what was computed
+  UnderWay under_way_;
+  Mutex mutex_;  // so that no arrival falls between the look at arrivals_ and the waiting
+  Condition arrived_;
   std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_
   std::atomic<std::uint64_t> looked_{0};    // arrivals when a worker last began to take
   std::atomic<int> idle_{0};                // workers that wait for arrivals

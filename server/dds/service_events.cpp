@@ -12,15 +12,16 @@ constexpr std::size_t kMaxReaders = 4096;
 
 void ServiceEvents::status_changed() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     status_changed_ = true;
   }
   changed_.notify_one();
 }
 
 std::vector<ReplyReader> ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, stop, limit, [this] { return status_changed_ || !readers_.empty(); });
+  MutexLock lock(mutex_);
+  changed_.wait_for(lock, stop, limit,
+                    [this]() TRAMMEL_REQUIRES(mutex_) { return status_changed_ || !readers_.empty(); });
   status_changed_ = false;
   return std::exchange(readers_, {});
 }
@@ -32,7 +33,7 @@ void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
   if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (readers_.size() < kMaxReaders) readers_.push_back({topic, partitions.front()});
   }
   changed_.notify_one();

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
-#include <mutex>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/mutex.h"
 
 namespace trammel {
 
@@ -30,10 +29,10 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 
-  std::mutex mutex_;
-  std::condition_variable_any changed_;
-  bool status_changed_ = false;       // guarded by mutex_
-  std::vector<ReplyReader> readers_;  // guarded by mutex_
+  Mutex mutex_;
+  Condition changed_;
+  bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
+  std::vector<ReplyReader> readers_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

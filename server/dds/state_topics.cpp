@@ -1,5 +1,6 @@
 #include "server/dds/state_topics.h"
 
+#include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 
 namespace trammel {

@@ -24,18 +24,23 @@ std::optional<int> version_number(const std::string& model) {
 Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& context) const {
   const auto found = trainer_.cells().find(context.cell());
   if (found == trainer_.cells().end()) {
-    return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell());
+    return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell())
+        .of("cell")
+        .with_text(context.cell());
   }
   if (context.controller_compensates()) {
     return refused("cell {}: models are trained with a controller that does not compensate, this one does",
-                   context.cell());
+                   context.cell())
+        .of("controller_compensates");
   }
   const Cell& cell = *found->second;
   if (!context.tool().empty() && !cell.tools.contains(context.tool())) {
-    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool());
+    return refused("cell {}: unknown tool `{}`", context.cell(), context.tool()).of("tool").with_text(context.tool());
   }
   if (!context.payload().empty() && !cell.payloads.contains(context.payload())) {
-    return refused("cell {}: unknown payload `{}`", context.cell(), context.payload());
+    return refused("cell {}: unknown payload `{}`", context.cell(), context.payload())
+        .of("payload")
+        .with_text(context.payload());
   }
   return found->second;
 }
@@ -50,11 +55,15 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
     subject.served = std::move(*stored);
     subject.in_force = false;
   } else if (!in_force) {
-    return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell());
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell())
+        .of("cell")
+        .with_text(context.cell());
   } else if (!wanted && !context.model().empty() && context.model() != in_force->model.provenance().id &&
              context.model() != in_force->model.provenance().hash) {
     return failure(ErrorCode::kConflict, "cell {}: model `{}` is not in force, {} (version {}) is", context.cell(),
-                   context.model(), in_force->model.provenance().id, in_force->version);
+                   context.model(), in_force->model.provenance().id, in_force->version)
+        .of("model")
+        .with_text(context.model());
   }
 
   const Cell& trained_for = subject.served->model.cell();
@@ -71,15 +80,20 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
 }
 
 Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::string& cell, int version) {
-  const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(loaded_.begin(), loaded_.end(),
-                                  [&](const auto& m) { return m->cell == cell && m->version == version; });
-  if (found != loaded_.end()) return *found;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = std::find_if(loaded_.begin(), loaded_.end(),
+                                    [&](const auto& m) { return m->cell == cell && m->version == version; });
+    if (found != loaded_.end()) return *found;
+  }
+  // Without the lock: other requests do not wait while a model is read.
   auto model = trainer_.load_for_service(cell, version);
   if (!model) return tl::make_unexpected(model.error());
-  loaded_.push_front(std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)}));
+  auto served = std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)});
+  const MutexLock lock(mutex_);
+  loaded_.push_front(served);
   if (loaded_.size() > kVersionsInMemory) loaded_.pop_back();
-  return loaded_.front();
+  return served;
 }
 
 }  // namespace trammel

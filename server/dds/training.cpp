@@ -5,7 +5,7 @@ namespace trammel {
 
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  if (request.batch_id().empty()) return refused("a batch without an id");
+  if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
   const auto job = trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
                                    request_id_text(request.header().request_id()));
   if (!job) return tl::make_unexpected(job.error());
@@ -18,7 +18,9 @@ Result<wire::TrainReply> Handlers::answer(const wire::TrainRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   if (request.batch_ids().size() > wire::MAX_BATCHES) {
     return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", request.batch_ids().size(),
-                   wire::MAX_BATCHES);
+                   wire::MAX_BATCHES)
+        .of("batch_ids")
+        .beyond(request.batch_ids().size(), wire::MAX_BATCHES);
   }
   const auto job = trainer_.retrain(request.about().cell(), request.batch_ids(), request.level(), request.bias());
   if (!job) return tl::make_unexpected(job.error());

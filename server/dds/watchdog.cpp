@@ -6,11 +6,11 @@
 
 #include <algorithm>
 #include <array>
-#include <condition_variable>
 #include <cstdio>
 #include <cstring>
-#include <mutex>
 #include <utility>
+
+#include "server/base/mutex.h"
 
 namespace trammel {
 namespace {
@@ -46,9 +46,9 @@ Watchdog::Watchdog(std::vector<MovingPart> parts)
 
 void Watchdog::watch(const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "watchdog");
-  std::mutex mutex;
-  std::condition_variable_any never;
-  std::unique_lock lock(mutex);
+  Mutex mutex;  // nobody else's: it waits for time to pass
+  Condition never;
+  MutexLock lock(mutex);
   Clock::time_point last = Clock::now();
   while (!stop.stop_requested()) {
     never.wait_for(lock, stop, kTick, [] { return false; });

@@ -1,6 +1,5 @@
 #include "server/diagnose/diagnose.h"
 
-#include <algorithm>
 #include <functional>
 
 #include "server/base/hash.h"
@@ -11,7 +10,6 @@
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/wording.h"
-#include "server/measurement/velocity.h"
 
 namespace trammel::cause_search {
 
@@ -20,48 +18,28 @@ namespace {
 constexpr std::size_t kFewestPoses =
     12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
 
-/// Poses in the order in which they were measured, where their times say another one than their rows. True where
-/// something had to be moved; what begins at a pose is then told by its pose id, not by a row.
-bool put_in_order_of_time(MeasurementBatch& batch) {
-  const auto time = [](const Measurement& m) { return m.context.time; };
-  if (!std::all_of(batch.measurements.begin(), batch.measurements.end(),
-                   [&](const auto& m) { return time(m).has_value(); }))
-    return false;
-  const auto earlier = [&](const Measurement& a, const Measurement& b) { return *time(a) < *time(b); };
-  if (std::is_sorted(batch.measurements.begin(), batch.measurements.end(), earlier)) return false;
-  std::stable_sort(batch.measurements.begin(), batch.measurements.end(), earlier);
-  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].context.index = static_cast<int>(i);
-  return true;
-}
-
-/// Refuses what cannot be diagnosed.
-Result<MeasurementBatch> checked(const Cell& cell, const MeasurementBatch& batch) {
-  Result<MeasurementBatch> checked = check_against_cell(batch, cell);
-  if (!checked) return checked;
-  if (const Status oriented = check_orientations(*checked, cell); !oriented)
+Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
+  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
     return tl::make_unexpected(oriented.error());
-  return checked;
-}
-
-Result<PreparedBatch> prepare(const Cell& cell, const MeasurementBatch& batch, std::uint64_t seed) {
-  Result<MeasurementBatch> whole = checked(cell, batch);
-  if (!whole) return tl::make_unexpected(whole.error());
   PreparedBatch prepared;
-  prepared.sorted = put_in_order_of_time(*whole);
-  fill_velocity(*whole);
-  BatchSplit split = split_batch(*whole, 0, seed);
-  MergedRepeats merged = merge_repeats(split.train, cell.tracker.sigma);
-  prepared.surrogates = put_in_surrogates(*whole);
-  take_over_surrogates(prepared.surrogates, *whole, merged.batch);
-  take_over_surrogates(prepared.surrogates, *whole, split.validation);
+  // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
+  prepared.sorted = !batch.is_in_order_of_time();
+  const CheckedBatch ordered = batch.in_order_of_time();
+  MeasurementBatch all = ordered.rows();
+  MergedRepeats merged = merge_repeats(ordered.training(), cell.tracker.sigma);
+  prepared.validation = ordered.held_out();
+  prepared.surrogates = put_in_surrogates(all);
+  take_over_surrogates(prepared.surrogates, all, merged.batch);
+  take_over_surrogates(prepared.surrogates, all, prepared.validation);
   const std::size_t poses = merged.batch.measurements.size();
   if (poses < kFewestPoses) {
-    const std::size_t held_out = split.validation.measurements.size();
-    return refused("batch {}: {} poses to diagnose{}, at least {}", batch.id, poses,
-                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses);
+    const std::size_t held_out = prepared.validation.measurements.size();
+    return refused("{} poses to diagnose{}, at least {}", poses,
+                   held_out > 0 ? fmt::format(" beside {} held out", held_out) : "", kFewestPoses)
+        .in("batch " + batch.id())
+        .beyond(poses, kFewestPoses);
   }
   prepared.train = std::move(merged.batch);
-  prepared.validation = std::move(split.validation);
   prepared.repeats = merged.statistics;
   return prepared;
 }
@@ -100,15 +78,15 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const Pre
 }
 
 /// What was done to which files.
-void tell_provenance(const Cell& cell, const MeasurementBatch& batch, std::uint64_t seed, Diagnosis& diagnosis) {
-  diagnosis.batch_hash = batch_hash(batch);
+void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed, Diagnosis& diagnosis) {
+  diagnosis.batch_hash = batch.hash();
   diagnosis.cell_hash = sha256_hex(cell.cell_yaml + cell.robot_yaml);
   diagnosis.seed = seed;
 }
 
-Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
-  const Result<PreparedBatch> prepared = prepare(*cell, batch, options.seed);
+  const Result<PreparedBatch> prepared = prepare(*cell, batch);
   if (!prepared) return tl::make_unexpected(prepared.error());
   Result<SearchResult> result = searched(cell, *prepared, options);
   if (!result) return tl::make_unexpected(result.error());
@@ -150,7 +128,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Measu
 
 namespace trammel {
 
-Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Diagnosis> diagnose(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                            const DiagnoseOptions& options) {
   return cause_search::diagnosed(cell, batch, options);
 }

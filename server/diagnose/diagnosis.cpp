@@ -1,5 +1,7 @@
 #include "server/diagnose/diagnosis.h"
 
+#include "server/error_sources/catalogue.h"
+
 namespace trammel {
 
 std::string to_string(const Cause& cause) {
@@ -9,19 +11,18 @@ std::string to_string(const Cause& cause) {
 
 const CauseRecord& record_of(const Cause& cause) { return cause_spelled(cause.cause); }
 
-std::string kind_in_words(const Cause& cause) {
-  const CauseRecord* record = find_cause(cause.cause);
-  const std::string words = record != nullptr ? plain_name(*record) : cause.cause;
-  return words + (cause.parameter.empty() ? "" : fmt::format(" ({})", cause.parameter));
-}
-
 std::string in_words(const Cause& cause) {
   const CauseRecord* record = find_cause(cause.cause);
-  std::string words = record != nullptr ? plain_name(*record, cause.joint) : to_string(cause);
-  if (record != nullptr && !cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
+  if (record == nullptr) return to_string(cause);
+  std::string words = plain_name(*record, cause.joint);
+  if (!cause.parameter.empty()) words += fmt::format(" ({})", cause.parameter);
   if (cause.pose_id.empty()) return words;
-  const bool begins = record != nullptr && record->lasting == causes::Lasting::kFromAPose;
-  return words + (begins ? fmt::format(" from pose {} on", cause.pose_id) : fmt::format(", pose {}", cause.pose_id));
+  const bool begins = record->lasting == causes::Lasting::kFromAPose;
+  return words + fmt::format(fmt::runtime(begins ? " from pose {} on" : ", pose {}"), cause.pose_id);
+}
+
+std::string kind_in_words(const Cause& cause) {
+  return in_words(Cause{.cause = cause.cause, .parameter = cause.parameter});
 }
 
 Cause cause_at(const CauseRecord& record, int joint) {

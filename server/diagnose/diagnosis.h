@@ -26,8 +26,8 @@ struct Cause {
 };
 /// As files and programs spell it: `gear_transmission:3`, `geometry:d6`, `tracker_moved`. No pose, no order.
 [[nodiscard]] std::string to_string(const Cause& cause);
-/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`. What another
-/// version of the program calls a cause that this one does not know comes as it is spelled.
+/// For people: `gear ripple in joint 3`, `link geometry (d6)`, `the tracker moved from pose p41 on`. No order. A cause
+/// that only another version of the program knows comes as it is spelled.
 [[nodiscard]] std::string in_words(const Cause& cause);
 /// The same without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);

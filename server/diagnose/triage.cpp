@@ -30,6 +30,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/orientation_check.h"
+#include "server/compensate/known_rows.h"
 #include "server/diagnose/triage/batch_alternatives.h"
 
 namespace trammel {
@@ -207,16 +208,15 @@ std::string_view to_string(TriageVerdict verdict) {
   return "poisoned";
 }
 
-Triage triage(const CompensatedModel& model, const MeasurementBatch& batch) {
-  return triage(model, batch, model.cell());
-}
+Triage triage(const CompensatedModel& model, const CheckedBatch& batch) { return triage(model, batch, model.cell()); }
 
-Triage triage(const CompensatedModel& model, const MeasurementBatch& batch, const Cell& cell) {
+Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const Cell& cell) {
+  const MeasurementBatch batch = known_rows(model, checked.rows());
   if (const auto doubt = orientation_doubt(batch, cell)) {
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;
-    poisoned.sentence = *doubt;
+    poisoned.sentence = sentence(*doubt);
     return poisoned;
   }
   if (batch.measurements.size() < kFewestPoses) {

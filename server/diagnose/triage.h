@@ -5,6 +5,7 @@
 
 #include "server/compensate/compensated_model.h"
 #include "server/diagnose/diagnosis.h"
+#include "server/measurement/checked_batch.h"
 
 namespace trammel {
 
@@ -33,14 +34,14 @@ struct Triage {
   std::string sentence;                 ///< for people
 };
 
-/// Holds `batch` (checked against the model's cell) against `model` and tells apart: a tracker or base that stands
+/// Holds the rows of `batch` that `model` knows() against it and tells apart: a tracker or base that stands
 /// elsewhere, another tool, another payload, a joint that lost its zero, single bad poses, an arm that has changed,
 /// each from the beginning of the batch or from one of its poses on. Orientations are judged like positions where the
 /// model was trained on some; those that do not follow the joints at all (orientation_doubt()) are poison whatever the
 /// positions say. With fewer than 8 poses nothing else is said: clean.
-[[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch);
+[[nodiscard]] Triage triage(const CompensatedModel& model, const CheckedBatch& batch);
 
 /// The same where tools and base are to be those of `cell`, which may say others than the model's.
-[[nodiscard]] Triage triage(const CompensatedModel& model, const MeasurementBatch& batch, const Cell& cell);
+[[nodiscard]] Triage triage(const CompensatedModel& model, const CheckedBatch& batch, const Cell& cell);
 
 }  // namespace trammel

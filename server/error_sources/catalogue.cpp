@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <memory>
-#include <mutex>
 
 #include "server/base/check.h"
+#include "server/base/mutex.h"
 #include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
@@ -23,20 +23,20 @@ Records shipped() {
 class Catalogue {
  public:
   std::shared_ptr<const Records> records() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return records_;
   }
   template <typename Change>
   void change(const Change& change) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     auto changed = std::make_shared<Records>(*records_);
     change(*changed);
     records_ = std::move(changed);
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Records> records_ = std::make_shared<Records>(shipped());
+  mutable Mutex mutex_;
+  std::shared_ptr<const Records> records_ TRAMMEL_GUARDED_BY(mutex_) = std::make_shared<Records>(shipped());
 };
 
 /// Made at its first use, whichever comes first of the program's own.

@@ -104,11 +104,15 @@ constexpr std::size_t kMostParameters = 4000;  // their covariance has the squar
 /// Before anything is made of them.
 Status check_counts(const std::vector<std::string>& specs) {
   if (specs.size() > kMostSources)
-    return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources);
+    return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources)
+        .of("error_sources")
+        .beyond(specs.size(), kMostSources);
   for (const std::string& spec : specs) {
     if (spec.size() <= kMostSpecBytes) continue;
     return failure(ErrorCode::kTooLarge, "error source '{}...': {} bytes, limit {}", spec.substr(0, 40), spec.size(),
-                   kMostSpecBytes);
+                   kMostSpecBytes)
+        .of("error_sources")
+        .beyond(spec.size(), kMostSpecBytes);
   }
   return {};
 }
@@ -125,15 +129,20 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
     for (const ErrorSourcePtr& other : model.sources) {
       const CauseRecord& cause = other->cause();
       if (&cause == &(*source)->cause() && cause.forms.size() > 1) {
-        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(),
-                       spec);
+        return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(), spec)
+            .of("error_sources")
+            .with_text(spec);
       }
-      if (other->name() == (*source)->name()) return failure(ErrorCode::kUsage, "error source '{}' given twice", spec);
+      if (other->name() == (*source)->name())
+        return failure(ErrorCode::kUsage, "error source '{}' given twice", spec).of("error_sources").with_text(spec);
     }
     parameters += (*source)->parameters().size();
     if (parameters > kMostParameters) {
       return failure(ErrorCode::kTooLarge, "error source '{}': {} parameters with those before it, limit {}", spec,
-                     parameters, kMostParameters);
+                     parameters, kMostParameters)
+          .of("error_sources")
+          .with_text(spec)
+          .beyond(parameters, kMostParameters);
     }
     model.sources.push_back(std::move(*source));
   }

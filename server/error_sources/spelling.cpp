@@ -95,15 +95,21 @@ Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& ce
     for (const CauseRecord* record : all_causes()) {
       if (record->forms.size() > 1) names.emplace(names.begin(), record->spelling);
     }
-    return failure(ErrorCode::kUsage, "unknown error source '{}'{}; known: {}", spec,
-                   did_you_mean(cause_in(spec), names), fmt::join(names, ", "));
+    return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec, did_you_mean(cause_in(spec), names))
+        .of("error_sources")
+        .with_text(spec)
+        .next(fmt::format("known: {}", fmt::join(names, ", ")));
   }
   if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
   const auto form = std::find_if(known->forms.begin(), known->forms.end(),
                                  [&](const Form& one) { return one.spelling == cause_in(spec); });
   if (form == known->forms.end())
-    return failure(ErrorCode::kUsage, "error source '{}' takes nothing behind its name", spec);
-  return parse_spec(spec, *known, cell).and_then([&](const SourceSpec& parsed) { return form->make(parsed, cell); });
+    return failure(ErrorCode::kUsage, "error source '{}' takes nothing behind its name", spec)
+        .of("error_sources")
+        .with_text(spec);
+  return parse_spec(spec, *known, cell)
+      .and_then([&](const SourceSpec& parsed) { return form->make(parsed, cell); })
+      .map_error([&](Error error) { return Failure(std::move(error)).of("error_sources").with_text(spec).value(); });
 }
 
 bool are_forms_of_one(const std::string& source, const std::string& other) {
@@ -155,7 +161,8 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
   std::istringstream words(level);
   for (std::string word; std::getline(words, word, ',');) {
     word.erase(std::remove(word.begin(), word.end(), ' '), word.end());
-    if (word.empty()) return failure(ErrorCode::kUsage, "level '{}': an empty entry", level);
+    if (word.empty())
+      return failure(ErrorCode::kUsage, "level '{}': an empty entry", level).of("level").with_text(level);
     if (word == "M0") continue;
     if (word == "M1" || word == "M2" || word == "M3") {
       names.emplace_back("base");
@@ -165,9 +172,10 @@ Result<std::vector<std::string>> parse_level(const std::string& level) {
       names.push_back(word);
     }
   }
-  if (level.empty()) return failure(ErrorCode::kUsage, "an empty level; expected M0, M1, M2, M3 or error sources");
+  if (level.empty())
+    return failure(ErrorCode::kUsage, "an empty level").of("level").next("expected M0, M1, M2, M3 or error sources");
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
-    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level);
+    return failure(ErrorCode::kUsage, "level '{}': an error source twice", level).of("level").with_text(level);
   }
   return names;
 }

@@ -52,18 +52,4 @@ struct MeasurementBatch {
 /// SHA-256 of the batch as it came, or of its CSV where it came from elsewhere.
 [[nodiscard]] std::string batch_hash(const MeasurementBatch& batch);
 
-/// The batch made ready for `cell`: tool and payload ids resolved. Refused when the number or kind of joints, a joint
-/// limit, an unknown tool or payload, or several candidates of either stand against it; when the joints look like
-/// radians; when positions spread over far more or far less than the robot's own motion does (metres for millimetres).
-[[nodiscard]] Result<MeasurementBatch> check_against_cell(MeasurementBatch batch, const Cell& cell);
-
-/// Rows for training and rows for validation: by the `set` column where the batch has one, else by drawing
-/// `validation_share` of the rows with `seed` (one row at least stays for training). Order, indices and source text
-/// stay. Reproducible: same rows, seed and share, same split.
-struct BatchSplit {
-  MeasurementBatch train;
-  MeasurementBatch validation;
-};
-[[nodiscard]] BatchSplit split_batch(const MeasurementBatch& batch, double validation_share, std::uint64_t seed);
-
 }  // namespace trammel

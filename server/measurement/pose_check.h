@@ -13,7 +13,7 @@ namespace trammel {
 [[nodiscard]] Status check_joint_columns(const std::vector<JointType>& columns, const Chain& robot,
                                          const std::string& where);
 
-/// Holds the joints against the robot's limits and resolves tool and payload. `where` names file and row.
-[[nodiscard]] Status check_pose(PoseContext& context, const Cell& cell, const std::string& where);
+/// Holds the joints against the robot's limits and resolves tool and payload. File and row are the caller's to add.
+[[nodiscard]] Status check_pose(PoseContext& context, const Cell& cell);
 
 }  // namespace trammel

@@ -42,15 +42,18 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   for (std::size_t i = 0; i < table.columns().size(); ++i) {
     const auto joint = as_joint_column(table.columns()[i]);
     if (joint && !joints.emplace(joint->number, std::pair(i, joint->type)).second) {
-      return refused("{}: two columns for joint {}: {} and {}", table.where(), joint->number,
-                     table.columns()[joints[joint->number].first], table.columns()[i]);
+      return refused("two columns for joint {}: {} and {}", joint->number, table.columns()[joints[joint->number].first],
+                     table.columns()[i])
+          .in(table.where())
+          .of(table.columns()[i]);
     }
   }
   std::vector<std::string> direction_names;
   for (const auto& [number, column] : joints) {
     if (number != static_cast<int>(found.joints_.size()) + 1) {
-      return refused("{}: missing column q{}_deg before {}", table.where(), found.joints_.size() + 1,
-                     table.columns()[column.first]);
+      return refused("missing column q{}_deg before {}", found.joints_.size() + 1, table.columns()[column.first])
+          .in(table.where())
+          .of(fmt::format("q{}_deg", found.joints_.size() + 1));
     }
     found.joints_.push_back(column.first);
     found.joint_types_.push_back(column.second);

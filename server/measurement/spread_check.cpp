@@ -102,18 +102,24 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
     const double upper = kRatio * nominal.largest + (small_angles ? kSlackOfSmallAngles : kSlack);
     if (measured > upper && small_angles) {
       return refused(
-          "{}: measured positions spread over {:.1f} mm (rms from their centroid), but the commanded joints, all "
-          "within "
-          "{:.2f} deg, move the tool over {:.1f} mm at most: are the joints radians? They must be degrees",
-          where, to_mm(measured), group.largest_angle_deg, to_mm(nominal.largest));
+                 "measured positions spread over {:.1f} mm (rms from their centroid), but the commanded joints, all "
+                 "within {:.2f} deg, move the tool over {:.1f} mm at most",
+                 to_mm(measured), group.largest_angle_deg, to_mm(nominal.largest))
+          .in(where)
+          .of("q1_deg")
+          .beyond(to_mm(measured), to_mm(upper))
+          .next("are the joints radians? They must be degrees");
     }
     if (measured > upper || kRatio * measured + kSlack < nominal.smallest) {
       return refused(
-          "{}: measured positions spread over {:.1f} mm (rms from their centroid), the commanded joints move tool '{}' "
-          "over {:.1f} mm; limit: a factor of {:g} and {:g} mm. Are positions mm, joints degrees, and is this the "
-          "robot?",
-          where, to_mm(measured), tool, to_mm(measured > upper ? nominal.largest : nominal.smallest), kRatio,
-          to_mm(kSlack));
+                 "measured positions spread over {:.1f} mm (rms from their centroid), the commanded joints move tool "
+                 "'{}' over {:.1f} mm, limit: a factor of {:g} and {:g} mm",
+                 to_mm(measured), tool, to_mm(measured > upper ? nominal.largest : nominal.smallest), kRatio,
+                 to_mm(kSlack))
+          .in(where)
+          .of("x_mm")
+          .beyond(to_mm(measured), to_mm(measured > upper ? upper : (nominal.smallest - kSlack) / kRatio))
+          .next("Are positions mm, joints degrees, and is this the robot?");
     }
   }
   return {};

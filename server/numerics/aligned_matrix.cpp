@@ -6,6 +6,8 @@
 #include <cstring>
 #include <new>
 
+#include "server/numerics/numerics_table.h"
+
 namespace trammel {
 namespace {
 
@@ -24,11 +26,11 @@ AlignedMatrix::AlignedMatrix(Eigen::Index rows, Eigen::Index cols) : rows_(rows)
     std::memset(data, 0, bytes);
     return;
   }
-  // Pages of the kernel's are zero, and there only once they are touched.
+  // Pages from the system are zero, and take memory only once they are touched.
   const std::size_t size = (bytes / kHugePage + 2) * kHugePage;
   void* block = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (block == MAP_FAILED) throw std::bad_alloc();
-  // Advice: a kernel without huge pages is slower, not wrong.
+  // Only advice: a system without huge pages is slower, not wrong.
   madvise(block, size, MADV_HUGEPAGE);
   const std::size_t start = reinterpret_cast<std::size_t>(block);
   auto* data = reinterpret_cast<double*>((start + kHugePage - 1) / kHugePage * kHugePage);
@@ -48,6 +50,12 @@ AlignedMatrix AlignedMatrix::copy() const {
   AlignedMatrix copy(rows_, cols_);
   copy.map() = map();
   return copy;
+}
+
+AlignedMatrix factor_storage(Eigen::Index rows) {
+  const Eigen::Index padded = padded_rows(rows);
+  // Columns that are a multiple of 512 bytes apart would put whole rows into the same few cache sets.
+  return {padded % 64 == 0 ? padded + kTargetBlock : padded, padded};
 }
 
 void AlignedMatrix::Release::operator()(double* /*data*/) const {

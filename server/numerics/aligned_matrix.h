@@ -5,15 +5,16 @@
 
 namespace trammel {
 
-/// A column-major matrix of doubles, zero at first, that starts on a cache line; a large one asks for huge pages, since
-/// the sweep touches a page for each column and would live on address translation otherwise. Movable, not copyable.
+/// A column-major matrix of doubles, zero at first, that starts on a cache line. A large one asks for huge pages: a
+/// factorisation touches a page for each column, and with small pages most of its time would go into looking up their
+/// addresses. Movable, not copyable.
 class AlignedMatrix {
  public:
   AlignedMatrix() = default;
   AlignedMatrix(Eigen::Index rows, Eigen::Index cols);
 
   [[nodiscard]] AlignedMatrix copy() const;
-  /// Gives the memory of these columns back; what they hold is undefined afterwards.
+  /// Gives back the memory of the columns from `col` on; what they hold is undefined afterwards.
   void forget_columns_from(Eigen::Index col);
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
   [[nodiscard]] Eigen::Index cols() const { return cols_; }
@@ -40,5 +41,9 @@ class AlignedMatrix {
   Eigen::Index cols_ = 0;
   std::unique_ptr<double[], Release> data_;
 };
+
+/// Room for `rows` rows and columns as the factorisations of numerics_table.h want it: padded, and with a leading
+/// dimension that spreads a row over all cache sets.
+[[nodiscard]] AlignedMatrix factor_storage(Eigen::Index rows);
 
 }  // namespace trammel

@@ -6,12 +6,14 @@
 namespace trammel {
 namespace {
 
-constexpr double kSufficientDecrease = 1e-4;
+constexpr double kSufficientDecrease = 1e-4;  // of what the slope promises: Nocedal & Wright, section 3.1
+constexpr double kLeastCurvature = 1e-10;     // cosine of step and change of gradient: below it is rounding
+constexpr double kLeastDecrease = 1e-3;       // of the tolerance: a shorter step is not worth an evaluation
 
-// Eq. 6.17; skipped when the curvature along the step is not positive, which keeps the matrix positive definite.
+// Eq. 6.17. A step along which the curvature is not positive is left out: the matrix stays positive definite.
 void update_inverse_hessian(const Eigen::VectorXd& step, const Eigen::VectorXd& change, Eigen::MatrixXd* inverse) {
   const double curvature = step.dot(change);
-  if (!(curvature > 1e-10 * step.norm() * change.norm())) return;
+  if (!(curvature > kLeastCurvature * step.norm() * change.norm())) return;
   const Eigen::VectorXd mapped = *inverse * change;
   const double scale = (1.0 + change.dot(mapped) / curvature) / curvature;
   *inverse += scale * step * step.transpose() - (mapped * step.transpose() + step * mapped.transpose()) / curvature;
@@ -56,7 +58,7 @@ BfgsResult minimise(const Objective& objective, const Eigen::VectorXd& start, co
       accepted = defined && there.value <= here.value + kSufficientDecrease * length * slope;
       if (!accepted) {
         length = shorter(length, here.value, slope, defined ? there.value : std::nan(""));
-        if (-length * slope < 1e-3 * options.tolerance) break;
+        if (-length * slope < kLeastDecrease * options.tolerance) break;
       }
     }
     if (!accepted) break;

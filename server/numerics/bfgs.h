@@ -10,7 +10,7 @@ struct ObjectiveValue {
   Eigen::VectorXd gradient;
 };
 
-/// False where the function is not defined; the search then takes a shorter step.
+/// A function and its gradient. Returns false where it is not defined; the search then takes a shorter step.
 using Objective = std::function<bool(const Eigen::VectorXd& x, ObjectiveValue* out)>;
 
 struct BfgsOptions {
@@ -25,8 +25,7 @@ struct BfgsResult {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd inverse_hessian;  ///< the approximation at x
   int evaluations = 0;
-  bool defined = false;    ///< false when the function was not defined at the
-                           ///< start; nothing else is then set
+  bool defined = false;    ///< false: the function is not defined at the start, and nothing else is set
   bool converged = false;  ///< the tolerance was met within the evaluations allowed
 };
 

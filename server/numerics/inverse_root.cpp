@@ -33,7 +33,8 @@ std::optional<VectorXd> InverseRoot::append(const VectorXd& covariance, double v
   return fresh;
 }
 
-// Rotations of `point`'s row with each later one empty the column of the point; what they gather in the row is r.
+// Each later row is rotated with the row of `point` until the column of the point is empty below it. What gathers in
+// the row of the point is r.
 VectorXd InverseRoot::remove(Index point) {
   VectorXd gathered = VectorXd::Zero(size_);
   gathered.head(point + 1) = row(point);
@@ -46,7 +47,7 @@ VectorXd InverseRoot::remove(Index point) {
     const VectorXd before = head;
     head = cosine * before + sine * other;
     other = cosine * other - sine * before;
-    // Its place is taken by the next row, without the column.
+    // The row moves up by one, and loses the column of the point.
     auto target = mutable_row(i - 1);
     for (Index j = 0; j < point; ++j) target[j] = other[j];
     for (Index j = point; j < i; ++j) target[j] = other[j + 1];

@@ -7,7 +7,7 @@
 
 namespace trammel {
 
-/// L⁻¹ of a covariance M = L Lᵀ, one row after the other, so that points come and go in N² operations.
+/// L⁻¹ of a covariance M = L Lᵀ, stored row after row. A point is added or removed in N² operations.
 class InverseRoot {
  public:
   /// `rows`: row i has i + 1 entries.
@@ -17,11 +17,12 @@ class InverseRoot {
   /// Row i: i + 1 entries.
   [[nodiscard]] Eigen::Map<const Eigen::VectorXd> row(Eigen::Index i) const;
 
-  /// Borders M with `covariance` and `variance`; the new last row. Empty, and nothing changed, when the bordered matrix
-  /// is not positive definite.
+  /// Adds a point with this covariance with the others and this variance; returns the new last row. Empty, and nothing
+  /// changed, where M would no longer be positive definite.
   [[nodiscard]] std::optional<Eigen::VectorXd> append(const Eigen::VectorXd& covariance, double variance);
 
-  /// Takes row and column `point` out of M. Returns r, with M⁻¹ before = M⁻¹ after + r rᵀ, r as long as before.
+  /// Takes row and column `point` out of M. Returns r with (M⁻¹ before) = (M⁻¹ after) + r rᵀ; r has the length that
+  /// rows had before.
   Eigen::VectorXd remove(Eigen::Index point);
 
   [[nodiscard]] const std::vector<double>& rows() const { return rows_; }

@@ -1,6 +1,6 @@
 #include "server/numerics/numerics.h"
 
-#include "server/numerics/numerics_builds.h"
+#include "server/numerics/builds/builds.h"
 
 namespace trammel {
 

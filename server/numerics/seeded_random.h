@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators). The standard library leaves its
-/// distributions and shuffles to the implementation; these give the same numbers anywhere.
+/// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014). The distributions and
+/// shuffles of the standard library differ between implementations; these give the same numbers everywhere.
 class SeededRandom {
  public:
   explicit SeededRandom(std::uint64_t seed) : state_(seed) {}
@@ -25,7 +25,7 @@ class SeededRandom {
   std::uint64_t state_;
 };
 
-/// 0 to n - 1 in an order that the seed decides.
+/// The numbers 0 to n - 1, shuffled.
 inline std::vector<Eigen::Index> shuffled_rows(Eigen::Index n, SeededRandom* random) {
   std::vector<Eigen::Index> order(static_cast<std::size_t>(n));
   std::iota(order.begin(), order.end(), Eigen::Index{0});

@@ -10,10 +10,10 @@ namespace trammel {
 
 namespace {
 
-constexpr double kBumpAngle = from_deg(5);
-constexpr double kBumpLength = from_mm(50);
-constexpr double kLeastShare = 0.2;  // of a bump
-constexpr double kGrid = 1e-4;       // deg, mm
+constexpr double kBumpAngle = from_deg(5);   // source section 3.2.4.2
+constexpr double kBumpLength = from_mm(50);  // of a rail
+constexpr double kLeastBump = 0.2;           // of the bump: 1 deg takes up any play
+constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of programs
 
 }  // namespace
 
@@ -24,7 +24,7 @@ std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, i
     const Joint& joint = robot.joint(j);
     const double way = joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
     bump(j) = std::clamp(q(j) - direction * way, joint.lower, joint.upper);
-    if (std::abs(bump(j) - q(j)) < kLeastShare * way) return std::nullopt;
+    if (std::abs(bump(j) - q(j)) < kLeastBump * way) return std::nullopt;
   }
   return bump;
 }
@@ -32,7 +32,7 @@ std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, i
 std::pair<double, double> approachable_range(const Joint& joint, double lower, double upper) {
   const bool revolute = joint.type == JointType::kRevolute;
   const double grid = revolute ? from_deg(kGrid) : from_mm(kGrid);
-  const double least = kLeastShare * (revolute ? kBumpAngle : kBumpLength) + grid;
+  const double least = kLeastBump * (revolute ? kBumpAngle : kBumpLength) + grid;
   const double from = std::max(lower + grid, joint.lower + least);
   const double to = std::min(upper - grid, joint.upper - least);
   return from < to ? std::pair(from, to) : std::pair(lower, upper);

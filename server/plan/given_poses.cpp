@@ -7,7 +7,7 @@ namespace trammel {
 
 namespace {
 
-/// The sides to try: the one recorded for all joints, or either.
+/// The sides to try: the recorded one where it is the same for all joints, else both.
 std::vector<int> sides_of(const PoseContext& context) {
   const std::vector<int>& recorded = context.direction;
   const bool one_side = !recorded.empty() && recorded.front() != 0 &&
@@ -25,7 +25,11 @@ Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given,
     pose.context.direction.assign(static_cast<std::size_t>(robot.size()), side);
     return pose;
   }
-  return refused("{} row {}: pose {} is too near to a joint limit to be approached", where, given.row, given.pose_id);
+  return refused("pose {} is too near to a joint limit to be approached", given.pose_id)
+      .in(where)
+      .at_row(given.row)
+      .of("pose_id")
+      .with_text(given.pose_id);
 }
 
 }  // namespace

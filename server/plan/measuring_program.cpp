@@ -12,10 +12,11 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kRapidName = 32;
-constexpr std::size_t kKrlName = 24;
-constexpr int kKrlTools = 16;
-constexpr std::size_t kLineLength = 80;
+// What the controllers take.
+constexpr std::size_t kRapidName = 32;   // letters of a RAPID identifier
+constexpr std::size_t kKrlName = 24;     // letters of the name of a KRL program
+constexpr int kKrlTools = 16;            // tools in $TOOL_DATA
+constexpr std::size_t kLineLength = 80;  // of a RAPID line
 
 bool is_name(const std::string& text, std::size_t longest) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
@@ -23,7 +24,7 @@ bool is_name(const std::string& text, std::size_t longest) {
          std::all_of(text.begin(), text.end(), allowed);
 }
 
-/// A prefix keeps it clear of reserved words and of the names inside.
+/// With a prefix, so that it is no reserved word and none of the names inside.
 std::string module_name(const std::string& name) {
   std::string text = "T_" + name;
   for (char& c : text) {
@@ -54,20 +55,26 @@ Result<Axes> axes_of(const Chain& robot, const ProgramOptions& options) {
     } else if (!axes.rail && (j == 0 || j + 1 == robot.size())) {
       axes.rail = j;
     } else {
-      return refused("robot {}: joint {} is prismatic; a program holds six turning axes and one rail before or after",
-                     robot.name(), j + 1);
+      return refused("robot {}: joint {} is prismatic", robot.name(), j + 1)
+          .of(fmt::format("joint {}", j + 1))
+          .next("a program holds six turning axes and one rail before or after");
     }
   }
   if (axes.turning.size() != 6) {
-    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size());
+    return refused("robot {}: {} turning joints, a program holds 6 and one rail", robot.name(), axes.turning.size())
+        .of("joints")
+        .beyond(axes.turning.size(), 6);
   }
   if (!(options.wait_s >= 0 && std::isfinite(options.wait_s))) {
-    return refused("a wait of {} s at each pose; expected 0 or more", options.wait_s);
+    return refused("a wait of {} s at each pose", options.wait_s)
+        .of("wait_s")
+        .beyond(options.wait_s, 0)
+        .next("expected 0 or more");
   }
   return axes;
 }
 
-/// Four decimals, and never a minus before nothing.
+/// Four decimals without trailing zeros; never `-0`.
 std::string number(double value) {
   std::string text = fmt::format("{:.4f}", value);
   if (text.find_first_not_of("-0.") == std::string::npos) return "0";
@@ -76,7 +83,7 @@ std::string number(double value) {
   return text;
 }
 
-/// What must be on the robot before this pose can be measured; empty where it is on it already.
+/// Which tool and payload must be mounted before this pose; empty where they are mounted already.
 std::string change_before(const Plan& plan, std::size_t i) {
   const PoseContext& now = plan.poses[i].context;
   if (i == 0) return "";
@@ -109,7 +116,9 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
   if (!axes) return tl::make_unexpected(axes.error());
   if (!is_name(options.rapid_tool, kRapidName)) {
     return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most", options.rapid_tool,
-                   kRapidName);
+                   kRapidName)
+        .of("rapid_tool")
+        .with_text(options.rapid_tool);
   }
   std::string text = fmt::format("MODULE {}\n", module_name(options.name));
   text += "  " + comment("!", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";
@@ -137,11 +146,15 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
   const Result<Axes> axes = axes_of(robot, options);
   if (!axes) return tl::make_unexpected(axes.error());
   if (options.krl_tool < 0 || options.krl_tool > kKrlTools) {
-    return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools);
+    return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools)
+        .of("krl_tool")
+        .beyond(options.krl_tool, options.krl_tool < 0 ? 0 : kKrlTools);
   }
   if (!is_name(options.name, kKrlName)) {
     return refused("KRL program '{}': expected a letter, then letters, digits or '_', {} at most, as its file is named",
-                   options.name, kKrlName);
+                   options.name, kKrlName)
+        .of("program")
+        .with_text(options.name);
   }
   std::string text = fmt::format("&ACCESS RVP\n&REL 1\nDEF {} ( )\n", options.name);
   text += "  " + comment(";", fmt::format("{} poses for {}", plan.poses.size(), robot.name())) + "\n";

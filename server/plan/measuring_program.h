@@ -5,16 +5,15 @@
 #include "server/base/result.h"
 #include "server/plan/plan.h"
 
-/// A plan as a program that the robot's own controller runs: for each pose fast to the pose it is approached from,
-/// slowly to the pose, and wait there until the arm is still and measured (source section 3.2.4.2). Joints are the
-/// robot's commanded values, degrees (mm for a rail) with four decimals. The program stops where tool or payload must
-/// be changed by hand.
+/// A plan as a program for the robot's controller. For each pose it moves fast to the pose of the approach, slowly to
+/// the pose, and waits there until the arm is still and measured (source section 3.2.4.2). Joints are commanded values
+/// in degrees (mm for a rail) with four decimals. The program stops where tool or payload must be changed by hand.
 namespace trammel {
 
 struct ProgramOptions {
-  std::string name = "measure";      ///< of the program, as its file's without the ending
+  std::string name = "measure";      ///< of the program: its file without the ending
   double wait_s = 5;                 ///< at each pose
-  std::string rapid_tool = "tool0";  ///< a tooldata that the controller has: its load makes the moves safe
+  std::string rapid_tool = "tool0";  ///< a tooldata of the controller, with the load that is mounted
   int krl_tool = 0;                  ///< number in $TOOL_DATA; 0 is the flange
 };
 

@@ -10,9 +10,9 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLeastGain = 1e-3;  // nat, that a swap must bring
-constexpr int kMaxExchangeScans = 200;
-constexpr double kOffTheBound = 0.3;  // of the prior scale
+constexpr double kLeastGain = 1e-3;      // nat: exchanges for less never end, and nobody measures the difference
+constexpr int kMostExchangeScans = 200;  // poses looked at: bounds the time of a plan
+constexpr double kOffTheBound = 0.3;     // of the prior scale: an ordinary value of the parameter
 
 Eigen::VectorXd prior_scales(const PhysicalModel& model) {
   const std::vector<Parameter> parameters = model.parameters();
@@ -23,7 +23,7 @@ Eigen::VectorXd prior_scales(const PhysicalModel& model) {
   return scales;
 }
 
-/// log det(M + rowsᵀ rows) as candidates are added and removed, over some of the columns.
+/// log det(M + rowsᵀ rows) of some of the columns, while candidates are added and removed.
 class GrowingDeterminant {
  public:
   GrowingDeterminant(Eigen::MatrixXd columns, Eigen::Index rows_each, Eigen::MatrixXd information)
@@ -62,7 +62,7 @@ class GrowingDeterminant {
   Eigen::MatrixXd information_;
 };
 
-/// The criterion: a determinant, less that of the nuisance parameters where there are any.
+/// The criterion: log det of all parameters, less that of the nuisance parameters.
 class Criterion {
  public:
   Criterion(const DesignCandidates& candidates, const Eigen::MatrixXd& information,
@@ -107,13 +107,13 @@ std::vector<std::size_t> greedy(Criterion& criterion, std::size_t candidates, in
   return chosen;
 }
 
-/// Takes out one pose after the other and puts in the best there is then, until a round brings nothing.
+/// Takes out one candidate after the other and puts in the best one instead, until a round gains nothing.
 int exchange(Criterion& criterion, std::size_t candidates, std::vector<std::size_t>& chosen) {
   std::vector<bool> taken(candidates, false);
   for (const std::size_t i : chosen) taken[i] = true;
   int exchanges = 0;
   int unchanged = 0;
-  for (int scan = 0; scan < kMaxExchangeScans && unchanged < static_cast<int>(chosen.size()); ++scan) {
+  for (int scan = 0; scan < kMostExchangeScans && unchanged < static_cast<int>(chosen.size()); ++scan) {
     std::size_t& pose = chosen[static_cast<std::size_t>(scan) % chosen.size()];
     criterion.add(pose, -1);
     const Eigen::VectorXd gains = criterion.gains();
@@ -129,7 +129,7 @@ int exchange(Criterion& criterion, std::size_t candidates, std::vector<std::size
   return exchanges;
 }
 
-/// The chosen ones with the most telling first: a plan that is broken off has lost the least.
+/// The chosen ones, the most telling first: a plan that is broken off early has lost the least.
 std::vector<std::size_t> most_telling_first(const DesignCandidates& candidates, const Eigen::MatrixXd& information,
                                             const std::vector<Eigen::Index>& nuisance,
                                             const std::vector<std::size_t>& chosen) {
@@ -194,10 +194,12 @@ Result<Design> optimal_design(const DesignCandidates& candidates, const Eigen::M
                               const std::vector<Eigen::Index>& nuisance) {
   TRAMMEL_CHECK(information.rows() == candidates.rows.cols() && information.cols() == information.rows());
   if (count < 1 || static_cast<std::size_t>(count) > candidates.size()) {
-    return refused("{} poses of {} candidates; expected 1 to {}", count, candidates.size(), candidates.size());
+    return refused("{} poses of {} candidates; expected 1 to {}", count, candidates.size(), candidates.size())
+        .of("count")
+        .beyond(count, count < 1 ? 1 : candidates.size());
   }
   if (!information.allFinite() || Eigen::LLT<Eigen::MatrixXd>(information).info() != Eigen::Success) {
-    return refused("the information to start from is not positive definite; it needs the prior");
+    return refused("the information to start from is not positive definite").next("it needs the prior");
   }
   Criterion criterion(candidates, information, nuisance);
   Design design;

@@ -18,7 +18,9 @@ Result<JointRanges> planning_ranges(const Cell& cell) {
   for (int i = 0; i < cell.robot.size(); ++i) {
     const Joint& joint = cell.robot.joint(i);
     if (!std::isfinite(joint.lower) || !std::isfinite(joint.upper)) {
-      return refused("cell {}: joint {} has no limits; give joint_ranges_deg", cell.name, i + 1);
+      return refused("cell {}: joint {} has no limits", cell.name, i + 1)
+          .of("joint_ranges_deg")
+          .next("give joint_ranges_deg");
     }
     ranges.emplace_back(joint.lower, joint.upper);
   }
@@ -43,12 +45,13 @@ Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint6
 
 namespace {
 
-constexpr int kCandidates = 4000;
-constexpr int kLargestFactor = 512;        // of a hypercube of poses: fewer than 1 in 1000 is refused by then
-constexpr int kLargestDesignFactor = 64;   // of a hypercube of candidates
-constexpr int kCandidatesForEachPose = 4;  // at least
+constexpr int kCandidates = 4000;          // to choose from: the time of a plan grows with them
+constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is hardly one
+// How many times larger than wanted a hypercube is drawn at most.
+constexpr int kLargestFactor = 512;       // of poses: fewer than 1 in 1000 fits then
+constexpr int kLargestDesignFactor = 64;  // of candidates: they are more already, and each is linearised
 
-/// What the cell allows: held against every tool that will be used, and every side a pose is approached from.
+/// What the cell allows, asked for every tool that will be used and every side that a pose is approached from.
 class Filter {
  public:
   static Result<Filter> of(const Cell& cell, const std::vector<std::string>& tools, std::vector<int> directions) {
@@ -62,7 +65,7 @@ class Filter {
     return filter;
   }
 
-  /// Counts the candidate; true when it may be planned.
+  /// Whether the candidate may be planned; counts it.
   bool keeps(const JointVector& q, DrawCount& count) const {
     ++count.drawn;
     std::vector<JointVector> visited = {q};
@@ -81,7 +84,7 @@ class Filter {
  private:
   Filter(const Cell& cell, std::vector<int> directions) : cell_(cell), directions_(std::move(directions)) {}
 
-  /// At the robot's believed place: this is a plan, not a measurement.
+  /// By the nominal robot.
   bool inside_workspace(const JointVector& q) const {
     if (!cell_.workspace) return true;
     const Pose X_BF = cell_.robot.flange_pose(q);
@@ -102,8 +105,8 @@ struct Drawn {
   DrawCount count;
 };
 
-/// `wanted` joint vectors that the filter keeps, of a Latin hypercube as large as that takes: twice as large each time,
-/// up to `largest_factor`. Refused when even that one keeps fewer than `needed`.
+/// `wanted` joint vectors that the filter keeps, from a Latin hypercube that doubles until it is large enough, up to
+/// `largest_factor` times as many as wanted. Refuses where even that one has fewer than `needed`.
 template <typename Prepare>
 Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed, int largest_factor,
                    std::uint64_t seed, const Prepare& prepare) {
@@ -127,9 +130,12 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
   const DrawCount& count = drawn.count;
   if (count.kept < needed) {
     return refused(
-        "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the workspace, "
-        "{} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be approached",
-        cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way);
+               "cell {}: of {} poses drawn from the joint ranges {} can be measured, {} are needed; {} leave the "
+               "workspace, {} are out of the tracker's sight, {} are beyond a joint limit or too near to it to be "
+               "approached",
+               cell.name, count.drawn, count.kept, needed, count.outside, count.unseen, count.no_way)
+        .of("count")
+        .beyond(count.kept, needed);
   }
   drawn.q.resize(static_cast<std::size_t>(std::min(wanted, count.kept)));
   return drawn;
@@ -137,10 +143,12 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
 
 Status check_count(const PlanOptions& options) {
   if (options.count >= 1) return {};
-  return failure(ErrorCode::kUsage, "a plan of {} poses; at least 1 is needed", options.count);
+  return failure(ErrorCode::kUsage, "a plan of {} poses, at least 1 is needed", options.count)
+      .of("--count")
+      .beyond(options.count, 1);
 }
 
-/// All that a plan is made with.
+/// What all poses of a plan share.
 struct Planning {
   std::shared_ptr<const Cell> cell;
   std::vector<std::string> tools, payloads;
@@ -158,7 +166,7 @@ Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<st
   return names;
 }
 
-/// Each pose with every side it is approached from, one after the other; tools and payloads in turn.
+/// Each pose once for every side that it is approached from; tools and payloads in turn.
 std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector<JointVector>& q) {
   std::vector<PoseContext> contexts;
   for (std::size_t i = 0; i < q.size(); ++i) {
@@ -205,7 +213,8 @@ Result<CausePair> pair_of(const Planning& planning, const PlanOptions& options) 
   }
   Result<PhysicalModel> model = make_physical_model(planning.cell, planning.cell->model.error_sources);
   if (!model) return tl::make_unexpected(model.error());
-  if (model->parameter_count() == 0) return refused("cell {}: its model has no error sources", planning.cell->name);
+  if (model->parameter_count() == 0)
+    return refused("cell {}: its model has no error sources", planning.cell->name).of("error_sources");
   model->values = planning_values(*model);
   return CausePair{std::move(*model), "", "", {}, {}};
 }
@@ -216,7 +225,7 @@ Plan::Separation separation_of(const CausePair& pair, const Separability& plan, 
   const auto shows = [](const ParameterSeparation& parameter) { return parameter.effect > 0; };
   const bool any_shows = std::any_of(candidates.parameters.begin(), candidates.parameters.end(), shows);
   for (const ParameterSeparation& parameter : candidates.parameters) {
-    // The order of a gear's error shows only once its amplitude is known: nothing to ask for.
+    // The order of a gear's error shows only once its amplitude is known, so it is not asked for.
     if (any_shows && !shows(parameter)) continue;
     const bool told = parameter.strength >= kLeastStrength && parameter.share >= kLeastShare;
     if (!told) separation.hopeless.push_back(parameter.parameter);
@@ -225,7 +234,7 @@ Plan::Separation separation_of(const CausePair& pair, const Separability& plan, 
   return separation;
 }
 
-/// Chooses among `candidates`; `latin_hypercube` is what to compare with.
+/// Chooses among `candidates`, and compares with `latin_hypercube`.
 Result<Plan> designed(const Planning& planning, const PlanOptions& options, const Drawn& candidates,
                       const Drawn& latin_hypercube) {
   const Result<CausePair> pair = pair_of(planning, options);

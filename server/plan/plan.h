@@ -13,7 +13,7 @@
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
 
-/// Measuring poses.
+/// Which poses to measure.
 namespace trammel {
 
 using JointRanges = std::vector<std::pair<double, double>>;  // rad, lower and upper end of each joint
@@ -22,47 +22,48 @@ using JointRanges = std::vector<std::pair<double, double>>;  // rad, lower and u
 [[nodiscard]] Result<JointRanges> planning_ranges(const Cell& cell);
 
 /// `count` joint vectors (rows, rad) by Latin hypercube sampling: each joint's range is cut into `count` equal slices
-/// and every slice is used once (source section 5.1.3). Same seed, same rows.
+/// and every slice is used once (source section 5.1.3). The same seed gives the same rows.
 [[nodiscard]] Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint64_t seed);
 
-/// How poses are chosen from those that the cell allows.
+/// How poses are chosen among those that the cell allows.
 enum class PlanCriterion {
   kLatinHypercube,  ///< evenly over the joint ranges
   kObservability,   ///< D-optimal for the parameters of the cell's error sources
-  kSeparation       ///< D_s-optimal for one cause beside another
+  kSeparation       ///< D_s-optimal to tell one cause from another
 };
 
 struct PlanOptions {
   int count = 0;
   std::uint64_t seed = 1;
   PlanCriterion criterion = PlanCriterion::kLatinHypercube;
-  std::string cause = {}, other = {};   ///< of kSeparation: specs as in the cell file
+  std::string cause = {}, other = {};   ///< for kSeparation: sources as written in the cell file
   bool bidirectional = false;           ///< every pose twice, approached from both sides
   bool orientation = true;              ///< false: positions only will be measured
   std::vector<std::string> tools = {};  ///< to measure with in turn; empty: the cell's only one
   std::vector<std::string> payloads = {};
 };
 
-/// `count` poses of the cell (rows, rad): a Latin hypercube, of which only poses inside the cell's workspace and in
-/// sight of its tracker (with its first tool) are kept, source section 6.1.2; drawn larger until enough are. Refuses
-/// when fewer than 1 in 1000 candidates fits, and what Visibility::of() refuses. Only count and seed matter.
+/// `count` poses of the cell (rows, rad): a Latin hypercube, of which the poses inside the workspace and in sight of
+/// the tracker, with the first tool, are kept (source section 6.1.2). The hypercube is drawn larger until they are
+/// enough. Refuses a cell where fewer than 1 in 1000 candidates fits, and what Visibility::of() refuses. Of the options
+/// only count and seed matter.
 [[nodiscard]] Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options);
 
-/// Which of the joint vectors in the rows of `q` (rad) plan_poses() could have given and, as a plan needs, can be
-/// approached from one side at least. Refuses what plan_poses() refuses of the cell.
+/// For each row of `q` (rad) whether plan_poses() could have given it and it can be approached from one side at least.
+/// Refuses what plan_poses() refuses of the cell.
 [[nodiscard]] Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q);
 
-/// What became of the candidates that were drawn; each is counted at the first thing that spoke against it.
+/// What became of the candidates drawn; each counts for the first reason against it.
 struct DrawCount {
   int drawn = 0;
-  int outside = 0;  ///< it or the pose it is approached from leaves the workspace
-  int unseen = 0;   ///< by the tracker
-  int no_way = 0;   ///< beyond a joint limit, or too near to it to be approached
+  int outside = 0;  ///< the pose, or that of its approach, is outside the workspace
+  int unseen = 0;   ///< not in sight of the tracker
+  int no_way = 0;   ///< beyond a joint limit, or too near to one to be approached
   int kept = 0;
 };
 
 struct PlannedPose {
-  std::string id;       ///< its number; `12+` and `12-` where it is approached from both sides
+  std::string id;       ///< its number; `12+` and `12-` for a pose approached from both sides
   PoseContext context;  ///< joints, approach directions, tool, payload
   JointVector bump;     ///< where it is approached from
 };
@@ -70,25 +71,26 @@ struct PlannedPose {
 struct Plan {
   std::vector<PlannedPose> poses;
   DrawCount draw;
-  /// Of kObservability and kSeparation: the criterion (nat) of this plan and of a Latin hypercube of as many poses.
+  /// For kObservability and kSeparation: the criterion (nat) of this plan, and of a Latin hypercube of as many poses.
   double criterion = 0, criterion_of_latin_hypercube = 0;
-  /// Of kSeparation: this plan, a Latin hypercube, and all candidates measured together.
+  /// For kSeparation: how well the causes are told apart by this plan, by a Latin hypercube, and by all candidates
+  /// together.
   struct Separation {
     Separability plan, latin_hypercube, candidates;
-    std::vector<std::string> hopeless;  ///< parameters of the cause that not even all candidates separate
-    std::string needs;                  ///< what would; empty when nothing is hopeless
+    std::vector<std::string> hopeless;  ///< parameters that not even all candidates together separate
+    std::string needs;                  ///< what would separate them; empty where nothing is hopeless
   };
   std::optional<Separation> separation;
 };
 
-/// The poses of `list` (checked against the cell) as a plan: each with the pose it is approached from, on the side that
-/// its directions say where they are all the same, else on one that the limits allow. Refuses a pose that lies too near
-/// to a limit to be approached.
+/// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach: from the recorded side
+/// where all joints have the same, else from one that the limits allow. Refuses a pose that is too near to a limit to
+/// be approached.
 [[nodiscard]] Result<Plan> plan_of(const Cell& cell, const JointList& list);
 
-/// A plan as the options say, every pose with the pose it is approached from (by default from above, as source section
-/// 3.2.4.2). Poses of one tool and payload come together; within them the most telling come first. Refuses as
-/// plan_poses(), and unknown causes, tools and payloads.
+/// A plan as the options say, each pose with the pose of its approach (by default from above, as in source section
+/// 3.2.4.2). Poses of one tool and payload come together, the most telling first. Refuses what plan_poses() refuses,
+/// and unknown causes, tools and payloads.
 [[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options);
 
 }  // namespace trammel

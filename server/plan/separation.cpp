@@ -14,7 +14,9 @@ Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell, const
   const Result<ErrorSourcePtr> second = make_error_source(other, *cell);
   if (!second) return tl::make_unexpected(second.error());
   if ((*first)->name() == (*second)->name()) {
-    return failure(ErrorCode::kUsage, "'{}' and '{}' are the same cause", cause, other);
+    return failure(ErrorCode::kUsage, "'{}' and '{}' are the same cause", cause, other)
+        .of("--criterion")
+        .with_text(cause);
   }
   std::vector<std::string> specs = cell->model.error_sources;
   for (const std::string& spec : {cause, other}) {

@@ -12,14 +12,14 @@ namespace trammel {
 /// (m). `X_WT` is the tool's pose, `normal_T` a unit vector. pi where the target stands in the tracker itself.
 [[nodiscard]] double visibility_angle(const Pose& X_WT, const Vector3& normal_T, const Vector3& tracker_W);
 
-/// What limits the view in a cell. Only the target's own aperture counts: what stands in the way is not known.
+/// Which poses the tracker sees. Only the target's aperture limits the view: obstacles are not known.
 class Visibility {
  public:
-  /// Everything is visible where the cell gives no tracker position or no aperture. Refuses an unknown base or tool
-  /// where it gives both: the line of sight cannot be told.
+  /// Where the cell has no tracker position or no aperture, everything is visible. Where it has both, refuses an
+  /// unknown base or tool: there is no line of sight to tell.
   [[nodiscard]] static Result<Visibility> of(const Cell& cell, const std::string& tool);
 
-  /// True when the nominal robot at `q` (rad, m) shows its target within the aperture, its edge included.
+  /// Whether the nominal robot at `q` (rad, m) shows its target within the aperture, edge included.
   [[nodiscard]] bool sees(const JointVector& q) const;
 
  private:

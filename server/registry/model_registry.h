@@ -2,10 +2,10 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "server/base/mutex.h"
 #include "server/compensate/compensated_model.h"
 
 namespace trammel {
@@ -29,8 +29,8 @@ class ModelRegistry {
   [[nodiscard]] std::vector<std::shared_ptr<const ServedModel>> all() const;
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<const ServedModel>> models_;  // guarded by mutex_
+  mutable Mutex mutex_;
+  std::map<std::string, std::shared_ptr<const ServedModel>> models_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

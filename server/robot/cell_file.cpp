@@ -48,7 +48,8 @@ Joint read_joint(const YamlMap& map) {
   Joint joint;
   map.attempt([&] {
     const std::string type = map.text("type", "revolute");
-    if (type != "revolute" && type != "prismatic") map.refuse("type", "expected revolute or prismatic");
+    if (type != "revolute" && type != "prismatic")
+      map.refuse("type", refused("'{}', expected revolute or prismatic", type).with_text(type));
     joint.type = type == "revolute" ? JointType::kRevolute : JointType::kPrismatic;
   });
   map.attempt([&] { read_link(map, joint); });
@@ -57,7 +58,7 @@ Joint read_joint(const YamlMap& map) {
     joint.gear_ratio = map.number("gear_ratio", 0);
     joint.compliance_prior = from_rad_per_nmm(map.number("compliance_rad_per_nmm", 0));
     joint.mass = map.number("mass_kg", 0);
-    if (joint.mass < 0) map.refuse("mass_kg", "below 0");
+    if (joint.mass < 0) map.refuse("mass_kg", refused("below 0").beyond(joint.mass, 0));
     if (map.has("cog_mm")) joint.p_cog = read_vector(map, "cog_mm") * from_mm(1);
   });
   map.attempt([&] { read_motion(map, joint); });
@@ -74,7 +75,8 @@ Pose read_pose(const YamlMap& map) {
     const std::vector<double> v = map.numbers("q_wxyz", 4);
     const Eigen::Quaterniond quaternion(v[0], v[1], v[2], v[3]);
     if (std::abs(quaternion.norm() - 1) > 1e-3) {
-      map.refuse("q_wxyz", fmt::format("length {:.6f}, expected a unit quaternion (limit 1e-3)", quaternion.norm()));
+      map.refuse("q_wxyz", refused("length {:.6f}, expected a unit quaternion (limit 1e-3)", quaternion.norm())
+                               .beyond(quaternion.norm(), 1));
     }
     X.linear() = quaternion.normalized().toRotationMatrix();
   }
@@ -88,13 +90,16 @@ Tracker read_tracker(const YamlMap& map) {
   Tracker tracker;
   tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
   tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
-  if (tracker.sigma <= 0) map.refuse("sigma_mm", "must be above 0");
-  if (tracker.sigma_rotation <= 0) map.refuse("sigma_deg", "must be above 0");
+  if (tracker.sigma <= 0) map.refuse("sigma_mm", refused("must be above 0").beyond(to_mm(tracker.sigma), 0));
+  if (tracker.sigma_rotation <= 0)
+    map.refuse("sigma_deg", refused("must be above 0").beyond(to_deg(tracker.sigma_rotation), 0));
   if (!map.is_null("xyz_mm")) tracker.p_W = read_vector(map, "xyz_mm") * from_mm(1);
   if (map.has("aperture_deg")) {
     tracker.aperture = from_deg(map.number("aperture_deg"));
     if (!(*tracker.aperture > 0 && *tracker.aperture <= kPi))
-      map.refuse("aperture_deg", "must be above 0, at most 180");
+      map.refuse(
+          "aperture_deg",
+          refused("must be above 0, at most 180").beyond(to_deg(*tracker.aperture), *tracker.aperture > 0 ? 180 : 0));
   }
   if (map.has("target_normal")) {
     tracker.target_normal_T = read_vector(map, "target_normal");
@@ -114,7 +119,8 @@ void read_tools(const YamlMap& map, Cell& cell) {
       });
     }
   }
-  if (cell.tools.empty()) map.refuse("tools", "at least one tool is needed (null when its pose is unknown)");
+  if (cell.tools.empty())
+    map.refuse("tools", refused("no tool").beyond(0, 1).next("name at least one, as null where its pose is unknown"));
 }
 
 void read_payloads(const YamlMap& map, Cell& cell) {
@@ -125,7 +131,7 @@ void read_payloads(const YamlMap& map, Cell& cell) {
       const YamlMap entry = payloads.map(name);
       entry.only({"mass_kg", "cog_mm"});
       Payload payload{entry.number("mass_kg"), read_vector(entry, "cog_mm") * from_mm(1)};
-      if (payload.mass < 0) entry.refuse("mass_kg", "below 0");
+      if (payload.mass < 0) entry.refuse("mass_kg", refused("below 0").beyond(payload.mass, 0));
       cell.payloads[name] = payload;
     });
   }
@@ -167,12 +173,13 @@ Cell read_cell_map(const YamlMap& map) {
             "workspace_mm"});
   Cell cell;
   map.attempt([&] {
-    if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+    if (map.integer("version", 0) != 1)
+      map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
   });
   map.attempt([&] {
     cell.name = map.text("cell");
     if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
-      map.refuse("cell", "expected a name without blanks, '@' and '/'");
+      map.refuse("cell", refused("'{}', expected a name without blanks, '@' and '/'", cell.name).with_text(cell.name));
     }
   });
   read_surroundings(map, cell);
@@ -187,11 +194,14 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
   const YamlMap ranges = map.map("joint_ranges_deg");
   for (int i = 0; i < cell.robot.size(); ++i) {
     const std::vector<double> range = ranges.numbers(fmt::format("q{}", i + 1), 2);
-    if (!(range[0] <= range[1])) ranges.refuse(fmt::format("q{}", i + 1), "lower end above upper end");
+    if (!(range[0] <= range[1])) {
+      ranges.refuse(fmt::format("q{}", i + 1), refused("lower end above upper end").beyond(range[0], range[1]));
+    };
     cell.joint_ranges.emplace_back(from_deg(range[0]), from_deg(range[1]));
   }
   if (ranges.keys().size() != static_cast<std::size_t>(cell.robot.size())) {
-    ranges.refuse("q1...", fmt::format("expected {} joints", cell.robot.size()));
+    ranges.refuse("q1...",
+                  refused("expected {} joints", cell.robot.size()).beyond(ranges.keys().size(), cell.robot.size()));
   }
 }
 
@@ -201,7 +211,8 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
   return read_yaml(robot_yaml, where,
                    [&](const YamlMap& map) {
                      map.only({"version", "name", "source", "joints", "coupling"});
-                     if (map.integer("version", 0) != 1) map.refuse("version", "expected 1");
+                     if (map.integer("version", 0) != 1)
+                       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
                      std::vector<Joint> joints;
                      for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
                      std::vector<Coupling> couplings;
@@ -215,10 +226,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                      return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
                    })
       .and_then([](Result<Chain> chain) { return chain; })
-      .map_error([&](Error error) {
-        if (!error.message.starts_with(where)) error.message = where + ": " + error.message;
-        return error;
-      });
+      .map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
 Result<Chain> read_robot(const std::string& path) {
@@ -231,7 +239,7 @@ namespace {
 Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml, const std::string& where) {
   return read_yaml(cell_yaml, where, [&](const YamlMap& map) {
     Cell cell = read_cell_map(map);
-    if (!robot) throw YamlRefusal{sentence(robot.error())};
+    if (!robot) throw YamlRefusal{robot.error()};
     cell.robot = *robot;
     map.attempt([&] { read_joint_ranges(map, cell); });
     cell.cell_yaml = cell_yaml;
@@ -245,8 +253,7 @@ Result<std::string> robot_text_of(const std::string& cell_yaml, const std::strin
   if (!name) return tl::make_unexpected(name.error());
   robot_path = (std::filesystem::path(path).parent_path() / *name).string();
   return read_text_file(robot_path).map_error([&](Error error) {
-    error.message = fmt::format("{}: robot: {}", path, error.message);
-    return error;
+    return Failure(std::move(error)).of("robot").next(fmt::format("{} names it as its robot", path)).value();
   });
 }
 
@@ -278,10 +285,14 @@ Result<std::string> resolve(const Map& known, const std::string& requested, cons
   for (const auto& [name, value] : known) names += (names.empty() ? "" : ", ") + name;
   if (requested.empty()) {
     if (known.size() == 1) return known.begin()->first;
-    return refused("cell {}: no {} named, and the cell has {}: {}", cell, kind, known.size(), names);
+    return refused("cell {}: no {} named, and the cell has {}: {}", cell, kind, known.size(), names)
+        .of(fmt::format("{}_id", kind));
   }
   if (!known.contains(requested)) {
-    return refused("cell {}: unknown {} '{}'; known: {}", cell, kind, requested, names.empty() ? "none" : names);
+    return refused("cell {}: unknown {} '{}'", cell, kind, requested)
+        .of(fmt::format("{}_id", kind))
+        .with_text(requested)
+        .next(fmt::format("known: {}", names.empty() ? "none" : names));
   }
   return requested;
 }

@@ -110,8 +110,10 @@ Result<std::string> with_error_sources(const std::string& cell_yaml, const std::
   } catch (const YAML::Exception& error) {
     why = error.what();
   }
-  return refused("{}: model: error_sources: cannot be changed in place ({}); write it as [base, geometry, ...]", where,
-                 why);
+  return refused("cannot be changed in place ({})", why)
+      .under("model: error_sources")
+      .in(where)
+      .next("write it as [base, geometry, ...]");
 }
 
 }  // namespace trammel

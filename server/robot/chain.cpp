@@ -9,18 +9,23 @@ namespace trammel {
 
 Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vector<Coupling> couplings) {
   const int n = static_cast<int>(joints.size());
-  if (n == 0) return refused("robot {}: no joints", name);
-  if (n > kMaxJoints) return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints);
+  if (n == 0) return refused("robot {}: no joints", name).of("joints").beyond(0, 1);
+  if (n > kMaxJoints)
+    return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints).of("joints").beyond(n, kMaxJoints);
   Chain chain;
   chain.transmission_ = Eigen::MatrixXd::Zero(n, n);
   for (int i = 0; i < n; ++i) {
     const Joint& joint = joints[static_cast<std::size_t>(i)];
     if (!(joint.lower < joint.upper)) {
       return refused("robot {} joint {}: lower limit {} is not below upper limit {}", name, i + 1, joint.lower,
-                     joint.upper);
+                     joint.upper)
+          .of(fmt::format("joints {}: limits", i + 1))
+          .beyond(joint.lower, joint.upper);
     }
     if (std::abs(joint.sign) != 1.0) {
-      return refused("robot {} joint {}: sign is {}, only 1 and -1 are allowed", name, i + 1, joint.sign);
+      return refused("robot {} joint {}: sign is {}, only 1 and -1 are allowed", name, i + 1, joint.sign)
+          .of(fmt::format("joints {}: sign", i + 1))
+          .with_value(joint.sign);
     }
     chain.transmission_(i, i) = joint.sign;
   }
@@ -28,12 +33,14 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
     if (coupling.joint < 0 || coupling.joint >= n || coupling.follows < 0 || coupling.follows >= n ||
         coupling.joint == coupling.follows) {
       return refused("robot {}: coupling of joint {} to joint {} in a robot of {} joints", name, coupling.joint + 1,
-                     coupling.follows + 1, n);
+                     coupling.follows + 1, n)
+          .of("coupling")
+          .beyond(std::max(coupling.joint, coupling.follows) + 1, n);
     }
     chain.transmission_(coupling.joint, coupling.follows) += coupling.ratio;
   }
   if (std::abs(chain.transmission_.determinant()) < 1e-6)
-    return refused("robot {}: couplings cannot be inverted", name);
+    return refused("robot {}: couplings cannot be inverted", name).of("coupling");
   chain.name_ = std::move(name);
   chain.joints_ = std::move(joints);
   return chain;

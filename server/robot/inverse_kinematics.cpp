@@ -175,10 +175,12 @@ double nearest_turn(const Joint& joint, double angle, double near) {
 Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, int conf,
                                          const std::optional<JointVector>& near) {
   if (!has_spherical_wrist(chain)) {
-    return refused("robot {}: no spherical wrist, so a branch (conf) does not say enough: give joints as a seed",
-                   chain.name());
+    return refused("robot {}: no spherical wrist, so a branch (conf) does not say enough", chain.name())
+        .of("conf")
+        .next("give joints as a seed");
   }
-  if (conf < 0 || conf > 7) return refused("conf is {}, limits 0 and 7", conf);
+  if (conf < 0 || conf > 7)
+    return refused("conf is {}, limits 0 and 7", conf).of("conf").beyond(conf, conf < 0 ? 0 : 7);
   const auto theta = branch(chain, X_BF, (conf & 4) != 0, (conf & 2) != 0, (conf & 1) != 0);
   InverseResult result{InverseStatus::kUnreachable, near.value_or(JointVector::Zero(6)), 0};
   if (!theta) return result;
@@ -191,7 +193,8 @@ Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, i
 
 Result<int> branch_of(const Chain& chain, const JointVector& q) {
   TRAMMEL_CHECK(q.size() == chain.size());
-  if (!has_spherical_wrist(chain)) return refused("robot {}: no spherical wrist, so no branches", chain.name());
+  if (!has_spherical_wrist(chain))
+    return refused("robot {}: no spherical wrist, so no branches", chain.name()).of("conf");
   const Pose X_BF = chain.flange_pose(q);
   int best = 0;
   double least = std::numeric_limits<double>::infinity();

@@ -9,17 +9,26 @@ namespace trammel {
 
 namespace {
 
-/// `pose` with what it left open: tool, payload, time and temperature.
+/// Refuses joints that the robot has not or cannot take.
+Status check_joints(const JointVector& q, int index, const Chain& robot) {
+  if (q.size() != robot.size()) {
+    return refused("simulate: {} joints, robot {} has {}", q.size(), robot.name(), robot.size())
+        .beyond(q.size(), robot.size());
+  }
+  const auto joint = robot.joint_outside_limits(q);
+  if (!joint) return {};
+  const Joint& known = robot.joint(*joint);
+  const double value = q(*joint);
+  return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1, *joint + 1,
+                 to_deg(value), to_deg(known.lower), to_deg(known.upper))
+      .of(fmt::format("q{}_deg", *joint + 1))
+      .beyond(to_deg(value), to_deg(value < known.lower ? known.lower : known.upper));
+}
+
+/// `pose` completed by the options and the course: tool, payload, time and temperature.
 Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot, const SimulateOptions& options) {
   const Cell& cell = *robot.truth.cell;
-  if (pose.q.size() != cell.robot.size()) {
-    return refused("simulate: {} joints, robot {} has {}", pose.q.size(), cell.robot.name(), cell.robot.size());
-  }
-  if (const auto joint = cell.robot.joint_outside_limits(pose.q)) {
-    return refused("simulate: pose {}: joint {} is {:.3f} deg, limits {:.1f} and {:.1f}", index + 1, *joint + 1,
-                   to_deg(pose.q(*joint)), to_deg(cell.robot.joint(*joint).lower),
-                   to_deg(cell.robot.joint(*joint).upper));
-  }
+  if (const Status fine = check_joints(pose.q, index, cell.robot); !fine) return tl::make_unexpected(fine.error());
   const Result<std::string> tool = resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool);
   if (!tool) return tl::make_unexpected(tool.error());
   const Result<std::string> payload = resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload);

@@ -9,10 +9,10 @@
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
-/// A virtual robot and tracker: truth in, batches out.
+/// A virtual robot and its tracker: a truth goes in, batches come out.
 namespace trammel {
 
-/// How a measuring session runs: poses that say no time or temperature get them from here.
+/// How a measuring session runs. Poses without time or temperature get them from here.
 struct MeasuringCourse {
   double seconds_per_pose = 0;              ///< s; 0: no time is recorded
   std::optional<double> temperature_start;  ///< degrees Celsius; empty: none is recorded
@@ -20,7 +20,7 @@ struct MeasuringCourse {
   double temperature_time_constant = 3600;  ///< s
 };
 
-/// A robot whose true numbers are known to its owner only.
+/// A robot with its true parameters.
 struct VirtualRobot {
   PhysicalModel truth;
   double sigma = 0;           ///< m, of one measured coordinate
@@ -47,12 +47,12 @@ struct SimulateOptions {
   std::string tool, payload;  ///< empty: the cell's only ones
 };
 
-/// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints, joints outside limits,
-/// an unknown tool or payload.
+/// Measures the poses of `q` (rows, rad) one after the other. Refuses a wrong number of joints, joints outside their
+/// limits, and an unknown tool or payload.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const Eigen::MatrixXd& q,
                                                 const SimulateOptions& options);
-/// The same for poses that bring their own direction, time, temperature, tool and payload (or leave them to the course
-/// and the options).
+/// The same for poses with their own direction, time, temperature, tool and payload; what they leave open comes from
+/// the course and the options.
 [[nodiscard]] Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<PoseContext>& poses,
                                                 const SimulateOptions& options);
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,8 @@ struct StoredModel {
   std::optional<std::int64_t> measured_at = {};  ///< see ModelProvenance
 };
 
+struct StoreConnection;
+
 /// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, on disk when
 /// it returns. What the disk or the database refuses is kInternal and names the file.
 class Store {
@@ -92,6 +95,10 @@ class Store {
   /// What an unfinished diagnosis has found; the job goes on.
   [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings, const std::string& page);
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
+  /// The same without its text: cheap.
+  [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
+  /// The ids of those that a model of the cell was made from.
+  [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Keeps the batch out of trainings for `reason`, or lets it in again (empty).
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason);
   /// Newest last, without their text.
@@ -110,9 +117,10 @@ class Store {
   [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message);
 
   /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and, if asked, puts the
-  /// model in force: one transaction. Returns the version.
+  /// model in force: one transaction. What the job may release leaves quarantine in it where the model goes in force or
+  /// `release` says so. Returns the version.
   [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                                      bool put_in_force, const std::string& message);
+                                      bool put_in_force, const std::string& message, bool release = false);
   /// Puts a stored version in force; nothing changes when it is already. Refuses (kNotFound) an unknown one.
   ///
   /// The rule of going back: an activation remembers the one that it replaced. Rolling back restores that one together
@@ -130,9 +138,8 @@ class Store {
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
 
  private:
-  struct Connection;
-  explicit Store(std::unique_ptr<Connection> connection);
-  std::unique_ptr<Connection> connection_;
+  explicit Store(std::unique_ptr<StoreConnection> connection);
+  std::unique_ptr<StoreConnection> connection_;
 };
 
 }  // namespace trammel

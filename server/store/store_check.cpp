@@ -32,12 +32,13 @@ Status check_folder(const fs::path& path) {
   std::error_code error;
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!fs::exists(folder, error))
-    return refused("{}: its folder {} is not there; create it, or name another", path.string(), folder.string());
+    return refused("its folder {} is not there", folder.string()).in(path.string()).next("create it, or name another");
   if (!fs::is_directory(folder, error))
-    return refused("{}: {} is no folder; name another", path.string(), folder.string());
+    return refused("{} is no folder", folder.string()).in(path.string()).next("name another");
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    return refused("{}: its folder {} cannot be written to: {}; change its owner or its mode", path.string(),
-                   folder.string(), std::strerror(errno));
+    return refused("its folder {} cannot be written to: {}", folder.string(), std::strerror(errno))
+        .in(path.string())
+        .next("change its owner or its mode");
   return {};
 }
 
@@ -46,28 +47,35 @@ Status check_header(const fs::path& path) {
   std::string header(kHeader, '\0');
   std::ifstream in(path, std::ios::binary);
   if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) || !header.starts_with(kMagic))
-    return refused("{}: no store: not an SQLite file; name another, or move this one away", path.string());
+    return refused("no store: not an SQLite file").in(path.string()).next("name another, or move this one away");
   const auto application = big_endian(std::string_view(header).substr(kApplicationAt, 4));
   const auto schema = big_endian(std::string_view(header).substr(kSchemaAt, 4));
   std::error_code error;
   const bool in_journal = application == 0 && schema == 0 && fs::exists(path.string() + "-wal", error);
   if (in_journal) return {};
   if (application != static_cast<std::uint32_t>(kApplicationId))
-    return refused("{}: a database of another program (application id {:#x}, not {:#x}); name another", path.string(),
-                   application, kApplicationId);
+    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+        .in(path.string())
+        .of("application id")
+        .with_value(application)
+        .next("name another");
   if (schema > static_cast<std::uint32_t>(kSchemaVersion))
-    return refused("{}: schema {} is newer than this program's, limit {}; start a newer one", path.string(), schema,
-                   kSchemaVersion);
+    return refused("schema {} is newer than this program's, limit {}", schema, kSchemaVersion)
+        .in(path.string())
+        .of("schema")
+        .beyond(schema, kSchemaVersion)
+        .next("start a newer one");
   return {};
 }
 
 Status check_file(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return {};
-  if (!fs::is_regular_file(path, error)) return refused("{}: no store: not a file; name another", path.string());
+  if (!fs::is_regular_file(path, error)) return refused("no store: not a file").in(path.string()).next("name another");
   if (::access(path.c_str(), R_OK | W_OK) != 0)
-    return refused("{}: cannot be read and written: {}; change its owner or its mode", path.string(),
-                   std::strerror(errno));
+    return refused("cannot be read and written: {}", std::strerror(errno))
+        .in(path.string())
+        .next("change its owner or its mode");
   if (fs::file_size(path, error) == 0) return {};
   return check_header(path);
 }

@@ -26,9 +26,10 @@ std::string lock_path_of(const std::string& file) {
   return (unknown ? file : real.string()) + ".lock";
 }
 
-tl::unexpected<Error> held(const std::string& file, int descriptor, const std::string& lock) {
-  return failure(ErrorCode::kConflict, "{} is being written by process {} (lock {}); one writer at a time", file,
-                 holder_of(descriptor), lock);
+Failure held(const std::string& file, int descriptor, const std::string& lock) {
+  return failure(ErrorCode::kConflict, "process {} is writing it (lock {})", holder_of(descriptor), lock)
+      .in(file)
+      .next("one writer at a time");
 }
 
 }  // namespace
@@ -38,7 +39,7 @@ Status WriterLock::look(const std::string& file) {
   const WriterLock lock(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (lock.descriptor_ < 0) {
     if (errno == ENOENT) return {};
-    return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, std::strerror(errno));
+    return failure(ErrorCode::kInternal, "cannot be opened: {}", std::strerror(errno)).in(path);
   }
   if (::flock(lock.descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return {};
   return held(file, lock.descriptor_, path);
@@ -47,17 +48,17 @@ Status WriterLock::look(const std::string& file) {
 Result<WriterLock> WriterLock::take(const std::string& file) {
   const std::string path = lock_path_of(file);
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor < 0) return failure(ErrorCode::kInternal, "{}: cannot be opened: {}", path, std::strerror(errno));
+  if (descriptor < 0) return failure(ErrorCode::kInternal, "cannot be opened: {}", std::strerror(errno)).in(path);
   WriterLock lock(descriptor);
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) {
-      return failure(ErrorCode::kInternal, "{}: cannot be locked: {}", path, std::strerror(errno));
+      return failure(ErrorCode::kInternal, "cannot be locked: {}", std::strerror(errno)).in(path);
     }
     return held(file, descriptor, path);
   }
   const std::string pid = std::to_string(::getpid()) + "\n";
   if (::ftruncate(descriptor, 0) != 0 || ::pwrite(descriptor, pid.data(), pid.size(), 0) < 0) {
-    return failure(ErrorCode::kInternal, "{}: cannot be written: {}", path, std::strerror(errno));
+    return failure(ErrorCode::kInternal, "cannot be written: {}", std::strerror(errno)).in(path);
   }
   return lock;
 }

@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
+
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 std::string repeated(const std::string& part, std::size_t times) {
   std::string text;
@@ -12,15 +17,19 @@ std::string repeated(const std::string& part, std::size_t times) {
   return text;
 }
 
-std::string message(const std::string& json, const JsonLimits& limits = {}) {
+Refusal refusal(const std::string& json, const JsonLimits& limits = {}) {
   const Status fine = check_json_limits(json, "x.json", limits);
-  return fine ? "" : fine.error().message;
+  return refusal_of(fine);
+}
+
+Refusal too_large(double count, double limit) {
+  return Refusal("x.json").of(ErrorCode::kTooLarge).beyond(count, limit);
 }
 
 TEST(JsonGuard, WhatIsWithinTheLimitsPasses) {
-  EXPECT_EQ(message("{}"), "");
-  EXPECT_EQ(message(R"({"a": [1, -2.5e-3, "b\"]]]", true, null], "c": {"d": []}})"), "");
-  EXPECT_EQ(message(repeated("[", 16) + repeated("]", 16)), "");
+  EXPECT_EQ(refusal("{}"), Refusal::none());
+  EXPECT_EQ(refusal(R"({"a": [1, -2.5e-3, "b\"]]]", true, null], "c": {"d": []}})"), Refusal::none());
+  EXPECT_EQ(refusal(repeated("[", 16) + repeated("]", 16)), Refusal::none());
 }
 
 TEST(JsonGuard, TooMuchOfAnythingIsRefusedAndNamedWithItsLimit) {
@@ -28,22 +37,22 @@ TEST(JsonGuard, TooMuchOfAnythingIsRefusedAndNamedWithItsLimit) {
   limits.bytes = 200;
   limits.values = limits.members = limits.containers = 5;
   limits.text_bytes = limits.scalar_bytes = 10;
-  EXPECT_EQ(message(std::string(201, ' '), limits), "x.json: 201 bytes, limit 200");
-  EXPECT_EQ(message(repeated("[", 17)), "x.json: 17 arrays and objects inside one another, limit 16");
-  EXPECT_EQ(message(repeated("{\"\":", 17)), "x.json: 17 arrays and objects inside one another, limit 16");
-  EXPECT_EQ(message(repeated("[],", 6), limits), "x.json: 6 arrays and objects, limit 5");
-  EXPECT_EQ(message(repeated("1,", 6), limits), "x.json: 6 values, limit 5");
-  EXPECT_EQ(message(repeated(":", 6), limits), "x.json: 6 keys, limit 5");
-  EXPECT_EQ(message('"' + std::string(20, 'x') + '"', limits), "x.json: 22 bytes in one text, limit 10");
-  EXPECT_EQ(message(std::string(20, '7'), limits), "x.json: 20 bytes in one number, limit 10");
-  EXPECT_EQ(message("]"), "x.json: not JSON: byte 0 closes what was not opened");
+  EXPECT_EQ(refusal(std::string(201, ' '), limits), too_large(201, 200));
+  EXPECT_EQ(refusal(repeated("[", 17)), too_large(17, 16));
+  EXPECT_EQ(refusal(repeated("{\"\":", 17)), too_large(17, 16));
+  EXPECT_EQ(refusal(repeated("[],", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal(repeated("1,", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal(repeated(":", 6), limits), too_large(6, 5));
+  EXPECT_EQ(refusal('"' + std::string(20, 'x') + '"', limits), too_large(22, 10));
+  EXPECT_EQ(refusal(std::string(20, '7'), limits), too_large(20, 10));
+  EXPECT_EQ(refusal("]"), Refusal("x.json"));
 }
 
 TEST(JsonGuard, MillionsOfBracketsTakeNeitherStackNorMemory) {
   for (const char* part : {"[", "{\"a\":", "[[],", "\"", "\\", "{\"\\\"", ",", ":"}) {
-    static_cast<void>(message(repeated(part, 10'000'000)));  // ends, whatever it says
+    static_cast<void>(refusal(repeated(part, 10'000'000)));  // ends, whatever it says
   }
-  EXPECT_NE(message(repeated("[", 30'000'000)), "");
+  EXPECT_FALSE(check_json_limits(repeated("[", 30'000'000), "x.json", {}));
 }
 
 TEST(JsonGuard, MembersAreTheBytesOfTheText) {

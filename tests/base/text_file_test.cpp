@@ -8,10 +8,14 @@
 #include <array>
 #include <filesystem>
 
+#include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 namespace fs = std::filesystem;
 
@@ -32,8 +36,7 @@ TEST(TextFile, WhatIsWrittenReadsBackAndReplacesWhatWasThere) {
 TEST(TextFile, AFailedWriteLeavesNothing) {
   const test::TemporaryFolder folder;
   const Status written = write_text_file(folder.file("no/such/a.txt"), "text");
-  ASSERT_FALSE(written);
-  EXPECT_NE(written.error().message.find("no/such/a.txt: cannot be written"), std::string::npos);
+  EXPECT_EQ(refusal_of(written), Refusal(folder.file("no/such/a.txt")));
   EXPECT_FALSE(write_text_file(folder.path().string(), "text")) << "a folder is no file";
   EXPECT_EQ(files_in(folder), 0u);
 }
@@ -65,9 +68,7 @@ TEST(TextFile, RefusesToReadWhatIsMissingAFolderOrTooLarge) {
   EXPECT_FALSE(read_text_file(folder.file("missing")));
   EXPECT_FALSE(read_text_file(folder.path().string()));
   const auto large = read_text_file(folder.write("large", "12345"), 4);
-  ASSERT_FALSE(large);
-  EXPECT_EQ(large.error().code, ErrorCode::kTooLarge);
-  EXPECT_NE(large.error().message.find("5 bytes, limit 4"), std::string::npos);
+  EXPECT_EQ(refusal_of(large), Refusal(folder.file("large")).of(ErrorCode::kTooLarge).beyond(5, 4));
 }
 
 }  // namespace

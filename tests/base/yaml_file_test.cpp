@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
+
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 std::string repeated(const std::string& part, int times) {
   std::string text;
@@ -22,21 +27,41 @@ TEST(YamlFile, WhatPeopleWritePasses) {
 }
 
 TEST(YamlFile, WhatNobodyWritesIsRefusedBeforeItIsBuilt) {
-  const std::vector<std::pair<std::string, std::string>> wrong = {
-      {"a: " + std::string(1 << 20, 'x'), "bytes, limit 1048576"},
-      {repeated("[", 1'000'000), "inside one another"},
-      {"a: " + repeated("[", 21) + repeated("]", 21), "inside one another, limit 20"},
-      {repeated("{a: ", 200'000), "inside one another"},
-      {repeated("- ", 500'000), "inside one another"},
-      {repeated("? ", 500'000), "inside one another"},
-      {"a: [" + repeated("1,", 30'000) + "1]", "20001 entries, limit 20000"},
-      {"a: &a 1\nb: [" + repeated("*a, ", 101) + "]", "101 aliases, limit 100"}};
-  for (const auto& [text, part] : wrong) {
-    const Result<std::size_t> keys = keys_of(text);
-    ASSERT_FALSE(keys) << part;
-    EXPECT_NE(keys.error().message.find(part), std::string::npos) << keys.error().message;
-    EXPECT_EQ(keys.error().message.rfind("x.yaml", 0), 0u) << keys.error().message;
-  }
+  const auto too_large = [](double count, double limit) {
+    return Refusal("x.yaml").of(ErrorCode::kTooLarge).beyond(count, limit);
+  };
+  const std::vector<std::pair<std::string, Refusal>> wrong = {
+      {"a: " + std::string(1 << 20, 'x'), too_large(1048579, 1048576)},
+      {repeated("[", 1'000'000), too_large(21, 20)},
+      {"a: " + repeated("[", 21) + repeated("]", 21), too_large(21, 20)},
+      {repeated("{a: ", 200'000), too_large(21, 20)},
+      {repeated("- ", 500'000), too_large(21, 20)},
+      {repeated("? ", 500'000), too_large(21, 20)},
+      {"a: [" + repeated("1,", 30'000) + "1]", too_large(20001, 20000)},
+      {"a: &a 1\nb: [" + repeated("*a, ", 101) + "]", too_large(101, 100)}};
+  for (const auto& [text, expected] : wrong) EXPECT_EQ(refusal_of(keys_of(text)), expected) << text.substr(0, 20);
+}
+
+TEST(YamlFile, ARefusalHasTheLineAndTheWayToItsKey) {
+  const auto weight = [](const YamlMap& map) { return map.map("tools").maps("list").at(1).number("mass_kg"); };
+  const auto refused = [&](const std::string& text) { return refusal_of(read_yaml(text, "x.yaml", weight)); };
+  EXPECT_EQ(refused("a: 1\ntools:\n  list:\n    - {mass_kg: 1}\n    - b: 2\n      mass_kg: heavy\n"),
+            Refusal("x.yaml", 6, "tools: list 2: mass_kg").text("heavy"));
+  EXPECT_EQ(refused("tools: {list: [{}, {b: 2}]}\n"), Refusal("x.yaml", 1, "tools: list 2: mass_kg"));
+  EXPECT_EQ(refused("a: 1\ntools: [1\n"), Refusal("x.yaml", 3));
+}
+
+TEST(YamlFile, AllThatIsWrongIsToldAtOnce) {
+  const auto read = read_yaml("a: 1\nbb: x\ncc: y\n", "x.yaml", [](const YamlMap& map) {
+    map.only({"a", "bb", "cc2"});
+    map.attempt([&] { static_cast<void>(map.number("bb")); });
+    return map.number("a");
+  });
+  ASSERT_FALSE(read);
+  const std::vector<Error> each = apart(read.error());
+  ASSERT_EQ(each.size(), 2u);
+  EXPECT_EQ(Refusal(each[0]), Refusal("x.yaml", 3, "cc"));
+  EXPECT_EQ(Refusal(each[1]), Refusal("x.yaml", 2, "bb").text("x"));
 }
 
 TEST(YamlFile, AliasesThatUnfoldToBillionsAreHarmless) {

@@ -23,6 +23,7 @@
 #include "server/bias/search/hyperparameter_search.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/bias/bias_data.h"
+#include "tests/support/figure.h"
 #include "tests/support/outside.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
@@ -324,7 +325,19 @@ void beside_sklearn(bool quick) {
 // together; true outsiders caught and insiders refused.
 std::string share(int part, int all) { return all == 0 ? "none" : fmt::format("{:.1f} %", 100.0 * part / all); }
 
+/// The least and the most of a share, in %.
+struct Range {
+  double least = 100, most = 0;
+  void take(double percent) {
+    least = std::min(least, percent);
+    most = std::max(most, percent);
+  }
+};
+
+double percent(int part, int all) { return all == 0 ? 0 : 100.0 * part / all; }
+
 void beyond_the_poses(bool quick) {
+  Range within, farther, caught, refused;
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
   std::printf("\n%-8s %-6s %6s", "box", "model", "learnt");
   for (const char* band : {"within", "to 0.1 ranges", "to 0.3", "to 1", "farther"}) std::printf(" | %21s", band);
@@ -340,12 +353,21 @@ void beyond_the_poses(bool quick) {
         for (const test::OutsideBand& band : figures.bands) {
           std::printf(" | %6.3f %6.3f %5.1f %%", to_mm(band.rms), to_mm(band.stddev), 100 * band.coverage_95);
         }
+        within.take(100 * figures.bands.front().coverage_95);
+        farther.take(100 * figures.bands.back().coverage_95);
+        if (figures.outsiders > 0) caught.take(percent(figures.caught, figures.outsiders));
+        refused.take(percent(figures.refused, figures.insiders));
         std::printf(" | %8s %8s\n", share(figures.caught, figures.outsiders).c_str(),
                     share(figures.refused, figures.insiders).c_str());
         std::fflush(stdout);
       }
     }
   }
+  test::tell_figure("within the poses, least inside 95 %", within.least);
+  test::tell_figure("within the poses, most inside 95 %", within.most);
+  test::tell_figure("a joint range and more out, least inside 95 %", farther.least);
+  test::tell_figure("true outsiders not in domain, least %", caught.least);
+  test::tell_figure("insiders refused, most %", refused.most);
 }
 
 }  // namespace

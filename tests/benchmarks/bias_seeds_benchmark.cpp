@@ -8,8 +8,11 @@
 
 #include "server/base/check.h"
 #include "server/bias/bias_model.h"
+#include "server/calibrate/calibrate.h"
+#include "server/measurement/checked_batch.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/repeats.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/virtual_robot.h"
 
@@ -36,7 +39,7 @@ BiasProblem left_by(const std::shared_ptr<const Cell>& cell, const std::vector<s
 // Every pose whose id ends in 0 to 6, as the tests train on.
 BiasProblem measured_ur10(const std::string& file) {
   const auto cell = std::make_shared<const Cell>(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml").value());
-  MeasurementBatch batch = check_against_cell(read_batch_csv(file).value(), *cell).value();
+  MeasurementBatch batch = check_against_cell(read_batch_csv(file).value(), *cell).value().rows();
   std::erase_if(batch.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
   batch = merge_repeats(batch, cell->tracker.sigma).batch;
   return left_by(cell, {"base", "geometry", "compliance", "tool"}, batch);

@@ -256,7 +256,8 @@ void print_named(const Results& results) {
   for (const auto& [row, aim] : {std::pair{"60", "95"}, {"120", "99"}}) {
     const Results some = of_rows(results, {std::string("named") + row});
     print(fmt::format("named exactly, lambda {}", row), share(some, exact), aim);
-    print("  of these: lambda 15 or more beside the closest imitator", share(apart_from_rivals(some), exact), aim);
+    print(fmt::format("  of these, {} with 15 or more beside the closest imitator", row),
+          share(apart_from_rivals(some), exact), aim);
   }
   Results detected = of_rows(results, {"named60", "named120"});
   std::erase_if(detected, [](const TrialResult& r) { return !r.judgement.detected; });
@@ -272,6 +273,10 @@ void print_abstaining(const Results& results) {
             share(some, [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }), "<= 1");
     }
   }
+  print("false names, all nulls",
+        share(of_rows(results, {"null", "null_unrecorded"}),
+              [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }),
+        "<= 1");
   const Results unrecorded = of_rows(results, {"unrecorded"});
   print("column not recorded: the truth among what is found, lambda 120",
         share(unrecorded, [](const TrialResult& r) { return r.judgement.unrecorded_rightly; }), ">= 90");

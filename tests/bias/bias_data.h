@@ -4,9 +4,13 @@
 #include <random>
 
 #include "server/bias/bias_model.h"
+#include "server/bias/kernels/kernel_spelling.h"
 
 /// Made-up residuals of a six-joint robot, for the tests and the benchmarks of the bias.
 namespace trammel {
+
+/// The kernel that is spelled so; null where none is.
+inline KernelPtr make_kernel(std::string_view spelling) { return spelled_kernel(spelling).value_or(nullptr); }
 
 inline Eigen::MatrixXd random_joints(Eigen::Index count, std::uint64_t seed, Eigen::Index joints = 6) {
   std::mt19937_64 random(seed);

@@ -4,9 +4,13 @@
 
 #include "server/bias/bias_model.h"
 #include "tests/bias/coupled_arm.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -145,30 +149,26 @@ TEST(CoupledModel, GrowsAsIfConditionedAnewAndRefitsFromWhereItWas) {
 }
 
 TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {
-  const auto message = [](const BiasProblem& problem, const std::string& kernel) {
+  const auto refusal = [](const BiasProblem& problem, const std::string& kernel) {
     const auto model = BiasModel::fit(problem, spelled(kernel));
-    return model ? "" : model.error().message;
+    return refusal_of(model);
   };
   BiasProblem problem = gear_problem(20, 5);
   problem.features.pop_back();
-  EXPECT_EQ(message(problem, "se + joint_map"),
-            "bias data: features of 19 poses for 20 observations, kernel `se + joint_map` needs them");
+  EXPECT_EQ(refusal(problem, "se + joint_map"), Refusal("bias data", {}, "features").beyond(19, 20));
   problem = gear_problem(20, 5);
   problem.features[7].by_parameter.resize(6, 1);
-  EXPECT_EQ(message(problem, "se + parameters"),
-            "bias data row 8: features are 6 x 3 and 6 x 1, should be 6 x 3 and 6 x 2");
+  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
   problem = gear_problem(20, 5);
   problem.features[7].by_joint(2, 2) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(message(problem, "se + parameters"), "bias data row 8: a feature is not finite");
-  EXPECT_EQ(message(gear_problem(4001, 5), "se + joint_map"),
-            "bias kernel `se + joint_map`: 4001 observations, at most 4000 with joint_map or parameters");
-  EXPECT_EQ(message(gear_problem(20, 5), "se * joint_map"),
-            "bias kernel `se * joint_map`: `joint_map` can only be added to a whole bias, as in `se + joint_map`");
+  EXPECT_EQ(refusal(problem, "se + parameters"), Refusal("bias data", 8, "features"));
+  EXPECT_EQ(refusal(gear_problem(4001, 5), "se + joint_map"),
+            Refusal("", {}, "bias").beyond(4001, 4000).text("se + joint_map"));
+  EXPECT_EQ(refusal(gear_problem(20, 5), "se * joint_map"), Refusal("", {}, "bias").text("se * joint_map"));
 
   BiasState state = fitted().state();
   state.block_hyperparameters.conservativeResize(4);
-  EXPECT_EQ(BiasModel::restore(state).error().message,
-            "bias state: 4 hyperparameters of blocks, should be 6 for kernel `se + joint_map + parameters`");
+  EXPECT_EQ(refusal_of(BiasModel::restore(state)), Refusal("", {}, "block_hyperparameters").beyond(4, 6));
 }
 
 TEST(CoupledModel, StopsWhenTold) {
@@ -176,7 +176,7 @@ TEST(CoupledModel, StopsWhenTold) {
   options.progress = [](double share) { return share < 0.2; };
   const auto model = BiasModel::fit(gear_problem(60, 6), options);
   ASSERT_FALSE(model.has_value());
-  EXPECT_EQ(model.error().message, "bias fit: given up on request");
+  EXPECT_EQ(refusal_of(model), Refusal().of(ErrorCode::kBusy));
   EXPECT_EQ(model.error().code, ErrorCode::kBusy);
 }
 

@@ -9,9 +9,13 @@
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/numerics.h"
 #include "tests/bias/bias_data.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -216,24 +220,20 @@ TEST(Kernel, ALoneWordIsThatKernelItself) {
 }
 
 TEST(Kernel, RefusesASpellingAtTheWordOrCharacterThatIsWrong) {
-  const std::string known =
-      "known are none and auto (alone), se, matern32, matern52, periodic, rational_quadratic, linear, white, and to be "
-      "added "
-      "joint_map, parameters";
-  const std::vector<std::pair<std::string, std::string>> cases = {
-      {"se + gauss", "bias kernel `se + gauss`: `gauss` is unknown; " + known},
-      {"none + se", "bias kernel `none + se`: `none` is unknown; " + known},
-      {"", "bias kernel ``, character 1: a kernel is expected"},
-      {"se +", "bias kernel `se +`, character 5: a kernel is expected"},
-      {"se se", "bias kernel `se se`, character 4: `+`, `*` or the end is expected"},
-      {"(se + white", "bias kernel `(se + white`, character 12: `)` is expected"},
-      {"se(tan)", "bias kernel `se(tan)`, character 7: `se(sincos)` is expected"},
-      {"se)", "bias kernel `se)`, character 3: `+`, `*` or the end is expected"}};
-  for (const auto& [spelling, message] : cases) {
+  const std::vector<std::pair<std::string, int>> cases = {
+      {"", 1}, {"se +", 5}, {"se se", 4}, {"(se + white", 12}, {"se(tan)", 7}, {"se)", 3}};
+  for (const auto& [spelling, character] : cases) {
+    EXPECT_EQ(refusal_of(spelled_kernel(spelling)), Refusal("", {}, "bias").value(character).text(spelling))
+        << spelling;
+  }
+  const std::vector<std::pair<std::string, std::string>> unknown_words = {{"se + gauss", "gauss"},
+                                                                          {"none + se", "none"}};
+  for (const auto& [spelling, word] : unknown_words) {
     const auto kernel = spelled_kernel(spelling);
-    ASSERT_FALSE(kernel.has_value()) << spelling;
-    EXPECT_EQ(kernel.error().code, ErrorCode::kRefused);
-    EXPECT_EQ(kernel.error().message, message);
+    EXPECT_EQ(refusal_of(kernel), Refusal("", {}, "bias").text(word));
+    for (const char* known : {"auto", "se", "matern52", "periodic", "joint_map", "parameters"}) {
+      EXPECT_TRUE(kernel.error().next.find(known) != std::string::npos) << known;
+    }
   }
   EXPECT_FALSE(spelled_kernel(std::string(100000, '(')).has_value());
 }
@@ -251,26 +251,13 @@ TEST(Kernel, ABiasIsSpelledAsAKernelAndTheBlocksAddedToIt) {
 }
 
 TEST(Kernel, ABlockThatIsNotASummandOfTheWholeBiasIsRefused) {
-  const auto misplaced = [](const std::string& spelling, const std::string& block) {
-    return std::pair{spelling, "bias kernel `" + spelling + "`: `" + block +
-                                   "` can only be added to a whole bias, as in `se + " + block + "`"};
-  };
-  const std::vector<std::pair<std::string, std::string>> cases = {
-      misplaced("se * joint_map", "joint_map"),
-      misplaced("joint_map * se", "joint_map"),
-      misplaced("(se + parameters)", "parameters"),
-      misplaced("se + joint_map(sincos)", "joint_map"),
-      {"joint_map", "bias kernel `joint_map`: a kernel is expected beside `joint_map`, for instance `se + joint_map`"},
-      {"parameters + joint_map",
-       "bias kernel `parameters + joint_map`: a kernel is expected beside `parameters`, for instance `se + "
-       "parameters`"},
-      {"se + joint_map + joint_map", "bias kernel `se + joint_map + joint_map`: `joint_map` is named twice"},
-      {"se + joint_map white", "bias kernel `se + joint_map white`, character 16: `+`, `*` or the end is expected"},
-      {"se + joint_map +", "bias kernel `se + joint_map +`, character 17: a kernel is expected"}};
-  for (const auto& [spelling, message] : cases) {
-    const Status fine = check_bias_spelling(spelling);
-    ASSERT_FALSE(fine.has_value()) << spelling;
-    EXPECT_EQ(fine.error().message, message);
+  for (const std::string spelling : {"se * joint_map", "joint_map * se", "(se + parameters)", "se + joint_map(sincos)",
+                                     "joint_map", "parameters + joint_map", "se + joint_map + joint_map"}) {
+    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").text(spelling)) << spelling;
+  }
+  const std::vector<std::pair<std::string, int>> cases = {{"se + joint_map white", 16}, {"se + joint_map +", 17}};
+  for (const auto& [spelling, character] : cases) {
+    EXPECT_EQ(refusal_of(check_bias_spelling(spelling)), Refusal("", {}, "bias").value(character).text(spelling));
   }
   EXPECT_FALSE(spelled_kernel("se + joint_map").has_value()) << "a kernel has no blocks";
 }

@@ -9,9 +9,13 @@
 #include "server/base/units.h"
 #include "server/robot/arm_state.h"
 #include "server/robot/cell.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 Chain shipped(const std::string& file) {
   const Result<Chain> chain = read_robot(TRAMMEL_SOURCE_DIR "/models/" + file);
@@ -273,34 +277,34 @@ TEST(CirclePoint, TheMeasuredRobotAndBasePutReflectorsWhereTheyWereSeen) {
 TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   const Chain nominal = shipped("abb_irb6640-205-275.yaml");
   const ArcList good = measured(nominal, table_4_1(), 1);
-  const auto message = [&](const ArcList& arcs, const Chain& robot) {
+  const auto refusal = [&](const ArcList& arcs, const Chain& robot) {
     const Result<CirclePointResult> result = analyse_circle_points(robot, arcs, {});
     EXPECT_FALSE(result);
-    return result ? std::string() : result.error().message;
+    return refusal_of(result);
   };
   ArcList missing = good;
   std::erase_if(missing.points, [](const ArcPoint& point) { return point.joint == 3; });
-  EXPECT_EQ(message(missing, nominal), "arcs.csv: no arc of joint 4");
+  EXPECT_EQ(refusal(missing, nominal), Refusal(good.where, {}, "joint").value(4));
   ArcList few = good;
   few.points.erase(few.points.begin());
-  EXPECT_NE(message(few, nominal).find("joint 1 has 4 points, at least 5"), std::string::npos);
+  EXPECT_EQ(refusal(few, nominal), Refusal(good.where, 3, "joint").beyond(4, 5));
   ArcList moved = good;
   moved.points[6].q(4) = 0.1;
-  EXPECT_NE(message(moved, nominal).find("row 8: joint 5 is at 5.72958 deg"), std::string::npos);
+  EXPECT_EQ(refusal(moved, nominal), Refusal(good.where, 8, "q5_deg").beyond(5.72958, 0));
   ArcList wrong_angle = good;
   wrong_angle.points[6].q(1) += from_deg(3);
-  EXPECT_NE(message(wrong_angle, nominal).find("joint 2 turned"), std::string::npos);
+  EXPECT_EQ(refusal(wrong_angle, nominal), Refusal(good.where, 8, "q_deg").beyond(2.57143, 1));
   ArcList line = good;
   for (ArcPoint& point : line.points) {
     if (point.joint == 1) point.p_W = Vector3(point.q(1), 0, 0);
   }
-  EXPECT_NE(message(line, nominal).find("joint 2 lie on a line"), std::string::npos);
-  EXPECT_NE(message(good, shipped("abb_irb1200-5-09.yaml")).find("limit"), std::string::npos);
+  EXPECT_EQ(refusal(line, nominal), Refusal(good.where, 7, "joint").value(2));
+  EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")), Refusal(good.where, {}, "a1").beyond(320, 100));
   std::vector<Joint> plain;
   for (int i = 0; i < 6; ++i) plain.push_back(nominal.joint(i));
   plain[1].hayati = false;
-  EXPECT_NE(message(good, *Chain::make("plain", plain)).find("must be a Hayati one"), std::string::npos);
-  EXPECT_NE(message(good, shipped("abb_irb6640-205-275-on-rail.yaml")).find("slides"), std::string::npos);
+  EXPECT_EQ(refusal(good, *Chain::make("plain", plain)), Refusal("", {}, "joints 2: hayati"));
+  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal("", {}, "joint 1"));
 }
 
 TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {
@@ -316,11 +320,11 @@ TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {
   EXPECT_NEAR(point.q(0), from_deg(10), 1e-12);
   EXPECT_NEAR(point.q(1), from_deg(-45), 1e-12);  // the turning joint's own angle
   EXPECT_NEAR(point.p_W.z(), 0.3, 1e-12);
-  const auto message = [&](const std::string& text) { return parse_arcs_csv(text, "a.csv", robot).error().message; };
-  EXPECT_NE(message("joint,q_deg,x_mm,y_mm\n").find("z_mm"), std::string::npos);
-  EXPECT_NE(message("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n").find("a.csv row 2"), std::string::npos);
-  EXPECT_NE(message("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n").find("a.csv row 2"), std::string::npos);
-  EXPECT_NE(message("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n").find("has 6 joints"), std::string::npos);
+  const auto refusal = [&](const std::string& text) { return refusal_of(parse_arcs_csv(text, "a.csv", robot)); };
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm\n"), Refusal("a.csv", {}, "z_mm"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n7,0,1,2,3\n"), Refusal("a.csv", 2, "joint").beyond(7, 6));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm\n1,0,1,far,3\n"), Refusal("a.csv", 2, "y_mm").text("far"));
+  EXPECT_EQ(refusal("joint,q_deg,x_mm,y_mm,z_mm,q1_deg\n1,0,1,2,3,0\n"), Refusal("a.csv").beyond(1, 6));
 }
 
 }  // namespace

@@ -4,10 +4,14 @@
 
 #include <filesystem>
 
+#include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel::cli {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 class OutputsTest : public testing::Test {
  protected:
@@ -65,7 +69,7 @@ TEST_F(OutputsTest, AreWrittenAllOrNone) {
   std::filesystem::remove(file("later"));
   const Status written = outputs.write();
   ASSERT_FALSE(written);
-  EXPECT_NE(written.error().message.find("later/b"), std::string::npos) << written.error().message;
+  EXPECT_EQ(refusal_of(written), Refusal(file("later/b")));
   EXPECT_EQ(test::read_file(file("a")), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1) << "a part was left";
 

@@ -3,16 +3,20 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel::cli {
 namespace {
 
+using test::Refusal;
+using test::refusal_of;
+
 const std::string kPose = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
 
-std::string refusal(const std::string& text) {
+Refusal refusal(const std::string& text) {
   const auto file = parse_targets_csv(text, "t.csv");
-  return file ? "accepted" : file.error().message;
+  return refusal_of(file);
 }
 
 TEST(TargetFile, ReadsPosesWithABranch) {
@@ -52,32 +56,28 @@ TEST(TargetFile, ReadsJointTargetsAlone) {
 }
 
 TEST(TargetFile, RefusesWhatIsNoTarget) {
-  EXPECT_EQ(refusal(""), "t.csv: empty file, expected a header line with column names");
-  EXPECT_EQ(refusal("a,b\n1,2\n"),
-            "t.csv: neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...); the header has: a,b");
-  EXPECT_EQ(refusal(kPose + "\n1,2,3,1,0,0,0\n"), "t.csv: missing column conf, or q1_deg... as the seed of the poses");
-  EXPECT_EQ(refusal("x_mm,y_mm,q1_deg\n1,2,3\n"),
-            "t.csv: missing column z_mm; x_mm, y_mm, z_mm, qw, qx, qy, qz come all together or not at all");
-  EXPECT_EQ(refusal(kPose + ",conf\n"), "t.csv: no targets below the header, at least 1 is needed");
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), "t.csv row 2: neither conf nor joints as the seed of the pose");
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), "t.csv row 2: conf is 8, expected a whole number from 0 to 7");
-  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"),
-            "t.csv row 2: quaternion qw,qx,qy,qz has length 1.00499, expected 1 (limit 0.001)");
-  EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), "t.csv row 3: q1_deg is nan, expected a finite number");
+  EXPECT_EQ(refusal(""), Refusal("t.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("a,b\n1,2\n"), Refusal("t.csv", {}, "x_mm"));
+  EXPECT_EQ(refusal(kPose + "\n1,2,3,1,0,0,0\n"), Refusal("t.csv", {}, "conf"));
+  EXPECT_EQ(refusal("x_mm,y_mm,q1_deg\n1,2,3\n"), Refusal("t.csv", {}, "z_mm"));
+  EXPECT_EQ(refusal(kPose + ",conf\n"), Refusal("t.csv").beyond(0, 1));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,\n"), Refusal("t.csv", 2, "conf"));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0,8\n"), Refusal("t.csv", 2, "conf").beyond(8, 7));
+  EXPECT_EQ(refusal(kPose + ",conf\n1,2,3,1,0,0,0.1,1\n"), Refusal("t.csv", 2, "qw").beyond(1.00499, 1));
+  EXPECT_EQ(refusal("q1_deg\n1\nnan\n"), Refusal("t.csv", 3, "q1_deg").text("nan"));
 }
 
 TEST(TargetFile, IsHeldAgainstTheRobot) {
   const Chain robot = test::small_cell("c")->robot;
   const auto check = [&](const std::string& text, const Chain& chain) {
     const Status checked = check_targets(parse_targets_csv(text, "t.csv").value(), chain);
-    return checked ? "fits" : checked.error().message;
+    return refusal_of(checked);
   };
-  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", robot), "fits");
-  EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), "t.csv: 2 joint columns, robot " + robot.name() + " has 6");
+  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", robot), Refusal::none());
+  EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), Refusal("t.csv").beyond(2, 6));
   const Chain one = Chain::make("turntable", {Joint{}}).value();
-  EXPECT_EQ(check("q1_deg\n1\n", one), "fits");
-  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one),
-            "t.csv row 2: conf is 1, but robot turntable has no spherical wrist to number branches by; give q1_deg...");
+  EXPECT_EQ(check("q1_deg\n1\n", one), Refusal::none());
+  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one), Refusal("t.csv", 2, "conf").value(1));
 }
 
 }  // namespace

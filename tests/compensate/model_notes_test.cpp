@@ -33,8 +33,7 @@ TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
       ASSERT_EQ(notes.size(), 1U) << form;
       EXPECT_EQ(notes.front(),
                 "gearbox compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 "
-                "is M2; give "
-                "payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
+                "is M2; give payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
     }
   }
   EXPECT_TRUE(notes_of(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());

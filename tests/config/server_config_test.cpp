@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
 
 const std::string kShipped = TRAMMEL_SOURCE_DIR "/config/server.yaml";
 
@@ -18,18 +21,17 @@ class ServerConfigTest : public testing::Test {
     folder_.write("cell-8.yaml", test::small_cell_yaml("cell-8"));
   }
   /// What is said of the minimal file with `more` at its end.
-  std::string message_for(const std::string& more) const { return message_of(kMinimal + more); }
-  std::string message_of(const std::string& text) const {
-    const auto config = read_server_config(folder_.write("server.yaml", text));
-    return config ? "accepted" : config.error().message;
+  Refusal refusal_for(const std::string& more) const { return refusal_of(kMinimal + more); }
+  Refusal refusal_of(const std::string& text) const {
+    return test::refusal_of(read_server_config(folder_.write("server.yaml", text)));
+  }
+  Refusal at(std::optional<long> line, const std::string& field = "") const {
+    return Refusal(folder_.file("server.yaml"), line, field);
   }
   ServerConfig read(const std::string& more) const {
     auto config = read_server_config(folder_.write("server.yaml", kMinimal + more));
     EXPECT_TRUE(config) << config.error().message;
     return config.value_or(ServerConfig{});
-  }
-  static void expect_says(const std::string& message, const std::vector<std::string>& parts) {
-    for (const std::string& part : parts) EXPECT_NE(message.find(part), std::string::npos) << part << " in " << message;
   }
 
   static inline const std::string kMinimal = "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n";
@@ -64,10 +66,10 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
 TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
   const std::string shipped = test::read_file(kShipped);
   for (const std::string section : {"", "dds: ", "trainer: ", "log: "}) {
-    const std::string message = message_for(section.empty() ? "bogus: 1\n" : section + "{bogus: 1}\n");
-    const auto list = message.find("known here: ");
-    ASSERT_NE(list, std::string::npos) << message;
-    std::istringstream keys(message.substr(list + 12));
+    const std::string more = section.empty() ? "bogus: 1\n" : section + "{bogus: 1}\n";
+    const auto config = read_server_config(folder_.write("server.yaml", kMinimal + more));
+    ASSERT_FALSE(config);
+    std::istringstream keys(config.error().next.substr(std::string("known here: ").size()));
     for (std::string key; keys >> key;) {
       const auto at = shipped.find((section.empty() ? "\n" : "\n  ") + key + ":");
       ASSERT_NE(at, std::string::npos) << key << " is not in " << kShipped;
@@ -101,52 +103,53 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
 }
 
 TEST_F(ServerConfigTest, RefusesUnknownDoubledAndMissingKeys) {
-  expect_says(message_for("dds: {prot: 17500}\n"), {"server.yaml", "dds", "prot", "unknown key"});
-  expect_says(message_for("trainer: {}\ntrainer: {}\n"), {"server.yaml", "trainer", "twice"});
-  expect_says(message_of("version: 1\nserver: a\nstore: t.db\n"), {"server.yaml", "cells", "missing"});
-  expect_says(message_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), {"version", "expected 1"});
+  EXPECT_EQ(refusal_for("dds: {prot: 17500}\n"), at(5, "dds: prot"));
+  EXPECT_EQ(refusal_for("trainer: {}\ntrainer: {}\n"), at(5, "trainer"));
+  EXPECT_EQ(refusal_of("version: 1\nserver: a\nstore: t.db\n"), at(1, "cells"));
+  EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), at(1, "version").beyond(0, 1));
 }
 
 TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
-  expect_says(message_for("dds: {port: 80}\n"), {"dds", "port", "80", "1024 to 65535"});
-  expect_says(message_for("dds: {domain: 233}\n"), {"domain", "0 to 232"});
-  expect_says(message_for("dds: {peer_ports: [17500]}\n"), {"peer_ports", "own port"});
-  expect_says(message_for("dds: {peer_ports: [1e4]}\n"), {"peer_ports", "1024 to 65535"});
-  expect_says(message_for("dds: {compute_workers: 0}\n"), {"compute_workers", "1 to 64"});
-  expect_says(message_for("trainer: {validation_share: 0}\n"), {"validation_share", "0.05 to 0.5"});
-  expect_says(message_for("trainer: {accept_ratio: -1}\n"), {"accept_ratio", "0.1 to 10"});
-  expect_says(message_for("trainer: {seed: -1}\n"), {"seed", "0 to"});
-  expect_says(message_for("log: {level: loud}\n"), {"log", "level", "loud", "debug"});
+  EXPECT_EQ(refusal_for("dds: {port: 80}\n"), at(5, "dds: port").beyond(80, 1024));
+  EXPECT_EQ(refusal_for("dds: {domain: 233}\n"), at(5, "dds: domain").beyond(233, 232));
+  EXPECT_EQ(refusal_for("dds: {peer_ports: [17500]}\n"), at(5, "dds: peer_ports").value(17500));
+  EXPECT_EQ(refusal_for("dds: {peer_ports: [1e4]}\n"), at(5, "dds: peer_ports").text("1e4"));
+  EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), at(5, "dds: compute_workers").beyond(0, 1));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
+  EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
+  EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), at(5, "trainer: seed").beyond(-1, 0));
+  EXPECT_EQ(refusal_for("log: {level: loud}\n"), at(5, "log: level").text("loud"));
 }
 
 TEST_F(ServerConfigTest, RefusesWrongTypes) {
-  expect_says(message_for("trainer: {queue_capacity: many}\n"), {"queue_capacity", "whole number"});
-  expect_says(message_for("trainer: {validation_share: .nan}\n"), {"validation_share", "finite"});
-  expect_says(message_for("dds: 17500\n"), {"dds", "keys and values"});
-  expect_says(message_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), {"allow_network", "true or false"});
-  expect_says(message_of("- a\n- b\n"), {"server.yaml", "keys and values"});
-  expect_says(message_of("version: [1\n"), {"server.yaml", "not YAML"});
+  EXPECT_EQ(refusal_for("trainer: {queue_capacity: many}\n"), at(5, "trainer: queue_capacity").text("many"));
+  EXPECT_EQ(refusal_for("trainer: {validation_share: .nan}\n"), at(5, "trainer: validation_share").text(".nan"));
+  EXPECT_EQ(refusal_for("dds: 17500\n"), at(5, "dds"));
+  EXPECT_EQ(refusal_for("dds: {allow_network: maybe, address: 10.0.0.1}\n"), at(5, "dds: allow_network").text("maybe"));
+  EXPECT_EQ(refusal_of("- a\n- b\n"), at(1));
+  EXPECT_EQ(refusal_of("version: [1\n"), at(2));
 }
 
 TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
-  expect_says(message_for("dds: {address: 192.168.1.5}\n"), {"address", "192.168.1.5", "allow_network"});
-  expect_says(message_for("dds: {address: 0.0.0.0}\n"), {"address", "allow_network"});
-  expect_says(message_for("dds: {address: localhost}\n"), {"address", "IPv4"});
+  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), at(5, "dds: address").text("192.168.1.5"));
+  EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), at(5, "dds: address").text("0.0.0.0"));
+  EXPECT_EQ(refusal_for("dds: {address: localhost}\n"), at(5, "dds: address").text("localhost"));
   EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true}\n").dds.address, "192.168.1.5");
 }
 
 TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {
   for (const std::string& name : {std::string("\"\""), std::string("a b"), std::string(65, 'x')}) {
-    expect_says(message_of("version: 1\nserver: " + name + "\ncells: [cell-7.yaml]\nstore: t.db\n"), {"server", "64"});
+    EXPECT_EQ(refusal_of("version: 1\nserver: " + name + "\ncells: [cell-7.yaml]\nstore: t.db\n"),
+              at(2, "server").text(name == "\"\"" ? "" : name));
   }
 }
 
 TEST_F(ServerConfigTest, RefusesTwoCellsOfOneNameAndACellThatCannotBeRead) {
   const std::string start = "version: 1\nserver: a\nstore: t.db\n";
   folder_.write("copy.yaml", test::small_cell_yaml("cell-7"));
-  expect_says(message_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), {"cell-7.yaml", "copy.yaml", "both"});
-  expect_says(message_of(start + "cells: [nowhere.yaml]\n"), {"nowhere.yaml"});
-  expect_says(message_of(start + "cells: []\n"), {"cells", "1 to 1024"});
+  EXPECT_EQ(refusal_of(start + "cells: [cell-7.yaml, copy.yaml]\n"), at({}, "cells").text("cell-7"));
+  EXPECT_EQ(refusal_of(start + "cells: [nowhere.yaml]\n"), Refusal(folder_.file("nowhere.yaml")));
+  EXPECT_EQ(refusal_of(start + "cells: []\n"), at(4, "cells").beyond(0, 1));
 }
 
 TEST_F(ServerConfigTest, RefusesAFileThatIsNotThere) { EXPECT_FALSE(read_server_config(folder_.file("nowhere.yaml"))); }

@@ -10,9 +10,13 @@
 #include "server/dds/reply_memory.h"
 #include "server/dds/request_endpoint.h"
 #include "tests/dds/backend.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const wire::Joints kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
@@ -53,14 +57,8 @@ class HandlersTest : public testing::Test {
     return backend_.cell->payloads.empty() ? "" : backend_.cell->payloads.begin()->first;
   }
   template <typename Request>
-  ErrorCode refusal(const Request& request, const std::string& part) {
-    const auto answer = handlers_.answer(request);
-    if (answer) {
-      ADD_FAILURE() << "was answered";
-      return ErrorCode::kInternal;
-    }
-    EXPECT_NE(answer.error().message.find(part), std::string::npos) << answer.error().message;
-    return answer.error().code;
+  Refusal refusal(const Request& request) {
+    return refusal_of(handlers_.answer(request));
   }
 
   test::Backend backend_;
@@ -89,30 +87,30 @@ TEST_F(HandlersTest, AnEmptyRequestIsAnsweredEmpty) {
 }
 
 TEST_F(HandlersTest, ACellWithoutModelIsNotAnswered) {
-  EXPECT_EQ(refusal(predict_request(), "no model in force"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(predict_request()), Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-7"));
 }
 
 TEST_F(HandlersTest, TheContextMustFit) {
   backend_.serve(1);
   auto request = predict_request();
   request.about().cell("cell-9");
-  EXPECT_EQ(refusal(request, "cell-9"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-9"));
   request = predict_request();
   request.about().tool("gripper");
-  EXPECT_EQ(refusal(request, "gripper"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "tool").text("gripper"));
   request = predict_request();
   request.about().payload("anvil");
-  EXPECT_EQ(refusal(request, "anvil"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "payload").text("anvil"));
   request = predict_request();
   request.about().controller_compensates(true);
-  EXPECT_EQ(refusal(request, "does not compensate"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "controller_compensates"));
 }
 
 TEST_F(HandlersTest, JointsOutsideTheLimitsHaveNoPrediction) {
   backend_.serve(1);
   auto request = predict_request(2);
   request.joints_rad()[1][2] = 1.5;  // limit 70 deg
-  EXPECT_EQ(refusal(request, "joint vector 2: joint 3 is 85.9"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(request), Refusal("joint vector 2", {}, "q3_deg").beyond(85.9437, 70));
 }
 
 TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
@@ -120,8 +118,8 @@ TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
   parts.trained_with = {{"probe", ""}};
   backend_.registry.publish(
       std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
-  EXPECT_EQ(refusal(predict_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
-  EXPECT_EQ(refusal(correct_request(), "was not trained with tool 'spindle'"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(predict_request()), Refusal("", {}, "tool_id").text("spindle"));
+  EXPECT_EQ(refusal(correct_request()), Refusal("", {}, "tool_id").text("spindle"));
 }
 
 TEST_F(HandlersTest, AModelIdMustBeTheOneInForce) {
@@ -134,9 +132,9 @@ TEST_F(HandlersTest, AModelIdMustBeTheOneInForce) {
   request.about().model("@2");
   EXPECT_TRUE(handlers_.answer(request));
   request.about().model("0123456789ab");
-  EXPECT_EQ(refusal(request, "0123456789ab"), ErrorCode::kConflict);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "model").of(ErrorCode::kConflict).text("0123456789ab"));
   request.about().model("@2x");
-  EXPECT_EQ(refusal(request, "@2x"), ErrorCode::kConflict);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "model").of(ErrorCode::kConflict).text("@2x"));
 }
 
 TEST_F(HandlersTest, AStoredVersionAnswersWhenItIsNamed) {
@@ -152,29 +150,30 @@ TEST_F(HandlersTest, AStoredVersionAnswersWhenItIsNamed) {
     EXPECT_FALSE(reply->model().in_force());
   }
   request.about().model("@7");
-  EXPECT_EQ(refusal(request, "7"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "version").of(ErrorCode::kNotFound).value(7));
 }
 
 TEST_F(HandlersTest, WrongNumbersAreRefusedWithTheirPlace) {
   backend_.serve(1);
   auto request = predict_request(3);
   request.joints_rad()[2] = {1, 2, 3};
-  EXPECT_EQ(refusal(request, "joint vector 3: 3 joint values"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "joints_rad").beyond(3, 6));
   request.joints_rad()[2] = {1, 2, kNaN, 4, 5, 6};
-  EXPECT_EQ(refusal(request, "joint vector 3: joint 3 is not finite"), ErrorCode::kRefused);
-  EXPECT_EQ(refusal(predict_request(static_cast<int>(wire::MAX_TARGETS) + 1), "10001"), ErrorCode::kTooLarge);
+  EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "joints_rad").value(kNaN));
+  EXPECT_EQ(refusal(predict_request(static_cast<int>(wire::MAX_TARGETS) + 1)),
+            Refusal().of(ErrorCode::kTooLarge).beyond(wire::MAX_TARGETS + 1, wire::MAX_TARGETS));
 
   auto correct = correct_request();
   correct.targets()[0].kind(wire::TARGET_POSE_NEAR_JOINTS);
   correct.targets()[0].pose().qw(0.5);
-  EXPECT_EQ(refusal(correct, "target 1: the quaternion has length 0.5"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(correct), Refusal("target 1", {}, "pose").beyond(0.5, 1));
   correct.targets()[0].pose().qw(1);
   correct.targets()[0].pose().x_mm(std::numeric_limits<double>::infinity());
-  EXPECT_EQ(refusal(correct, "target 1: the pose is not finite"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(correct), Refusal("target 1", {}, "pose"));
   correct.targets()[0].pose().x_mm(0);
   correct.targets()[0].kind(wire::TARGET_POSE_ON_BRANCH);
   correct.targets()[0].conf(8);
-  EXPECT_EQ(refusal(correct, "branch 8"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(correct), Refusal("target 1", {}, "conf").beyond(8, 7));
 }
 
 TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
@@ -273,17 +272,17 @@ TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
 
   auto another = submit_request("lt-07");
   another.header().request_id().sequence_number(6);
-  EXPECT_EQ(refusal(another, "lt-07"), ErrorCode::kConflict);
-  EXPECT_EQ(refusal(submit_request(""), "without an id"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(another), Refusal("", {}, "batch").of(ErrorCode::kConflict).text("lt-07"));
+  EXPECT_EQ(refusal(submit_request("")), Refusal("", {}, "batch_id"));
   auto bad = submit_request("lt-08");
   bad.csv("q1_deg,x_mm\n1,2\n");
-  EXPECT_EQ(refusal(bad, "lt-08"), ErrorCode::kRefused);
+  EXPECT_EQ(refusal(bad), Refusal("batch lt-08", {}, "y_mm"));
 }
 
 TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
   wire::TrainRequest request;
   request.about().cell("cell-7");
-  EXPECT_EQ(refusal(request, "cell-7"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(request), Refusal("", {}, "batch").of(ErrorCode::kNotFound));
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   request.batch_ids({"lt-07"});
   const auto job = handlers_.answer(request);
@@ -294,7 +293,7 @@ TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
   ASSERT_TRUE(state) << state.error().message;
   EXPECT_EQ(state->job().stage(), wire::JOB_QUEUED);
   look.job(99);
-  EXPECT_EQ(refusal(look, "99"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(look), Refusal("", {}, "job").of(ErrorCode::kNotFound).value(99));
 }
 
 TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
@@ -302,11 +301,13 @@ TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
     ASSERT_TRUE(
         backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, "by hand"));
   }
-  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ROLLBACK), "cell-7"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ROLLBACK)),
+            Refusal("", {}, "cell").of(ErrorCode::kNotFound).text("cell-7"));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
   ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 2)));
   EXPECT_EQ(backend_.registry.in_force("cell-7")->version, 2);
-  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ACTIVATE, 9), "9"), ErrorCode::kNotFound);
+  EXPECT_EQ(refusal(manage_request(wire::MANAGE_ACTIVATE, 9)),
+            Refusal("", {}, "version").of(ErrorCode::kNotFound).value(9));
   const auto back = handlers_.answer(manage_request(wire::MANAGE_ROLLBACK));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->version(), 1);

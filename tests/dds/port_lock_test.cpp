@@ -7,9 +7,13 @@
 #include <unistd.h>
 
 #include "tests/dds/backend.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 constexpr const char* kHere = "127.0.0.1";
 
@@ -21,7 +25,7 @@ TEST(PortLock, ASecondServerOnThePortIsRefused) {
     const auto second = PortLock::take(kHere, port);
     ASSERT_FALSE(second);
     EXPECT_EQ(second.error().code, ErrorCode::kConflict);
-    EXPECT_NE(second.error().message.find(std::to_string(port)), std::string::npos);
+    EXPECT_EQ(refusal_of(second), Refusal("", {}, "port").of(ErrorCode::kConflict).value(port));
     EXPECT_TRUE(PortLock::take(kHere, static_cast<std::uint16_t>(port + 1)));
   }
   EXPECT_TRUE(PortLock::take(kHere, port));
@@ -38,7 +42,7 @@ TEST(PortLock, APortOfAnotherProgramIsRefused) {
   const auto lock = PortLock::take(kHere, port);
   ::close(other);
   ASSERT_FALSE(lock);
-  EXPECT_NE(lock.error().message.find("another program"), std::string::npos);
+  EXPECT_EQ(refusal_of(lock), Refusal("", {}, "port").of(ErrorCode::kConflict).value(port));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/scan.h"
+#include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/virtual_robot.h"
@@ -21,7 +22,7 @@ using Eigen::VectorXd;
 class Beginning : public testing::Test {
  protected:
   Beginning()
-      : batch_(test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell_), 80, 3), *cell_))),
+      : batch_(test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell_), 80, 3), *cell_)).rows()),
         calibration_(test::demand(calibrate(cell_, cell_->model.error_sources, batch_, {}))) {
     std::vector<Parameter> priors;
     for (const IdentifiedParameter& one : calibration_.parameters) priors.push_back(one.parameter);

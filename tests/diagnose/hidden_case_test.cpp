@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/error_sources/physical_model.h"
+#include "server/measurement/checked_batch.h"
 #include "server/measurement/measurement.h"
 #include "tests/support/demand.h"
 #include "tests/support/hidden_files.h"
@@ -22,7 +23,7 @@ std::shared_ptr<const Cell> cell_of(const HiddenCase& hidden) {
 }
 
 MeasurementBatch batch_of(const HiddenCase& hidden, const Cell& cell) {
-  return test::demand(check_against_cell(test::demand(parse_batch_csv(hidden.batch_csv, "batch.csv")), cell));
+  return test::demand(check_against_cell(test::demand(parse_batch_csv(hidden.batch_csv, "batch.csv")), cell)).rows();
 }
 
 /// Largest distance, mm, of the two simulations' tool points, and angle, rad, between their tools.

@@ -7,7 +7,7 @@
 #include "server/diagnose/evidence/refine.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
-#include "server/numerics/product.h"
+#include "server/measurement/checked_batch.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel::cause_search {
@@ -28,7 +28,7 @@ MatrixXd random_matrix(Index rows, Index cols, unsigned seed) {
 /// The chapter 5 robot in cell 7, calibrated by the list of the cell, and a linear problem about it.
 struct Calibrated {
   explicit Calibrated(int poses) : batch(test::measured(test::chapter_5_robot(cell), poses, 3)) {
-    batch = *check_against_cell(batch, *cell);
+    batch = MeasurementBatch(check_against_cell(batch, *cell)->rows());
     const CalibrationResult calibration = *calibrate(cell, cell->model.error_sources, batch, {});
     model.model = calibration.model;
     for (const IdentifiedParameter& one : calibration.parameters) model.priors.push_back(one.parameter);
@@ -38,23 +38,6 @@ struct Calibrated {
   MeasurementBatch batch;
   PriorModel model;
 };
-
-TEST(Product, EveryBuildThatThisProcessorRunsAgreesWithThePlainSum) {
-  for (const auto& [k, m, n] : {std::tuple{1, 1, 1}, {7, 5, 3}, {1033, 9, 6}, {64, 4, 4}}) {
-    const MatrixXd a = random_matrix(k, m, 1);
-    const MatrixXd b = random_matrix(k, n, 2);
-    const MatrixXd plain = a.transpose() * b;
-    const auto expect_equal = [&](RawProduct product) {
-      MatrixXd c = MatrixXd::Constant(m, n, -7);
-      product(k, m, a.data(), k, n, b.data(), k, c.data(), m);
-      EXPECT_LT((c - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
-    };
-    expect_equal(raw_product_baseline);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) expect_equal(raw_product_avx2);
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) expect_equal(raw_product_avx512);
-    EXPECT_LT((transposed_product(a, b) - plain).cwiseAbs().maxCoeff(), 1e-11 * k);
-  }
-}
 
 TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
   const MatrixXd Z = 3 * random_matrix(40, 6, 4);
@@ -88,7 +71,7 @@ TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
 TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRows) {
   const Calibrated calibrated(120);
   const LinearProblem problem = calibrated.problem();
-  const FamilyPtr gear = make_order_family(problem, {"gear_transmission", 2, "", "", {}});
+  const FamilyPtr gear = make_order_family(problem, {"gear_transmission", 2});
   ASSERT_NE(gear, nullptr);
   Best planted = gear->typical();
   planted.order = 37.3;

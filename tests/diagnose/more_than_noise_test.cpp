@@ -86,8 +86,8 @@ TEST(MoreThanNoise, OrientationsInXyzwOrderAreRefused) {
   }
   const auto refused = diagnose(test::cell_7(), batch, {});
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().message.find("read as xyzw they would fit to 0."), std::string::npos)
-      << refused.error().message;
+  EXPECT_EQ(refused.error().field, "qw,qx,qy,qz");
+  EXPECT_EQ(refused.error().text, "as xyzw") << sentence(refused.error());
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/diagnose.h"
+#include "server/diagnose/families/candidates.h"
+#include "server/measurement/checked_batch.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/pose_columns.h"
 #include "server/plan/plan.h"
@@ -58,11 +60,11 @@ SearchResult in_doubt(const std::shared_ptr<const Cell>& cell) {
   found.before.priors = found.before.model.parameters();
   found.after = found.before;
   const VirtualRobot robot{found.before.model, cell->tracker.sigma, cell->tracker.sigma_rotation, {}};
-  found.all = test::demand(check_against_cell(test::demand(simulate(robot, narrow(*cell), {})), *cell));
+  found.all = test::demand(check_against_cell(test::demand(simulate(robot, narrow(*cell), {})), *cell)).rows();
   found.batch = found.all;
   Accepted one;
-  one.cause = {"encoder_eccentricity", 1};
-  one.could_also_be = {{"tool"}};
+  one.cause = {"encoder_eccentricity", 1, "", "", {}};
+  one.could_also_be = {{"tool", -1, "", "", {}}};
   found.accepted = {one};
   return found;
 }

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "server/diagnose/diagnose.h"
+#include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
@@ -61,7 +62,7 @@ TEST(Refine, WhatIsLeftOfARobotOnARailIsNoShiftAlongIt) {
 TEST(Refine, StepsAlongABoundAreTheBestOnesThatStayInside) {
   // One compliance at its bound: refining from the best fit leaves the best fit where it is.
   const auto cell = rail({0, 0, -1});
-  const MeasurementBatch batch = test::demand(check_against_cell(measured_on(cell, false, 4), *cell));
+  const MeasurementBatch batch = test::demand(check_against_cell(measured_on(cell, false, 4), *cell)).rows();
   const CalibrationResult best =
       test::demand(calibrate(cell, {"base", "geometry", "compliance_first_order"}, batch, {}));
   PriorModel refined{best.model, {}};

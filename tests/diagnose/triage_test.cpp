@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include "server/measurement/checked_batch.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
@@ -18,15 +19,15 @@ class TriageTest : public testing::Test {
   static void SetUpTestSuite() {
     TrainOptions options;
     options.bias = "none";
-    options.validation_share = 0.2;
     const auto cell = test::cell_7();
-    const auto batch = test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), 150, 1), *cell));
+    const auto batch =
+        test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), 150, 1), *cell, drawn(0.2, 1)));
     model_ = std::make_unique<CompensatedModel>(test::demand(train(cell, batch, options)));
   }
   static void TearDownTestSuite() { model_.reset(); }
 
   static MeasurementBatch batch_of(const VirtualRobot& robot, std::uint64_t seed = 20, int poses = 90) {
-    return test::demand(check_against_cell(test::measured(robot, poses, seed), *robot.truth.cell));
+    return test::demand(check_against_cell(test::measured(robot, poses, seed), *robot.truth.cell)).rows();
   }
   /// The robot with an error source more, whose parameters are `values`.
   static VirtualRobot robot_with(const std::string& spec, const std::vector<double>& values) {
@@ -36,7 +37,9 @@ class TriageTest : public testing::Test {
     return robot;
   }
   static VirtualRobot robot_as_it_was() { return test::chapter_5_robot(test::cell_7()); }
-  static Triage triaged(const MeasurementBatch& batch) { return triage(*model_, batch); }
+  static Triage triaged(const MeasurementBatch& batch) {
+    return triage(*model_, test::demand(check_against_cell(batch, model_->cell())));
+  }
   static bool could_be(const Triage& triage, const std::string& cause) {
     return triage.cause.cause == cause || std::any_of(triage.could_also_be.begin(), triage.could_also_be.end(),
                                                       [&](const Cause& other) { return other.cause == cause; });

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
 #include "tests/support/diagnosis_trial.h"
 #include "tests/support/hidden_columns.h"
@@ -46,7 +47,7 @@ TEST(Validation, ListsAHeldOutPoseThatFitsNeitherModelAndDropsItFromNoFigure) {
 TEST(Validation, SuspectsAGoodPoseInOneOfAHundredBatches) {
   const auto cell = test::cell_7();
   const auto batch = [&](int poses, std::uint64_t seed) {
-    return test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), poses, seed), *cell));
+    return test::demand(check_against_cell(test::measured(test::chapter_5_robot(cell), poses, seed), *cell)).rows();
   };
   const MeasurementBatch seen = batch(80, 3);
   const CalibrationResult calibration = test::demand(calibrate(cell, cell->model.error_sources, seen, {}));

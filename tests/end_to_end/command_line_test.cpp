@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
 
 #include "server/measurement/files/csv_table.h"
 #include "tests/support/daemon.h"
@@ -96,6 +98,44 @@ TEST_F(CommandLine, HelpOfEveryCommandEndsWith0AndNamesItsOptions) {
   }
 }
 
+/// The commands that the program itself lists.
+std::vector<std::string> commands_of(const std::string& help) {
+  std::vector<std::string> commands;
+  std::istringstream lines(help.substr(help.find("Subcommands:")));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && line.starts_with("  ")) {
+    if (line[2] != ' ') commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return commands;
+}
+
+TEST_F(CommandLine, HelpOfEveryCommandSaysTheUnitOfEveryQuantity) {
+  const std::regex blanks("\\s+"), goes_with("(Needs|Excludes): --"),
+      unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation", std::regex::icase);
+  int quantities = 0;
+  for (const std::string& command : commands_of(must({"--help"}).out)) {
+    const std::string one_line = std::regex_replace(must({command, "--help"}).out, blanks, " ");
+    const std::string help = std::regex_replace(one_line, goes_with, "$1: ");
+    for (auto at = help.find(" FLOAT"); at != std::string::npos; at = help.find(" FLOAT", at + 1)) {
+      const std::string described = help.substr(at, help.find(" --", at) - at);
+      EXPECT_TRUE(std::regex_search(described, unit)) << command << ":" << described;
+      ++quantities;
+    }
+  }
+  EXPECT_GE(quantities, 10);
+}
+
+TEST_F(CommandLine, HelpOfWhatOnlyAServiceCanDoDoesNotOfferFilesInstead) {
+  for (const char* command :
+       {"submit", "retrain", "status", "watch", "models", "activate", "rollback", "export", "import"}) {
+    EXPECT_EQ(must({command, "--help"}).out.find("instead of working on files"), std::string::npos) << command;
+  }
+  for (const char* command : {"predict", "correct", "diagnose"}) {
+    EXPECT_NE(must({command, "--help"}).out.find("instead of working on files"), std::string::npos) << command;
+  }
+}
+
 TEST_F(CommandLine, AStudyPutsTheSourcesFiguresBesideOurs) {
   const json study = json::parse(must({"study", "cal", "--json", "-"}).out);
   ASSERT_EQ(study["rows"].size(), 8u);
@@ -129,6 +169,24 @@ TEST_F(CommandLine, WrongUsageEndsWith2AndNamesWhatIsWrong) {
     EXPECT_NE((finished.err + finished.out).find(part), std::string::npos) << finished.err;
     EXPECT_EQ(finished.out, "") << "errors belong on standard error";
   }
+}
+
+TEST_F(CommandLine, ARefusalIsDataWhereTheResultWasToBeJsonOnStandardOutput) {
+  const std::string batch = folder_.write("bad.csv", "q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n1,2,3e7,4\n");
+  const Finished refused = trammel({"diagnose", "--cell", cell_, "--batch", batch, "--json", "-"});
+  EXPECT_EQ(refused.exit_code, kRefusedData);
+  const json error = json::parse(refused.out).at("error");
+  EXPECT_EQ(error.at("code"), "refused");
+  EXPECT_EQ(error.at("file"), batch);
+  EXPECT_EQ(error.at("row"), 3);
+  EXPECT_EQ(error.at("field"), "y_mm");
+  EXPECT_EQ(error.at("value"), 3e7);
+  EXPECT_EQ(error.at("limit"), 1e6);
+  EXPECT_EQ(refused.err, "trammel diagnose: " + error.at("sentence").get<std::string>() + "\n");
+  const Finished into_file = trammel({"diagnose", "--cell", cell_, "--batch", batch, "--json", file("out")});
+  EXPECT_EQ(into_file.exit_code, kRefusedData);
+  EXPECT_EQ(into_file.out, "");
+  EXPECT_FALSE(std::filesystem::exists(file("out"))) << "a file stays as it was";
 }
 
 TEST_F(CommandLine, ALevelThatDoesNotExistIsWrongUsage) {
@@ -528,7 +586,11 @@ TEST_F(CommandLine, ADiagnosisIsNotBegunWhereItsResultsCouldNotBeKept) {
     const Finished finished = trammel(all);
     EXPECT_EQ(finished.exit_code, exit_code) << finished.err;
     EXPECT_NE(finished.err.find(said), std::string::npos) << finished.err;
-    EXPECT_EQ(finished.out, "");
+    const bool tells_a_program = std::find(more.begin(), more.end(), "-") != more.end();
+    EXPECT_EQ(finished.out.empty(), !tells_a_program) << finished.out;
+    if (tells_a_program) {
+      EXPECT_EQ(nlohmann::json::parse(finished.out).at("error").at("code"), "usage");
+    }
   };
   wrong({"--json", "-", "--report", "-"}, kWrongUsage, "both go to standard output");
   wrong({"--json", file("a"), "--report", file("a")}, kWrongUsage, "--report and --json both go to");

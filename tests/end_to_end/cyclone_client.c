@@ -120,9 +120,8 @@ int main(int argc, char** argv) {
   const trammel_wire_PredictErrorReply* reply = take_one(participant, reply_reader);
   if (reply == NULL) return fail("no reply");
   printf("result=%d id=%lld guid=%02x model=%s version=%d items=%u\n", (int)reply->header.result,
-         (long long)reply->header.related_request_id.sequence_number,
-         reply->header.related_request_id.writer_guid[15], reply->model.hash, reply->model.version,
-         reply->predictions._length);
+         (long long)reply->header.related_request_id.sequence_number, reply->header.related_request_id.writer_guid[15],
+         reply->model.hash, reply->model.version, reply->predictions._length);
   if (reply->predictions._length == 1) printf("dx_mm=%.6f\n", reply->predictions._buffer[0].dx_mm);
   dds_delete(participant);
   return 0;

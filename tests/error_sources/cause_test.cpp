@@ -61,7 +61,8 @@ TEST(Causes, SpellingsAndNamesForPeopleAreTheirOwn) {
 }
 
 TEST(Causes, TheReadmeHasEveryCauseWithBothItsNames) {
-  const Result<std::string> readme = read_text_file(std::string(TRAMMEL_SOURCE_DIR) + "/README.md");
+  const Result<std::string> readme =
+      read_text_file(std::string(TRAMMEL_SOURCE_DIR) + "/server/error_sources/README.md");
   ASSERT_TRUE(readme);
   for (const CauseRecord* record : all_causes()) {
     EXPECT_NE(readme->find(fmt::format("`{}", record->spelling)), std::string::npos) << record->spelling;

@@ -10,9 +10,13 @@
 #include "server/error_sources/catalogue.h"
 #include "server/error_sources/physical_model.h"
 #include "server/error_sources/spelling.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 std::shared_ptr<const Cell> cell_7() {
   return std::make_shared<const Cell>(*read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml"));
@@ -229,7 +233,7 @@ TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const auto cell = cell_7();
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
-  EXPECT_NE(unknown.error().message.find("geometry"), std::string::npos);
+  EXPECT_EQ(refusal_of(unknown), Refusal("", {}, "error_sources").of(ErrorCode::kUsage).text("gremlins"));
   for (const char* spec : {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
                            "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5"}) {
     EXPECT_FALSE(make_error_source(spec, *cell)) << spec;

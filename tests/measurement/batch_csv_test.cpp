@@ -3,13 +3,17 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/measurement.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
 
-std::string refusal(const std::string& text) {
+using test::Refusal;
+using test::refusal_of;
+
+Refusal refusal(const std::string& text) {
   const auto batch = parse_batch_csv(text, "lt-07.csv");
-  return batch ? "accepted" : batch.error().message;
+  return refusal_of(batch);
 }
 
 constexpr const char* kEverything =
@@ -79,17 +83,14 @@ TEST(BatchCsv, ReadsARailInMillimetres) {
 }
 
 TEST(BatchCsv, RefusesMissingColumnsByName) {
-  EXPECT_EQ(refusal(""), "lt-07.csv: empty file, expected a header line with column names");
-  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm\n"), "lt-07.csv: no measurements below the header, at least 1 is needed");
-  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm\n1,2,3\n"), "lt-07.csv: missing column z_mm; the header has: q1_deg,x_mm,y_mm");
-  EXPECT_EQ(refusal("x_mm,y_mm,z_mm\n1,2,3\n"), "lt-07.csv: missing column q1_deg; the header has: x_mm,y_mm,z_mm");
-  EXPECT_EQ(refusal("q1_deg,q3_deg,x_mm,y_mm,z_mm\n1,1,1,2,3\n"), "lt-07.csv: missing column q2_deg before q3_deg");
-  EXPECT_EQ(refusal("q1_deg,q1_mm,x_mm,y_mm,z_mm\n1,1,1,2,3\n"),
-            "lt-07.csv: two columns for joint 1: q1_deg and q1_mm");
-  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm,qw,qx,qz\n1,1,2,3,1,0,0\n"),
-            "lt-07.csv: missing column qy; qw, qx, qy, qz come all together or not at all");
-  EXPECT_EQ(refusal("q1_deg,q2_deg,dir2,x_mm,y_mm,z_mm\n1,1,1,1,2,3\n"),
-            "lt-07.csv: missing column dir1; dir1, dir2 come all together or not at all");
+  EXPECT_EQ(refusal(""), Refusal("lt-07.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm\n"), Refusal("lt-07.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm\n1,2,3\n"), Refusal("lt-07.csv", {}, "z_mm"));
+  EXPECT_EQ(refusal("x_mm,y_mm,z_mm\n1,2,3\n"), Refusal("lt-07.csv", {}, "q1_deg"));
+  EXPECT_EQ(refusal("q1_deg,q3_deg,x_mm,y_mm,z_mm\n1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "q2_deg"));
+  EXPECT_EQ(refusal("q1_deg,q1_mm,x_mm,y_mm,z_mm\n1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "q1_mm"));
+  EXPECT_EQ(refusal("q1_deg,x_mm,y_mm,z_mm,qw,qx,qz\n1,1,2,3,1,0,0\n"), Refusal("lt-07.csv", {}, "qy"));
+  EXPECT_EQ(refusal("q1_deg,q2_deg,dir2,x_mm,y_mm,z_mm\n1,1,1,1,2,3\n"), Refusal("lt-07.csv", {}, "dir1"));
 }
 
 /// A batch of two rows of which the second has `value` in `column`.
@@ -106,22 +107,21 @@ std::string with(const std::string& column, const std::string& value) {
   return header + "end\n" + first + "\n" + second + "\n";
 }
 
-TEST(BatchCsv, TheRowThatTheRefusalsStartFromIsGood) { EXPECT_EQ(refusal(with("x_mm", "4")), "accepted"); }
+TEST(BatchCsv, TheRowThatTheRefusalsStartFromIsGood) { EXPECT_EQ(refusal(with("x_mm", "4")), Refusal::none()); }
 
 TEST(BatchCsv, RefusesBadValuesWithRowColumnValueAndLimit) {
-  EXPECT_EQ(refusal(with("q1_deg", "nan")), "lt-07.csv row 3: q1_deg is nan, expected a finite number");
-  EXPECT_EQ(refusal(with("q1_deg", "")), "lt-07.csv row 3: q1_deg is empty, expected a number");
-  EXPECT_EQ(refusal(with("y_mm", "inf")), "lt-07.csv row 3: y_mm is inf, expected a finite number");
-  EXPECT_EQ(refusal(with("y_mm", "2e6")), "lt-07.csv row 3: y_mm is 2e+06, limit 1e+06");
-  EXPECT_EQ(refusal(with("y_mm", "12;5")), "lt-07.csv row 3: y_mm is '12;5', expected a number");
-  EXPECT_EQ(refusal(with("qw", "1.01")),
-            "lt-07.csv row 3: quaternion qw,qx,qy,qz has length 1.01, expected 1 (limit 0.001)");
-  EXPECT_EQ(refusal(with("qw", "")), "lt-07.csv row 3: qw is empty, expected a number");
-  EXPECT_EQ(refusal(with("sigma_mm", "0")), "lt-07.csv row 3: sigma_mm is 0, must be above 0");
-  EXPECT_EQ(refusal(with("sigma_mm", "-1")), "lt-07.csv row 3: sigma_mm is -1, must be above 0");
-  EXPECT_EQ(refusal(with("dir1", "2")), "lt-07.csv row 3: dir1 is 2, expected a whole number from -1 to 1");
-  EXPECT_EQ(refusal(with("set", "test")), "lt-07.csv row 3: set is 'test', expected train or validation");
-  EXPECT_EQ(refusal(with("pose_id", "p1")), "lt-07.csv row 3: pose_id 'p1' is already that of row 2");
+  EXPECT_EQ(refusal(with("q1_deg", "nan")), Refusal("lt-07.csv", 3, "q1_deg").text("nan"));
+  EXPECT_EQ(refusal(with("q1_deg", "")), Refusal("lt-07.csv", 3, "q1_deg"));
+  EXPECT_EQ(refusal(with("y_mm", "inf")), Refusal("lt-07.csv", 3, "y_mm").text("inf"));
+  EXPECT_EQ(refusal(with("y_mm", "2e6")), Refusal("lt-07.csv", 3, "y_mm").beyond(2e+06, 1e+06));
+  EXPECT_EQ(refusal(with("y_mm", "12;5")), Refusal("lt-07.csv", 3, "y_mm").text("12;5"));
+  EXPECT_EQ(refusal(with("qw", "1.01")), Refusal("lt-07.csv", 3, "qw").beyond(1.01, 1));
+  EXPECT_EQ(refusal(with("qw", "")), Refusal("lt-07.csv", 3, "qw"));
+  EXPECT_EQ(refusal(with("sigma_mm", "0")), Refusal("lt-07.csv", 3, "sigma_mm").beyond(0, 0));
+  EXPECT_EQ(refusal(with("sigma_mm", "-1")), Refusal("lt-07.csv", 3, "sigma_mm").beyond(-1, 0));
+  EXPECT_EQ(refusal(with("dir1", "2")), Refusal("lt-07.csv", 3, "dir1").beyond(2, 1));
+  EXPECT_EQ(refusal(with("set", "test")), Refusal("lt-07.csv", 3, "set").text("test"));
+  EXPECT_EQ(refusal(with("pose_id", "p1")), Refusal("lt-07.csv", 3, "pose_id").text("p1"));
 }
 
 TEST(BatchCsv, NormalisesAQuaternionWithinTheLimit) {
@@ -166,7 +166,7 @@ TEST(BatchCsv, WritesNoColumnThatNoRowHas) {
 TEST(BatchCsv, RefusesAFileThatIsNotThere) {
   const auto batch = read_batch_csv("/nowhere/b.csv");
   ASSERT_FALSE(batch);
-  EXPECT_EQ(batch.error().message, "/nowhere/b.csv: no such file");
+  EXPECT_EQ(refusal_of(batch), Refusal("/nowhere/b.csv"));
   EXPECT_EQ(batch.error().code, ErrorCode::kRefused);
 }
 

@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
 
-std::string refusal(const std::string& text) {
+using test::Refusal;
+using test::refusal_of;
+
+Refusal refusal(const std::string& text) {
   const auto batch = parse_robodk_csv(text, "rdk.csv");
-  return batch ? "accepted" : batch.error().message;
+  return refusal_of(batch);
 }
 
 Matrix3 turned(double x, double y, double z, const char* order) {
@@ -70,7 +74,8 @@ TEST(RoboDkCsv, ReadsTheExportsByPosition) {
   const auto poses = parse_robodk_csv("1,2,3,4,5,6,100,200,300,0.1,-0.2,2.5,7,8,9,0,0,0\n", "rdk.csv");
   ASSERT_TRUE(poses) << poses.error().message;
   EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz")).norm(), 1e-12);
-  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200,300,10,-20,170,7,8,9,0,0,0\n"), "rdk.csv row 1: rx_rad is 10, limit 6.28319");
+  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200,300,10,-20,170,7,8,9,0,0,0\n"),
+            Refusal("rdk.csv", 1, "rx_rad").beyond(10, 6.28319));
 }
 
 TEST(RoboDkCsv, MakesAToolOfEachTcp) {
@@ -83,19 +88,17 @@ TEST(RoboDkCsv, MakesAToolOfEachTcp) {
 }
 
 TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
-  EXPECT_EQ(refusal(""), "rdk.csv: empty file, expected joints and measured positions");
-  EXPECT_EQ(refusal("J1,X,Y,Z\n"), "rdk.csv: no measurements below the header, at least 1 is needed");
-  EXPECT_EQ(refusal("1,2,3,4\n"), "rdk.csv row 1: 4 columns and none named J1; without names expected 9, 12 or 18");
-  EXPECT_EQ(refusal("J1,J3,X,Y,Z\n1,2,3,4,5\n"), "rdk.csv: missing column J2 before J3");
-  EXPECT_EQ(refusal("J1,X,Y\n1,2,3\n"), "rdk.csv: 2 of the columns x, y, z; they come all together or not at all");
-  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"),
-            "rdk.csv: two orientations; expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz");
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), "rdk.csv row 3: Y is 'c', expected a number");
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2e7,3,4\n"), "rdk.csv row 2: X is 2e+07, limit 1e+06");
-  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), "rdk.csv row 2: 3 values, the header has 4 columns");
-  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"),
-            "rdk.csv: column J2 (turns): unit 'turns', expected deg or rad, of a rail mm");
-  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"), "rdk.csv row 3: pose_id 'a' is already that of row 2");
+  EXPECT_EQ(refusal(""), Refusal("rdk.csv"));
+  EXPECT_EQ(refusal("J1,X,Y,Z\n"), Refusal("rdk.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("1,2,3,4\n"), Refusal("rdk.csv", 1, "J1").value(4));
+  EXPECT_EQ(refusal("J1,J3,X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2"));
+  EXPECT_EQ(refusal("J1,X,Y\n1,2,3\n"), Refusal("rdk.csv", {}, "x").beyond(2, 3));
+  EXPECT_EQ(refusal("J1,X,Y,Z,A,B,C,W,P,R\n1,2,3,4,5,6,7,8,9,10\n"), Refusal("rdk.csv", {}, "orientation"));
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3,4\n1,2,c,4\n"), Refusal("rdk.csv", 3, "Y").text("c"));
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2e7,3,4\n"), Refusal("rdk.csv", 2, "X").beyond(2e+07, 1e+06));
+  EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), Refusal("rdk.csv", 2).beyond(3, 4));
+  EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2 (turns)").text("turns"));
+  EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"), Refusal("rdk.csv", 3, "pose_id").text("a"));
 }
 
 TEST(BatchFile, RecognisesKindsByTheirContent) {
@@ -116,8 +119,8 @@ TEST(BatchFile, ReadsBatchesOfEitherKindAndSaysHowPointsBecomeOne) {
   EXPECT_EQ(to_csv(*ours), to_csv(*other));
   const auto points = parse_batch("Main p1 1 2 3\n", "sa.txt");
   ASSERT_FALSE(points);
-  EXPECT_NE(points.error().message.find("sa.txt: measured points without the joints"), std::string::npos);
-  EXPECT_NE(points.error().message.find("trammel convert --points"), std::string::npos);
+  EXPECT_EQ(refusal_of(points), Refusal("sa.txt", {}, "q1_deg"));
+  EXPECT_FALSE(points.error().next.empty());
   const auto neither = parse_batch("q1,q2\n1,2\n", "b.csv");
   EXPECT_FALSE(neither);
 }

@@ -2,12 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "tests/support/refusal.h"
+
 namespace trammel {
 namespace {
 
-std::string refusal(const std::string& text) {
+using test::Refusal;
+using test::refusal_of;
+
+Refusal refusal(const std::string& text) {
   const auto table = CsvTable::parse(text, "f.csv");
-  return table ? "accepted" : table.error().message;
+  return refusal_of(table);
 }
 
 TEST(CsvTable, ReadsTheSameRowsFromLfAndCrlfWithAndWithoutByteOrderMark) {
@@ -47,24 +54,24 @@ TEST(CsvTable, WrittenFieldsReadBackAsTheyWere) {
 }
 
 TEST(CsvTable, RefusesWhatIsNoTableAndSaysWhere) {
-  EXPECT_EQ(refusal(""), "f.csv: empty file, expected a header line with column names");
-  EXPECT_EQ(refusal("# only a comment\n"), "f.csv: empty file, expected a header line with column names");
-  EXPECT_EQ(refusal("a,b,a\n"), "f.csv row 1: column a appears twice");
-  EXPECT_EQ(refusal("a,,b\n"), "f.csv row 1: column 2 has no name");
-  EXPECT_EQ(refusal("a,b\n1,2\n1\n"), "f.csv row 3: 1 values, the header has 2 columns");
-  EXPECT_EQ(refusal("a,b\n1,2,\n"), "f.csv row 2: 3 values, the header has 2 columns");
-  EXPECT_EQ(refusal("a,b\n1,2,"), "f.csv row 2: 3 values, the header has 2 columns");
-  EXPECT_EQ(refusal("a,b\n\"1,2\n"), "f.csv row 2: a quote is not closed");
-  EXPECT_EQ(refusal("a,b\n\"1\"x,2\n"), "f.csv row 2: 'x' after a closing quote, expected ','");
+  EXPECT_EQ(refusal(""), Refusal("f.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("# only a comment\n"), Refusal("f.csv").beyond(0, 1));
+  EXPECT_EQ(refusal("a,b,a\n"), Refusal("f.csv", 1, "a"));
+  EXPECT_EQ(refusal("a,,b\n"), Refusal("f.csv", 1).value(2));
+  EXPECT_EQ(refusal("a,b\n1,2\n1\n"), Refusal("f.csv", 3).beyond(1, 2));
+  EXPECT_EQ(refusal("a,b\n1,2,\n"), Refusal("f.csv", 2).beyond(3, 2));
+  EXPECT_EQ(refusal("a,b\n1,2,"), Refusal("f.csv", 2).beyond(3, 2));
+  EXPECT_EQ(refusal("a,b\n\"1,2\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal("a,b\n\"1\"x,2\n"), Refusal("f.csv", 2));
 }
 
 TEST(CsvTable, RefusesBytesThatAreNoUtf8AndTakesThoseThatAre) {
-  EXPECT_EQ(refusal("a\n\xB0\n"), "f.csv row 2: not UTF-8 text");
-  EXPECT_EQ(refusal("a\n\xE2\x82\n"), "f.csv row 2: not UTF-8 text");
-  EXPECT_EQ(refusal("a\n\xED\xA0\x80\n"), "f.csv row 2: not UTF-8 text");
-  EXPECT_EQ(refusal("a\n\xC0\xAF\n"), "f.csv row 2: not UTF-8 text");
-  EXPECT_EQ(refusal(std::string("a\n\0\n", 4)), "f.csv row 2: not UTF-8 text");
-  EXPECT_EQ(refusal("a\n\xC2\xB0 \xE2\x82\xAC \xF0\x9F\xA4\x96\n"), "accepted");
+  EXPECT_EQ(refusal("a\n\xB0\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal("a\n\xE2\x82\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal("a\n\xED\xA0\x80\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal("a\n\xC0\xAF\n"), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal(std::string("a\n\0\n", 4)), Refusal("f.csv", 2));
+  EXPECT_EQ(refusal("a\n\xC2\xB0 \xE2\x82\xAC \xF0\x9F\xA4\x96\n"), Refusal::none());
 }
 
 TEST(CsvTable, ReadsNumbersWholeOrNotAtAll) {
@@ -72,12 +79,13 @@ TEST(CsvTable, ReadsNumbersWholeOrNotAtAll) {
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_EQ(table->number(0, 0).value(), 1.5);
   EXPECT_EQ(table->number(1, 0).value(), -2e-3);
-  EXPECT_EQ(table->number(2, 0).error().message, "f.csv row 4: a is '1.5mm', expected a number");
-  EXPECT_EQ(table->number(3, 0).error().message, "f.csv row 5: a is nan, expected a finite number");
-  EXPECT_EQ(table->number(4, 0).error().message, "f.csv row 6: a is -inf, expected a finite number");
-  EXPECT_EQ(table->number(5, 0, 1000).error().message, "f.csv row 7: a is 1e400, limit 1000");
-  EXPECT_EQ(table->number(6, 0, 1000).error().message, "f.csv row 8: a is 2000, limit 1000");
-  EXPECT_EQ(table->number(7, 0).error().message, "f.csv row 9: a is empty, expected a number");
+  EXPECT_EQ(refusal_of(table->number(2, 0)), Refusal("f.csv", 4, "a").text("1.5mm"));
+  EXPECT_EQ(refusal_of(table->number(3, 0)), Refusal("f.csv", 5, "a").text("nan"));
+  EXPECT_EQ(refusal_of(table->number(4, 0)), Refusal("f.csv", 6, "a").text("-inf"));
+  EXPECT_EQ(refusal_of(table->number(5, 0, 1000)),
+            Refusal("f.csv", 7, "a").beyond(std::numeric_limits<double>::infinity(), 1000).text("1e400"));
+  EXPECT_EQ(refusal_of(table->number(6, 0, 1000)), Refusal("f.csv", 8, "a").beyond(2000, 1000));
+  EXPECT_EQ(refusal_of(table->number(7, 0)), Refusal("f.csv", 9, "a"));
   EXPECT_FALSE(table->number(8, 0));
 }
 
@@ -85,15 +93,14 @@ TEST(CsvTable, ReadsWholeNumbersWithinTheirLimits) {
   const auto table = CsvTable::parse("a\n7\n8\n1.5\n", "f.csv");
   ASSERT_TRUE(table);
   EXPECT_EQ(table->integer(0, 0, 0, 7).value(), 7);
-  EXPECT_EQ(table->integer(1, 0, 0, 7).error().message, "f.csv row 3: a is 8, expected a whole number from 0 to 7");
+  EXPECT_EQ(refusal_of(table->integer(1, 0, 0, 7)), Refusal("f.csv", 3, "a").beyond(8, 7));
   EXPECT_FALSE(table->integer(2, 0, 0, 7));
 }
 
 TEST(CsvTable, SaysThatSemicolonsAreNoSeparators) {
   const auto table = CsvTable::parse("a;b\n1;2\n", "f.csv");
   ASSERT_TRUE(table);
-  EXPECT_EQ(table->require("a").error().message,
-            "f.csv: missing column a; the header has: a;b (columns must be separated by ',')");
+  EXPECT_EQ(refusal_of(table->require("a")), Refusal("f.csv", {}, "a"));
 }
 
 }  // namespace

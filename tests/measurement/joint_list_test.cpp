@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 Cell cell() {
   Cell cell;
@@ -21,10 +25,10 @@ Cell cell() {
   return cell;
 }
 
-std::string refusal(const std::string& text) {
+Refusal refusal(const std::string& text) {
   const auto list =
       parse_joint_csv(text, "j.csv").and_then([](const JointList& read) { return check_against_cell(read, cell()); });
-  return list ? "accepted" : list.error().message;
+  return refusal_of(list);
 }
 
 TEST(JointList, ReadsJointsAndTheirCircumstances) {
@@ -58,15 +62,14 @@ TEST(JointList, ResolvesTheOnlyTool) {
 }
 
 TEST(JointList, RefusesWhatDoesNotFitTheRobot) {
-  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n"), "accepted");
-  EXPECT_EQ(refusal("q1_mm\n1\n"), "j.csv: 1 joint columns, robot crane has 2");
-  EXPECT_EQ(refusal("q1_deg,q2_deg\n1,2\n"),
-            "j.csv: column q1_deg, but joint 1 of robot crane is prismatic: expected q1_mm");
-  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n-5,2\n"), "j.csv row 3: joint 1 is -5 mm, limit 0 mm");
-  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n1,90.5\n"), "j.csv row 3: joint 2 is 90.5 deg, limit 90 deg");
-  EXPECT_EQ(refusal("q1_mm,q2_deg,tool_id\n1,2,saw\n"), "j.csv row 2: cell cell-2: unknown tool 'saw'; known: hook");
-  EXPECT_EQ(refusal("a,b\n1,2\n"), "j.csv: missing column q1_deg; the header has: a,b");
-  EXPECT_EQ(refusal("q1_mm,q2_deg\n"), "j.csv: no poses below the header, at least 1 is needed");
+  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n"), Refusal::none());
+  EXPECT_EQ(refusal("q1_mm\n1\n"), Refusal("j.csv").beyond(1, 2));
+  EXPECT_EQ(refusal("q1_deg,q2_deg\n1,2\n"), Refusal("j.csv", {}, "q1_deg"));
+  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n-5,2\n"), Refusal("j.csv", 3, "q1_mm").beyond(-5, 0));
+  EXPECT_EQ(refusal("q1_mm,q2_deg\n1,2\n1,90.5\n"), Refusal("j.csv", 3, "q2_deg").beyond(90.5, 90));
+  EXPECT_EQ(refusal("q1_mm,q2_deg,tool_id\n1,2,saw\n"), Refusal("j.csv", 2, "tool_id").text("saw"));
+  EXPECT_EQ(refusal("a,b\n1,2\n"), Refusal("j.csv", {}, "q1_deg"));
+  EXPECT_EQ(refusal("q1_mm,q2_deg\n"), Refusal("j.csv").beyond(0, 1));
 }
 
 }  // namespace

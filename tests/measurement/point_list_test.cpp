@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "tests/support/refusal.h"
 
 namespace trammel {
 namespace {
 
-std::string refusal(const std::string& text, const PointFileOptions& options = {}) {
+using test::Refusal;
+using test::refusal_of;
+
+Refusal refusal(const std::string& text, const PointFileOptions& options = {}) {
   const auto points = parse_points(text, "sa.txt", options);
-  return points ? "accepted" : points.error().message;
+  return refusal_of(points);
 }
 
 PointList demand(const std::string& text, const PointFileOptions& options = {}) {
@@ -40,19 +44,18 @@ TEST(PointList, ReadsTargetsWithAndWithoutGroupAndCollectionBySeparatorsOfAnyKin
 
 TEST(PointList, TakesNumbersAsNamesButNoCoordinates) {
   EXPECT_EQ(demand("7 1000 2000 300\n").points[0].name, "7");
-  EXPECT_EQ(refusal("p1 100.0 200.0 300.0 0.5\n"),
-            "sa.txt row 1: name is '100.0', which looks like a coordinate; expected [[collection] group] target first");
+  EXPECT_EQ(refusal("p1 100.0 200.0 300.0 0.5\n"), Refusal("sa.txt", 1, "name").text("100.0"));
 }
 
 TEST(PointList, ReadsTheUnitFromACommentAndRefusesAnotherOne) {
   EXPECT_NEAR(demand("// Units: Inches\np 1 0 0\n").points[0].p_W.x(), 0.0254, 1e-15);
   EXPECT_NEAR(demand("// Length units = m\np 1 0 0\n").points[0].p_W.x(), 1, 1e-15);
   EXPECT_NEAR(demand("// units in millimeters\np 1 0 0\n").points[0].p_W.x(), 1e-3, 1e-15);
-  EXPECT_EQ(refusal("// a\n// Units: feet\np 1 0 0\n"), "sa.txt row 2: unit is 'feet', expected mm, m or inch");
+  EXPECT_EQ(refusal("// a\n// Units: feet\np 1 0 0\n"), Refusal("sa.txt", 2, "unit").text("feet"));
   PointFileOptions metres;
   metres.unit = LengthUnit::kMetre;
   EXPECT_NEAR(demand("p 1 0 0\n", metres).points[0].p_W.x(), 1, 1e-15);
-  EXPECT_EQ(refusal("// Units: mm\np 1 0 0\n", metres), "sa.txt: two different statements of the unit");
+  EXPECT_EQ(refusal("// Units: mm\np 1 0 0\n", metres), Refusal("sa.txt", {}, "unit"));
 }
 
 TEST(PointList, TurnsCylindricalAndSphericalCoordinatesIntoCartesianOnes) {
@@ -78,7 +81,7 @@ TEST(PointList, TurnsCylindricalAndSphericalCoordinatesIntoCartesianOnes) {
        p)
           .norm(),
       1e-12);
-  EXPECT_EQ(refusal("// cylindrical\np -5 0 0\n"), "sa.txt row 2: r is -5, must not be below 0");
+  EXPECT_EQ(refusal("// cylindrical\np -5 0 0\n"), Refusal("sa.txt", 2, "r").beyond(-5, 0));
 }
 
 TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
@@ -92,16 +95,13 @@ TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
   EXPECT_LT((rotation(demand("// XYZ Fixed Angles\nf,1,2,3,10,-20,30,2021-10-12 08:15:23\n")) - R).norm(), 1e-12);
   EXPECT_LT((rotation(demand("// ZYX Euler Angles\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_LT((rotation(demand("Frame Name,X,Y,Z,Rz,Ry,Rx\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
-  EXPECT_EQ(refusal("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"),
-            "sa.txt row 1: Euler angles or parameters other than ZYX; expected Euler ZYX or fixed XYZ");
+  EXPECT_EQ(refusal("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"), Refusal("sa.txt", 1, "angles"));
 }
 
 TEST(PointList, DoesNotGuessWhatThreeMoreValuesAre) {
-  EXPECT_EQ(refusal("p 1 2 3 0.01 0.01 0.01\n"),
-            "sa.txt row 1: 3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ "
-            "or Euler ZYX angles");
+  EXPECT_EQ(refusal("p 1 2 3 0.01 0.01 0.01\n"), Refusal("sa.txt", 1, "columns behind the coordinates"));
   EXPECT_EQ(refusal("// fixed XYZ\np 1 2 3 0.01 0.01 0.01\n", behind(BehindCoordinates::kUncertainties)),
-            "sa.txt: two different statements of what follows the coordinates");
+            Refusal("sa.txt", {}, "columns behind the coordinates"));
 }
 
 TEST(PointList, MakesOneSigmaOfUncertainties) {
@@ -113,7 +113,7 @@ TEST(PointList, MakesOneSigmaOfUncertainties) {
   // 1 mrad at 2 m, the other two exact.
   const PointList far = demand(fmt::format("// uncertainties, cylindrical\np 2000 30 0 0 {:.15g} 0\n", to_deg(1e-3)));
   EXPECT_NEAR(far.points[0].sigma.value_or(0), 2e-3 / std::sqrt(3.0), 1e-12);
-  EXPECT_EQ(refusal("p 1 2 3 0.02 -0.04 0.04\n", two_sigma), "sa.txt row 1: uy is -0.04, must not be below 0");
+  EXPECT_EQ(refusal("p 1 2 3 0.02 -0.04 0.04\n", two_sigma), Refusal("sa.txt", 1, "uy").text("-0.04"));
 }
 
 TEST(PointList, FindsColumnsByTheNamesOfAHeaderOrOfAComment) {
@@ -124,20 +124,18 @@ TEST(PointList, FindsColumnsByTheNamesOfAHeaderOrOfAComment) {
   EXPECT_EQ(list.points[1].row, 3);
   const PointList other = demand("// Group, Point Name, Z (in), Y (in), X (in), Offset\nG, p, 3, 2, 1, 0.5\n");
   EXPECT_LT((other.points[0].p_W - 0.0254 * Vector3(1, 2, 3)).norm(), 1e-15);
-  EXPECT_EQ(refusal("name,x_mm,y_m,z_mm\nR1,1,2,3\n"), "sa.txt: two different statements of the unit");
+  EXPECT_EQ(refusal("name,x_mm,y_m,z_mm\nR1,1,2,3\n"), Refusal("sa.txt", {}, "unit"));
 }
 
 TEST(PointList, RefusalsNameFileRowColumnValueAndLimit) {
-  EXPECT_EQ(refusal(""), "sa.txt: no points, at least 1 is needed");
-  EXPECT_EQ(refusal("name,x,y,z\n"), "sa.txt: no points below the header, at least 1 is needed");
-  EXPECT_EQ(refusal("p 1 2\n"),
-            "sa.txt row 1: 3 values, expected 4 to 9: [[collection] group] target, 3 coordinates, [3 uncertainties or "
-            "angles]");
-  EXPECT_EQ(refusal("p 1 2 3\n\nq 1 2 3 4\n"), "sa.txt row 3: 5 values, the rows before have 4");
-  EXPECT_EQ(refusal("p 1 2 3\nq 1 b 3\n"), "sa.txt row 2: y is 'b', expected a number");
-  EXPECT_EQ(refusal("p 1 2 3e6\n"), "sa.txt row 1: z is 3e+06, limit 1e+06");
-  EXPECT_EQ(refusal("p 1 2 3\np 1 2 3\n"), "sa.txt row 2: name 'p' is already that of row 1");
-  EXPECT_EQ(refusal("p\xff 1 2 3\n"), "sa.txt row 1: not UTF-8 text");
+  EXPECT_EQ(refusal(""), Refusal("sa.txt").beyond(0, 1));
+  EXPECT_EQ(refusal("name,x,y,z\n"), Refusal("sa.txt").beyond(0, 1));
+  EXPECT_EQ(refusal("p 1 2\n"), Refusal("sa.txt", 1).beyond(3, 4));
+  EXPECT_EQ(refusal("p 1 2 3\n\nq 1 2 3 4\n"), Refusal("sa.txt", 3).beyond(5, 4));
+  EXPECT_EQ(refusal("p 1 2 3\nq 1 b 3\n"), Refusal("sa.txt", 2, "y").text("b"));
+  EXPECT_EQ(refusal("p 1 2 3e6\n"), Refusal("sa.txt", 1, "z").beyond(3e+06, 1e+06));
+  EXPECT_EQ(refusal("p 1 2 3\np 1 2 3\n"), Refusal("sa.txt", 2, "name").text("p"));
+  EXPECT_EQ(refusal("p\xff 1 2 3\n"), Refusal("sa.txt", 1));
 }
 
 JointList plan(const std::string& text) { return parse_joint_csv(text, "plan.csv").value_or(JointList{}); }
@@ -167,10 +165,10 @@ TEST(PointList, JoinsWithAPlanByPoseIdInTheOrderOfMeasuring) {
 TEST(PointList, RefusesAPointWithoutAPoseAndAPlanThatNamesAPoseTwice) {
   const auto unknown = join_points(demand("a 1 2 3\nx 1 2 3\n"), plan("pose_id,q1_deg\na,1\n"));
   ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().message, "sa.txt row 2: point 'x' has no pose of that pose_id in plan.csv");
+  EXPECT_EQ(refusal_of(unknown), Refusal("sa.txt", 2, "name").text("x"));
   const auto twice = join_points(demand("a 1 2 3\n"), plan("pose_id,q1_deg\na,1\na,2\n"));
   ASSERT_FALSE(twice);
-  EXPECT_EQ(twice.error().message, "plan.csv row 3: pose_id 'a' is already that of row 2");
+  EXPECT_EQ(refusal_of(twice), Refusal("plan.csv", 3, "pose_id").text("a"));
 }
 
 }  // namespace

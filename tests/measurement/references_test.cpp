@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
+
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 PointList reflectors(const std::string& where = "refs.csv") {
   PointList list{where, {}};
@@ -26,9 +31,9 @@ PointList moved(const Pose& X) {
 
 Pose shifted(double x) { return make_pose(Matrix3::Identity(), {x, 0, 0}); }
 
-std::string refusal(const PointList& references, const PointList& measured, const ReferenceOptions& options = {}) {
+Refusal refusal(const PointList& references, const PointList& measured, const ReferenceOptions& options = {}) {
   const auto check = check_references(references, measured, options);
-  return check ? "accepted" : check.error().message;
+  return refusal_of(check);
 }
 
 TEST(References, FindWhereTheTrackerHasMovedTo) {
@@ -83,17 +88,16 @@ TEST(References, AreMatchedByNameAndMayMissSome) {
 TEST(References, RefuseTooFewUnknownOnesOnALineAndLimitsThatMakeNoSense) {
   PointList two = moved(shifted(0));
   two.points.resize(2);
-  EXPECT_EQ(refusal(reflectors(), two), "now.csv: 2 of the reference reflectors in refs.csv, at least 3 are needed");
+  EXPECT_EQ(refusal(reflectors(), two), Refusal("now.csv").beyond(2, 3));
   PointList unknown = moved(shifted(0));
   unknown.points[2].name = "R9";
-  EXPECT_EQ(refusal(reflectors(), unknown), "now.csv row 4: reflector 'R9' is none of the references in refs.csv");
+  EXPECT_EQ(refusal(reflectors(), unknown), Refusal("now.csv", 4, "name").text("R9"));
   PointList line = reflectors();
   for (std::size_t i = 0; i < 5; ++i) line.points[i].p_W = static_cast<double>(i) * Vector3(1, 2, 3);
   PointList line_now = line;
   line_now.where = "now.csv";
-  EXPECT_EQ(refusal(line, line_now), "now.csv: localisation: the points lie on one line");
-  EXPECT_EQ(refusal(reflectors(), moved(shifted(0)), {50e-6, 20e-6}),
-            "references: limits 0.05 mm and 0.02 mm, expected 0 < localise <= repeat");
+  EXPECT_EQ(refusal(line, line_now), Refusal("now.csv"));
+  EXPECT_EQ(refusal(reflectors(), moved(shifted(0)), {50e-6, 20e-6}), Refusal("").beyond(0.05, 0.02));
 }
 
 TEST(References, BringABatchIntoTheirFrame) {

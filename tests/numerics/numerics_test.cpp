@@ -4,7 +4,8 @@
 
 #include <Eigen/Dense>
 
-#include "server/numerics/numerics_builds.h"
+#include "server/numerics/builds/builds.h"
+#include "server/numerics/product.h"
 #include "tests/bias/bias_data.h"
 
 namespace trammel {
@@ -103,6 +104,17 @@ TEST_P(EveryBuild, MultipliesByATranspose) {
     build().multiply_transposed(rows, cols, depth, -1.0, a.data(), a.rows(), b.data(), b.rows(), false, c.data(),
                                 c.rows(), work.data());
     EXPECT_LT((c - expected).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+TEST_P(EveryBuild, MultipliesATransposeByAMatrix) {
+  for (const auto& [k, m, n] : {std::tuple{1, 1, 1}, {7, 5, 3}, {1033, 9, 6}, {64, 4, 4}}) {
+    const MatrixXd a = random_joints(k, 53, m);
+    const MatrixXd b = random_joints(k, 54, n);
+    MatrixXd c = MatrixXd::Constant(m, n, -7);
+    build().transposed_product(k, m, a.data(), k, n, b.data(), k, c.data(), m);
+    EXPECT_LT((c - a.transpose() * b).cwiseAbs().maxCoeff(), 1e-11 * k);
+    EXPECT_LT((transposed_product(a, b) - c).cwiseAbs().maxCoeff(), 1e-11 * k);
   }
 }
 

@@ -7,10 +7,14 @@
 #include <sstream>
 
 #include "server/base/units.h"
+#include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 Plan planned(const std::shared_ptr<const Cell>& cell, bool bidirectional = false) {
   PlanOptions options{12, 5};
@@ -226,7 +230,7 @@ TEST(MeasuringProgram, RefusesRobotsThatAreNoSixAxisArms) {
   Plan plan;
   const Result<std::string> seven = to_rapid(Chain::make("seven", joints).value(), plan, {});
   ASSERT_FALSE(seven);
-  EXPECT_NE(seven.error().message.find("7 turning joints"), std::string::npos);
+  EXPECT_EQ(refusal_of(seven), Refusal("", {}, "joints").beyond(7, 6));
   joints[3].type = JointType::kPrismatic;
   EXPECT_FALSE(to_krl(Chain::make("rail in the middle", joints).value(), plan, {}));
   joints.resize(4);

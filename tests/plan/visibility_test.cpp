@@ -6,10 +6,14 @@
 
 #include "server/base/units.h"
 #include "server/plan/plan.h"
+#include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 /// cell-7 with a tracker 4 m in front of the robot whose target, a T-Mac, is seen within 30 deg.
 Cell watched_cell() {
@@ -81,11 +85,10 @@ TEST(Visibility, WithoutTrackerPositionOrApertureEverythingIsSeen) {
 TEST(Visibility, WhereBaseOrToolIsUnknownItCannotBeTold) {
   Cell cell = watched_cell();
   cell.X_WB.reset();
-  EXPECT_NE(plan_poses(cell, {30, 3}).error().message.find("the base is unknown"), std::string::npos)
-      << plan_poses(cell, {30, 3}).error().message;
+  EXPECT_EQ(refusal_of(plan_poses(cell, {30, 3})), Refusal("", {}, "base"));
   cell = watched_cell();
   cell.tools["spindle"].reset();
-  EXPECT_NE(plan_poses(cell, {30, 3}).error().message.find("tool spindle is unknown"), std::string::npos);
+  EXPECT_EQ(refusal_of(plan_poses(cell, {30, 3})), Refusal("", {}, "tools"));
 }
 
 TEST(Visibility, APlanThatTheTrackerCannotSeeIsRefusedWithTheCounts) {
@@ -93,7 +96,8 @@ TEST(Visibility, APlanThatTheTrackerCannotSeeIsRefusedWithTheCounts) {
   cell.tracker.aperture = from_deg(0.01);
   const Result<Eigen::MatrixXd> plan = plan_poses(cell, {50, 1});
   ASSERT_FALSE(plan);
-  EXPECT_NE(plan.error().message.find("out of the tracker's sight"), std::string::npos) << plan.error().message;
+  EXPECT_EQ(plan.error().field, "count");
+  EXPECT_LT(plan.error().value, plan.error().limit);
 }
 
 std::string cell_text(const std::string& tracker) {

@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "server/measurement/checked_batch.h"
 #include "server/trainer/pipeline/train.h"
+#include "tests/support/from_rows.h"
 #include "tests/support/small_cell.h"
 
 namespace trammel {
@@ -21,8 +23,8 @@ class ModelPage : public testing::Test {
   CompensatedModel trained(const std::string& bias, double validation_share = 0) const {
     TrainOptions options;
     options.bias = bias;
-    options.validation_share = validation_share;
-    return train(cell_, batch_, options).value();
+    const CheckedBatch checked = check_against_cell(batch_, *cell_, drawn(validation_share, 1)).value();
+    return train(cell_, checked, options).value();
   }
   /// What the charts of the page are drawn from.
   static nlohmann::json chart_data(const std::string& page) {
@@ -90,7 +92,7 @@ TEST_F(ModelPage, OpensWithoutANetwork) {
 
 TEST_F(ModelPage, CountsEveryPoseOfTheBatchInItsHistogram) {
   const auto checked = check_against_cell(batch_, *cell_);
-  const auto histogram = chart_data(model_page(trained("none"), *checked)).at("histogram");
+  const auto histogram = chart_data(model_page(trained("none"), checked->rows())).at("histogram");
   for (const char* level : {"calibrated", "compensated"}) {
     const auto counts = histogram.at(level).get<std::vector<int>>();
     EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0), 30) << level;
@@ -110,7 +112,7 @@ TEST_F(ModelPage, DrawsNoHistogramWhereItKnowsNoPoses) {
 }
 
 TEST_F(ModelPage, NamesFromFilesStayText) {
-  const std::string page = model_page(trained("none"), *check_against_cell(batch_, *cell_));
+  const std::string page = model_page(trained("none"), check_against_cell(batch_, *cell_)->rows());
   EXPECT_FALSE(has(page, "lt-<03>"));
   EXPECT_TRUE(has(page, "lt-&lt;03&gt;"));
 }

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 const std::vector<std::string> kExtended = {"base", "geometry", "gear_transmission:3@48.5"};
 
@@ -48,7 +52,7 @@ TEST(CellSources, OfAnAliasAreRefusedInsteadOfChangedElsewhere) {
   const auto edited =
       with_error_sources("list: &l [base]\nmodel: {error_sources: *l, bias: se}\n", kExtended, "c.yaml");
   ASSERT_FALSE(edited);
-  EXPECT_NE(edited.error().message.find("c.yaml: model: error_sources"), std::string::npos);
+  EXPECT_EQ(refusal_of(edited), Refusal("c.yaml", {}, "model: error_sources"));
 }
 
 }  // namespace

@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.h"
+
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 const Pose kTruth = make_pose(rotation_exp({0.5, -2.5, 0.8}), {3, -1, 0.5});
 
@@ -26,11 +31,11 @@ TEST(RigidFit, RefusesTooFewPointsAndPointsOnALine) {
   Eigen::Matrix3Xd p_B = Eigen::Matrix3Xd::Random(3, 5);
   const auto few = fit_transform(p_B.leftCols(2), p_B.leftCols(2));
   ASSERT_FALSE(few);
-  EXPECT_EQ(few.error().message, "localisation: 2 points, at least 3 are needed");
+  EXPECT_EQ(refusal_of(few), Refusal().beyond(2, 3));
   for (int i = 0; i < 5; ++i) p_B.col(i) = i * Vector3(1, 2, 3);
   const auto line = fit_transform(p_B, p_B);
   ASSERT_FALSE(line);
-  EXPECT_EQ(line.error().message, "localisation: the points lie on one line");
+  EXPECT_EQ(refusal_of(line), Refusal());
 }
 
 }  // namespace

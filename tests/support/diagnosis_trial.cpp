@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/measurement.h"
+#include "tests/support/from_rows.h"
 #include "tests/support/hidden_oracle.h"
 
 namespace trammel::test {

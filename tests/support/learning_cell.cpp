@@ -4,6 +4,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/robot/rigid_fit.h"
 #include "tests/support/demand.h"
@@ -58,7 +59,7 @@ double true_error(const CompensatedModel& model, const VirtualRobot& robot, cons
   SimulateOptions exact;
   exact.noise = false;
   exact.tool = tool;
-  const MeasurementBatch truth = demand(check_against_cell(demand(simulate(robot, q, exact)), cell));
+  const MeasurementBatch truth = demand(check_against_cell(demand(simulate(robot, q, exact)), cell)).rows();
   Eigen::Matrix3Xd real(3, q.rows()), predicted(3, q.rows());
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const Measurement& m = truth.measurements[static_cast<std::size_t>(i)];

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "server/base/coverage.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "tests/support/demand.h"
+#include "tests/support/from_rows.h"
 
 namespace trammel::test {
 

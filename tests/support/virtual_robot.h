@@ -6,6 +6,7 @@
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
 #include "server/simulate/simulate.h"
+#include "tests/support/from_rows.h"
 
 /// The shipped virtual robot, measured. Tests see its batches; its truth stays inside the simulator.
 namespace trammel::test {

@@ -11,10 +11,11 @@
 #include "server/trainer/pipeline/extend.h"
 #include "tests/error_sources/hose_pull.h"
 #include "tests/support/demand.h"
+#include "tests/support/from_rows.h"
 #include "tests/support/virtual_robot.h"
 
-// The README's recipe for adding a cause, followed to the letter: one file (tests/error_sources/hose_pull.h) and one
-// line that registers it. Nothing else anywhere knows of it.
+// The recipe of server/error_sources/README.md for adding a cause, followed to the letter: one file
+// (tests/error_sources/hose_pull.h) and one line that registers it. Nothing else anywhere knows of it.
 
 namespace trammel {
 namespace {
@@ -29,7 +30,7 @@ class TheRecipe : public testing::Test {
     cell->model.error_sources = {"base", "geometry"};
     cell->model.bias = "none";
     cell_ = std::move(cell);
-    batch_ = with_held_out(pulled(test::demand(plan_poses(*cell_, {.count = 160, .seed = 3}))), 0.2, 1);
+    batch_ = test::with_held_out(pulled(test::demand(plan_poses(*cell_, {.count = 160, .seed = 3}))), 0.2, 1);
   }
 
   /// As a robot measures them that goes elsewhere than it was told: the effect is put in by hand, not by the cause.

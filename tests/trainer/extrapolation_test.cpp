@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/compensate/bias_physics.h"
 #include "server/compensate/domain.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "tests/support/demand.h"
 #include "tests/support/outside.h"
 #include "tests/support/virtual_robot.h"

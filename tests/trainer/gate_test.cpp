@@ -9,6 +9,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/measurement/checked_batch.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -80,7 +81,7 @@ TEST_F(GateTest, ASubmitterDoesNotChooseHisJudges) {
 
 TEST_F(GateTest, JudgesThatAreSentAgainAsABatchOfTheirOwnDoNotTeachTheirOwnAnswers) {
   const MeasurementBatch first = first_day();
-  MeasurementBatch judges = test::demand(check_against_cell(first, *cell_));
+  MeasurementBatch judges = test::demand(check_against_cell(first, *cell_)).rows();
   const std::set<int> rows = judging_rows(judges, TrainerOptions{}.validation_share, TrainerOptions{}.seed);
   std::erase_if(judges.measurements, [&](const Measurement& m) { return !rows.contains(m.row); });
   judges.source_text.clear();
@@ -208,16 +209,16 @@ TEST_F(GateTest, FewJudgesLeaveItToAPerson) {
 /// Judged without a trainer.
 class JudgeTest : public GateTest {
  protected:
-  [[nodiscard]] MeasurementBatch day(const Day& day) const {
-    MeasurementBatch batch = test::demand(check_against_cell(measured_on(robot_, day), *cell_));
+  [[nodiscard]] CheckedBatch day(const Day& day) const {
+    MeasurementBatch batch = measured_on(robot_, day);
     batch.id = fmt::format("day-{}", day.seed);
-    return batch;
+    return test::demand(check_against_cell(std::move(batch), *cell_, held_out_by_service(0.2, 1)));
   }
-  [[nodiscard]] JudgingSession session(const Day& of) const { return judging_session(day(of), 0.2, 1); }
+  [[nodiscard]] JudgingSession session(const Day& of) const { return judging_session(day(of)); }
   [[nodiscard]] CompensatedModel trained(const Day& of) const {
     TrainOptions options;
     options.bias = "none";
-    return test::demand(train(cell_, held_out_by_service(day(of), 0.2, 1), options));
+    return test::demand(train(cell_, day(of), options));
   }
 };
 

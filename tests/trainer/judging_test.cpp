@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/measurement/split.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -23,11 +24,6 @@ MeasurementBatch batch_of(int poses) {
     batch.measurements.push_back(std::move(m));
   }
   return batch;
-}
-
-int count(const MeasurementBatch& batch, MeasurementSet set) {
-  return static_cast<int>(std::count_if(batch.measurements.begin(), batch.measurements.end(),
-                                        [set](const Measurement& m) { return m.set == set; }));
 }
 
 TEST(JudgingRows, AreAFifthAndOfAHundredPosesAtLeastThirtyFour) {
@@ -51,7 +47,8 @@ TEST(JudgingRows, TheSubmitterHoldsOutMoreButDoesNotChooseThem) {
   const std::set<int> judges = judging_rows(batch, kShare, 1);
   EXPECT_EQ(judges.size(), 8U) << "a fifth of the other 40";
   for (int i = 0; i < 20; ++i) EXPECT_FALSE(judges.contains(i + 2));
-  EXPECT_EQ(count(held_out_by_service(batch, kShare, 1), MeasurementSet::kTrain), 32);
+  const std::vector<bool> held_out = held_out_by_service(kShare, 1)(batch);
+  EXPECT_EQ(std::count(held_out.begin(), held_out.end(), false), 32);
 }
 
 TEST(JudgingRows, ACopyOfAJudgeIsNotLearnedFrom) {
@@ -62,43 +59,50 @@ TEST(JudgingRows, ACopyOfAJudgeIsNotLearnedFrom) {
     copy.row += 50;
     batch.measurements.push_back(copy);
   }
-  const MeasurementBatch held_out = held_out_by_service(batch, kShare, 1);
+  const std::vector<bool> held_out = held_out_by_service(kShare, 1)(batch);
   EXPECT_EQ(judging_rows(batch, kShare, 1).size(), 20U) << "ten poses, each measured twice";
-  for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ(held_out.measurements[i].set, held_out.measurements[i + 50].set);
+  for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ(held_out[i], held_out[i + 50]);
 }
 
-MeasurementBatch measured_batch(const std::string& id, int first, int last) {
-  MeasurementBatch batch = batch_of(last);
-  batch.measurements.erase(batch.measurements.begin(), batch.measurements.begin() + first);
-  for (Measurement& m : batch.measurements) m.p_W = Vector3(1.2, 0.3, 0.01 * m.row);
+/// Rows `first` to `last` of one day of the shipped robot, as a batch of their own.
+MeasurementBatch part_of_a_day(const std::string& id, int first, int last) {
+  static const MeasurementBatch day = test::measured(test::chapter_5_robot(test::cell_7()), 120, 3);
+  MeasurementBatch batch = day;
   batch.id = id;
+  batch.measurements.assign(day.measurements.begin() + first, day.measurements.begin() + last);
   return batch;
 }
 
+CheckedBatch accepted(const MeasurementBatch& batch) {
+  return test::demand(check_against_cell(batch, *test::cell_7(), held_out_by_service(kShare, 1)));
+}
+
+std::set<int> rows_of(const MeasurementBatch& batch) {
+  std::set<int> rows;
+  for (const Measurement& m : batch.measurements) rows.insert(m.row);
+  return rows;
+}
+
 TEST(JudgingSessions, ARowThatIsSentAgainUnderAnotherIdJudgesOnceAndIsNotLearnedFrom) {
-  const MeasurementBatch again = measured_batch("again", 10, 120);
-  std::vector<JudgingSession> sessions = {judging_session(measured_batch("first", 0, 100), kShare, 1),
-                                          judging_session(again, kShare, 1)};
-  const MeasurementBatch first_judges = sessions[0].judges;
+  const CheckedBatch first = accepted(part_of_a_day("first", 0, 100));
+  const CheckedBatch again = accepted(part_of_a_day("again", 10, 120));
+  std::vector<JudgingSession> sessions = {judging_session(first), judging_session(again)};
+  const std::set<int> first_judges = rows_of(sessions[0].judges);
+  const std::set<int> sent_twice = rows_of(first.rows());
   judge_once(sessions);
-  EXPECT_EQ(sessions[0].judges.measurements.size(), first_judges.measurements.size());
-  for (const Measurement& m : sessions[1].judges.measurements) EXPECT_GE(m.row, 102) << "of the twenty new ones";
+  EXPECT_EQ(rows_of(sessions[0].judges), first_judges);
+  for (const int row : rows_of(sessions[1].judges)) EXPECT_FALSE(sent_twice.contains(row)) << "of the twenty new ones";
   EXPECT_FALSE(sessions[1].judges.measurements.empty());
-  const MeasurementBatch learned = without_older_judges(held_out_by_service(again, kShare, 1), sessions);
-  std::set<int> judges;
-  for (const Measurement& m : first_judges.measurements) judges.insert(m.row);
-  for (const Measurement& m : learned.measurements)
-    EXPECT_TRUE(m.set != MeasurementSet::kTrain || !judges.contains(m.row)) << m.row;
-  const MeasurementBatch first = held_out_by_service(measured_batch("first", 0, 100), kShare, 1);
-  const MeasurementBatch kept = without_older_judges(first, sessions);
-  EXPECT_EQ(count(kept, MeasurementSet::kTrain), count(first, MeasurementSet::kTrain));
+  for (const int row : rows_of(without_older_judges(again, sessions).training()))
+    EXPECT_FALSE(first_judges.contains(row)) << row;
+  EXPECT_EQ(rows_of(without_older_judges(first, sessions).training()), rows_of(first.training()));
 }
 
 TEST(JudgingSessions, TheSamePoseMeasuredAnotherTimeJudgesAgain) {
-  MeasurementBatch later = measured_batch("later", 0, 100);
+  MeasurementBatch later = part_of_a_day("later", 0, 100);
   for (Measurement& m : later.measurements) m.p_W.x() += 12e-6;
-  std::vector<JudgingSession> sessions = {judging_session(measured_batch("first", 0, 100), kShare, 1),
-                                          judging_session(later, kShare, 1)};
+  std::vector<JudgingSession> sessions = {judging_session(accepted(part_of_a_day("first", 0, 100))),
+                                          judging_session(accepted(later))};
   judge_once(sessions);
   EXPECT_EQ(sessions[1].judges.measurements.size(), 34U);
 }
@@ -120,14 +124,13 @@ TEST(LocatedErrors, DoNotDependOnWhereTheTrackerStood) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
   const auto batch = [&](bool anew) {
-    return test::demand(
-        check_against_cell(test::measured_on(robot, {.poses = 120, .seed = 3, .set_up_anew = anew}), *cell));
+    return accepted(test::measured_on(robot, {.poses = 120, .seed = 3, .set_up_anew = anew}));
   };
   TrainOptions options;
   options.bias = "none";
-  const CompensatedModel model = test::demand(train(cell, batch(false), options));
-  const LocatedErrors here = located_errors(model, judging_session(batch(false), kShare, 1));
-  const LocatedErrors there = located_errors(model, judging_session(batch(true), kShare, 1));
+  const CompensatedModel model = test::demand(train(cell, batch(false).rows(), options));
+  const LocatedErrors here = located_errors(model, judging_session(batch(false)));
+  const LocatedErrors there = located_errors(model, judging_session(batch(true)));
   ASSERT_EQ(here.position.cols(), 34);
   EXPECT_LT((here.position - there.position).cwiseAbs().maxCoeff(), 2e-6) << "gravity is turned a little";
   EXPECT_LT((here.rotation - there.rotation).cwiseAbs().maxCoeff(), 2e-6);

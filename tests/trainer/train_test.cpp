@@ -6,13 +6,20 @@
 #include <random>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
+#include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
+#include "tests/support/figure.h"
+#include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
+
+using test::Refusal;
+using test::refusal_of;
 
 TrainOptions quick(const std::string& level, const std::string& bias) {
   TrainOptions options;
@@ -105,7 +112,7 @@ TEST(Train, WhatARequestDoesNotSayWidensItsUncertainty) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     later.measurements[i].context.temperature = 20.5 + 0.02 * static_cast<double>(i);
   }
-  const MeasurementBatch checked = test::demand(check_against_cell(later, *cell));
+  const MeasurementBatch checked = test::demand(check_against_cell(later, *cell)).rows();
   EXPECT_EQ(*checked.measurements.front().context.time, 0);
   EXPECT_EQ(*checked.measurements[100].context.time, 2000);
 }
@@ -249,8 +256,8 @@ TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
 TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
   const auto cell = test::cell_7();
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 63);
-  EXPECT_EQ(train(cell, batch, quick("M1", "se * joint_map")).error().message,
-            "bias kernel `se * joint_map`: `joint_map` can only be added to a whole bias, as in `se + joint_map`");
+  EXPECT_EQ(refusal_of(train(cell, batch, quick("M1", "se * joint_map"))),
+            Refusal("", {}, "bias").text("se * joint_map"));
 }
 
 /// A real robot with base and tool unknown: ../shared/data, where it is at hand.
@@ -281,7 +288,12 @@ class RealRobot : public testing::Test {
   static Figures figures(const std::string& name) {
     const Evaluation evaluation =
         *test::demand(train(cell(), series(name), quick("M3", "matern52"))).parts().validation;
-    return {to_mm(evaluation.nominal.rms), to_mm(evaluation.calibrated.rms), to_mm(evaluation.compensated.rms)};
+    const Figures figures{to_mm(evaluation.nominal.rms), to_mm(evaluation.calibrated.rms),
+                          to_mm(evaluation.compensated.rms)};
+    test::tell_figure("UR10 " + name + " nominal, mm", figures.nominal_mm);
+    test::tell_figure("UR10 " + name + " geometry and compliance, mm", figures.geometry_mm);
+    test::tell_figure("UR10 " + name + " with matern52, mm", figures.compensated_mm);
+    return figures;
   }
   void SetUp() override {
     if (!std::filesystem::exists(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_c.csv")) {
@@ -301,6 +313,7 @@ const char* const kJointMaps = "M3,joint_map:1,joint_map:2,joint_map:3,joint_map
 
 TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
   const CompensatedModel c = test::demand(train(cell(), series("c"), quick(kJointMaps, "none")));
+  test::tell_figure("UR10 c joint maps, mm", to_mm(c.parts().validation->calibrated.rms));
   EXPECT_LE(to_mm(c.parts().validation->calibrated.rms), 0.115);
   // The other series months later: base and tool from 60 of its poses (spread over it: it keeps one orientation for
   // dozens of poses), everything else from the first.
@@ -311,14 +324,14 @@ TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
   const CompensatedModel without = test::demand(train(cell(), series("c"), quick("M3", "none")));
   refit.from = without;
   const CompensatedModel d_without = test::demand(train(cell(), series("d", 60, 7), refit));
-  RecordProperty("series_d_mm", fmt::format("{:.4f}", to_mm(d.parts().validation->calibrated.rms)));
-  RecordProperty("series_d_without_maps_mm",
-                 fmt::format("{:.4f}", to_mm(d_without.parts().validation->calibrated.rms)));
+  test::tell_figure("UR10 d from c, joint maps, mm", to_mm(d.parts().validation->calibrated.rms));
+  test::tell_figure("UR10 d from c, without maps, mm", to_mm(d_without.parts().validation->calibrated.rms));
   EXPECT_LT(d.parts().validation->calibrated.rms, d_without.parts().validation->calibrated.rms);
 }
 
 TEST_F(RealRobot, JointMapsLearnFromTwoHundredPoses) {
   const CompensatedModel c = test::demand(train(cell(), series("c", 200), quick(kJointMaps, "se")));
+  test::tell_figure("UR10 c joint maps, 200 poses, mm", to_mm(c.parts().validation->calibrated.rms));
   EXPECT_LE(to_mm(c.parts().validation->calibrated.rms), 0.155);
   EXPECT_LE(to_mm(c.parts().validation->compensated.rms), 0.155) << "a process on top may not spoil it";
 }
@@ -327,11 +340,17 @@ TEST_F(RealRobot, ABiasWithJointMapsAndParametersTakesUr10ToATenthOfAMillimetre)
   for (const char* name : {"c", "d"}) {
     const auto model = train(cell(), series(name), quick("M3", "matern52 + joint_map + parameters"));
     const Evaluation evaluation = *test::demand(model).parts().validation;
-    RecordProperty(fmt::format("series_{}_mm", name), fmt::format("{:.4f}", to_mm(evaluation.compensated.rms)));
+    const auto tell = [&](const char* what, double value) {
+      test::tell_figure(fmt::format("UR10 {} coupled bias, {}", name, what), value);
+    };
+    tell("mm", to_mm(evaluation.compensated.rms));
+    tell("inside 95 %", 100 * evaluation.coverage_95);
     EXPECT_LE(to_mm(evaluation.compensated.rms), 0.105) << name;
     EXPECT_GE(evaluation.coverage_95, 0.90) << name;
     const OrientationFigures& turned = evaluation.orientation.value();
-    RecordProperty(fmt::format("series_{}_deg", name), fmt::format("{:.4f}", to_deg(turned.compensated)));
+    tell("calibrated, deg", to_deg(turned.calibrated));
+    tell("deg", to_deg(turned.compensated));
+    tell("orientations inside 95 %", 100 * turned.coverage_95.value());
     EXPECT_LE(turned.compensated, 0.4 * turned.calibrated) << name;
     EXPECT_GE(turned.coverage_95.value(), 0.92) << name;
   }

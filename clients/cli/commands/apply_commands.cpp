@@ -6,13 +6,14 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
 namespace trammel::cli {
 
 namespace {
 
-constexpr std::size_t kItemsOfOneCall = 1000;  // keeps answers of a service small
+constexpr std::size_t kPosesTogether = 1000;  // that a model predicts between two looks at the progress
 
 /// What predict and correct have in common.
 struct ApplyArguments {
@@ -28,31 +29,6 @@ void fill_in(JointList& list, const ApplyArguments& arguments) {
     if (pose.context.tool.empty()) pose.context.tool = arguments.tool;
     if (pose.context.payload.empty()) pose.context.payload = arguments.payload;
   }
-}
-
-/// Asks the service for all items, so many a call, of one model: the later calls name the model that answered the
-/// first.
-template <typename Item, typename Answered, typename Ask>
-Result<std::string> ask_in_parts(const std::vector<Item>& items, client::CallContext context, const char* what,
-                                 const Ask& ask, std::vector<Answered>& answers) {
-  ProgressLine progress;
-  std::string model_id;
-  for (std::size_t from = 0; from < items.size(); from += kItemsOfOneCall) {
-    progress.show(what, static_cast<double>(from) / static_cast<double>(items.size()));
-    const auto first = items.begin() + static_cast<std::ptrdiff_t>(from);
-    const auto count = static_cast<std::ptrdiff_t>(std::min(kItemsOfOneCall, items.size() - from));
-    Result<client::Answer<Answered>> answer = ask(context, std::vector<Item>(first, first + count));
-    if (!answer) return tl::make_unexpected(answer.error());
-    if (answer->items.size() != static_cast<std::size_t>(count)) {
-      return failure(ErrorCode::kInternal, "the service answered {} of {} items", answer->items.size(), count);
-    }
-    if (from == 0) {
-      model_id = answer->model.id;
-      if (context.model.empty()) context.model = model_id;
-    }
-    answers.insert(answers.end(), answer->items.begin(), answer->items.end());
-  }
-  return model_id;
 }
 
 Result<client::CallContext> call_context(const ApplyArguments& arguments) {
@@ -75,7 +51,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
     if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
-      return refused("{} row {}: {}", list.where, pose.row, sentence(known.error()));
+      return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
     asked.q = pose.context.q;
@@ -86,16 +62,16 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
   }
   Predictions predictions{model->provenance().id, {}};
   ProgressLine progress;
-  for (std::size_t from = 0; from < poses.size(); from += kItemsOfOneCall) {
+  for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
-    const std::size_t to = std::min(from + kItemsOfOneCall, poses.size());
+    const std::size_t to = std::min(from + kPosesTogether, poses.size());
     const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
     for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
       if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
       if (!arguments.orientation) continue;
       const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
-      if (!turned) return refused("{}: {}", arguments.model, sentence(turned.error()));
+      if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
       predictions.turned.push_back(*turned);
     }
   }
@@ -104,9 +80,13 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
   if (arguments.covariance)
-    return failure(ErrorCode::kUsage, "--covariance needs a model file: a service does not send covariances");
+    return failure(ErrorCode::kUsage, "--covariance needs a model file")
+        .of("--covariance")
+        .next("a service does not send covariances");
   if (arguments.orientation)
-    return failure(ErrorCode::kUsage, "--orientation needs a model file: a service does not send these deviations");
+    return failure(ErrorCode::kUsage, "--orientation needs a model file")
+        .of("--orientation")
+        .next("a service does not send these deviations");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
@@ -114,21 +94,22 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   std::vector<std::vector<double>> joints;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
-      return refused("{} row {}: tool '{}' and payload '{}' after '{}' and '{}'; a service is asked for one of each",
-                     list.where, pose.row, pose.context.tool, pose.context.payload, context->tool, context->payload);
+      return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
+                     context->tool, context->payload)
+          .in(list.where)
+          .at_row(pose.row)
+          .of("tool_id")
+          .with_text(pose.context.tool)
+          .next("a service is asked for one of each");
     }
     joints.push_back(to_wire(pose.context.q, list.joint_types));
   }
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
-  Predictions predictions;
-  const auto ask = [&](const client::CallContext& call, const std::vector<std::vector<double>>& part) {
-    return (*session)->predict_error(call, part);
-  };
-  return ask_in_parts(joints, *context, "predicting", ask, predictions.items).map([&](std::string model_id) {
-    predictions.model_id = std::move(model_id);
-    return predictions;
-  });
+  ProgressLine progress;
+  auto answer = (*session)->predict_error(*context, joints, [&](double share) { progress.show("predicting", share); });
+  if (!answer) return tl::make_unexpected(answer.error());
+  return Predictions{answer->model.id, std::move(answer->items)};
 }
 
 Status predict(const ApplyArguments& arguments) {
@@ -170,14 +151,11 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
-  Corrections corrections{"", file.joint_types, {}};
-  const auto ask = [&](const client::CallContext& call, const std::vector<client::TargetMm>& part) {
-    return (*session)->correct_targets(call, part);
-  };
-  return ask_in_parts(targets, *context, "correcting", ask, corrections.items).map([&](std::string model_id) {
-    corrections.model_id = std::move(model_id);
-    return corrections;
-  });
+  ProgressLine progress;
+  auto answer =
+      (*session)->correct_targets(*context, targets, [&](double share) { progress.show("correcting", share); });
+  if (!answer) return tl::make_unexpected(answer.error());
+  return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
 }
 
 /// Whether what could not be corrected counts.
@@ -187,7 +165,10 @@ struct CorrectArguments : ApplyArguments {
 
 Result<Extent> correct(const CorrectArguments& arguments) {
   if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
-    return failure(ErrorCode::kUsage, "{}: unknown kind of targets '{}'; known: .csv", arguments.input, ending);
+    return failure(ErrorCode::kUsage, "unknown kind of targets '{}'", ending)
+        .in(arguments.input)
+        .with_text(ending)
+        .next("known: .csv");
   }
   const Result<TargetFile> file = read_targets_csv(arguments.input);
   if (!file) return tl::make_unexpected(file.error());
@@ -210,7 +191,7 @@ Result<Extent> correct(const CorrectArguments& arguments) {
 void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   command
       .add_option("--model", arguments.model,
-                  "Model file; with --service a cell id (its model in force) or cell@version")
+                  "Model file; with --service a cell id (its model in force) or CELL@VERSION")
       ->required();
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
@@ -220,17 +201,19 @@ void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 void add_predict(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ApplyArguments>();
   CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
-  command->add_option("--joints", arguments->input, "Commanded joints (CSV: deg, rails in mm)")->required();
+  command->add_option("--joints", arguments->input, "Commanded joints (CSV: joints in deg, rails in mm)")->required();
   command
       ->add_option("-o,--output", arguments->output,
-                   "Predicted errors, standard deviations and poses in the robot's base (CSV: mm)")
+                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm)")
       ->required();
   command->add_flag(
       "--covariance", arguments->covariance,
-      "Append covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations "
-      "of the true error, without the tracker's own (slx_mm ...)");
-  command->add_flag("--orientation", arguments->orientation,
-                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
+      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations of the "
+      "true error, the tracker's noise left out (slx_mm ...); with a model file only");
+  command->add_flag(
+      "--orientation", arguments->orientation,
+      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
+      "file only");
   add_apply_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
 }
@@ -238,11 +221,15 @@ void add_predict(CLI::App& app, Action& chosen) {
 void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
-  command->add_option("input", arguments->input, "Targets in the robot's base (CSV: mm, joints in deg)")->required();
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Corrected targets (CSV: mm, deg), each behind the columns of its input; a column named as one of "
-                   "ours comes as input_NAME")
+      ->add_option("input", arguments->input,
+                   "Targets in the robot's base (.csv: positions in mm, joints in deg, rails in mm)")
+      ->required();
+  command
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Corrected targets to write (CSV: mm, deg), behind the columns of the input; an input column that is named "
+          "as an output column comes as input_NAME")
       ->required();
   CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
                                                 "Exit with 0, not 1, where targets are left as they were");

@@ -6,6 +6,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/diagnosis_json.h"
@@ -21,7 +22,7 @@ using nlohmann::ordered_json;
 constexpr const char* kCellOption = "--cell-out";
 constexpr double kHeldOutShare = 0.2;  // of a batch without `set` column that is to judge an extended model
 
-Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 std::uint64_t seed) {
   ProgressLine progress;
   DiagnoseOptions options;
@@ -33,7 +34,7 @@ Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const M
   return diagnose(cell, batch, options);
 }
 
-Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 const Diagnosis& diagnosis, std::uint64_t seed) {
   ProgressLine progress;
   TrainOptions options;
@@ -68,16 +69,15 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
 }
 
 /// Never silently worse: what does not lower the error on poses held out beyond chance goes into no file.
-Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                        const Diagnosis& diagnosis, const DiagnoseArguments& arguments, ordered_json& json,
-                        Outputs& outputs) {
+Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
+                        const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
   if (!extension) return extension;
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
   if (!extension->gain.beyond_chance()) {
-    return refused("cell {}: with what was found {}; cell file and model were not written", cell->name,
-                   to_string(extension->gain));
+    return refused("cell {}: with what was found {}", cell->name, to_string(extension->gain))
+        .next("cell file and model were not written");
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
@@ -87,14 +87,14 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const Measureme
 }
 
 /// The batch that is diagnosed: to apply what is found, some rows must not have been seen.
-Result<MeasurementBatch> batch_to_diagnose(const DiagnoseArguments& arguments) {
-  Result<MeasurementBatch> batch = read_batch(arguments.batch);
-  if (!batch || !arguments.apply) return batch;
-  return with_held_out(std::move(*batch), kHeldOutShare, arguments.seed);
+Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
+  return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
+    return check_against_cell(std::move(batch), cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
+  });
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
-  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required");
+  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
@@ -102,7 +102,7 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   Result<Cell> read = read_cell(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<MeasurementBatch> batch = batch_to_diagnose(arguments);
+  const Result<CheckedBatch> batch = batch_to_diagnose(arguments, *cell);
   if (!batch) return tl::make_unexpected(batch.error());
   const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
@@ -154,20 +154,26 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
   command->add_option(
       "--batch", arguments->batch,
-      "Measurements (CSV: deg, mm); with --service also the id of a batch that it has, else the newest");
-  command->add_option("--report", arguments->report, "Page to write (HTML), opens offline")->type_name("FILE");
+      "Measurements (CSV: joints in deg, rails in mm; positions in mm); with --service also the id of a batch that the "
+      "service has; left out there: its newest batch");
+  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+      ->type_name("FILE");
   command
-      ->add_option(
-          "--next-poses", arguments->next_poses,
-          "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot; where "
-          "there are none nothing is written, the reason is said on standard error, and the exit code is 0")
+      ->add_option("--next-poses", arguments->next_poses,
+                   "Plan to write (CSV: joints in deg, rails in mm) of poses that tell apart what this batch cannot. "
+                   "Where there are "
+                   "none nothing is written, the reason goes to standard error, and the exit code is 0")
       ->type_name("FILE");
   add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
-  CLI::Option* apply_flag = command->add_flag(
-      "--apply", arguments->apply,
-      "Add what was found to the cell's error sources and train; nothing is written unless poses held out gain by it");
-  command->add_option("--model", arguments->model, "With --apply: extended model to write")->needs(apply_flag);
-  command->add_option("--cell-out", arguments->cell_out, "With --apply: cell file to write instead of --cell itself")
+  CLI::Option* apply_flag = command->add_flag("--apply", arguments->apply,
+                                              "Add what was found to the cell's error sources and train. Cell file and "
+                                              "model are written, with --service put in "
+                                              "force, only where poses held out gain by it beyond chance");
+  command->add_option("--model", arguments->model, "With --apply, on files: extended model file to write")
+      ->needs(apply_flag);
+  command
+      ->add_option("--cell-out", arguments->cell_out,
+                   "With --apply, on files: cell file to write instead of --cell itself")
       ->needs(apply_flag);
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);

@@ -67,7 +67,7 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
 
 Status convert(const ConvertArguments& arguments) {
   if (!arguments.points.empty() && arguments.joints.empty()) {
-    return failure(ErrorCode::kUsage, "--points needs --joints: the plan that was measured");
+    return failure(ErrorCode::kUsage, "--points needs --joints").of("--joints").next("name the plan that was measured");
   }
   Result<Converted> converted = read_converted(arguments);
   if (!converted) return tl::make_unexpected(converted.error());
@@ -148,8 +148,11 @@ ordered_json references_json(const ReferenceCheck& check) {
 Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck& check) {
   if (arguments.batch.empty()) return {};
   if (!check.rigid) {
-    return refused("{}: not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is reflector {}",
-                   arguments.batch, to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst);
+    return refused("not localised: {:.4f} mm rms remain after the transform, limit {:g} mm; worst is reflector {}",
+                   to_mm(check.rms_remaining), arguments.repeat_above_mm, check.worst)
+        .in(arguments.batch)
+        .beyond(to_mm(check.rms_remaining), arguments.repeat_above_mm)
+        .with_text(check.worst);
   }
   return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
     const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
@@ -159,7 +162,8 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
 
 Status check_reflectors(const ReferencesArguments& arguments) {
   if (arguments.batch.empty() != arguments.output.empty()) {
-    return failure(ErrorCode::kUsage, "--batch and --output belong together");
+    return failure(ErrorCode::kUsage, "--batch and --output belong together")
+        .of(arguments.batch.empty() ? "--batch" : "--output");
   }
   const Result<PointList> nominal = read_points(arguments.nominal);
   if (!nominal) return tl::make_unexpected(nominal.error());
@@ -175,18 +179,22 @@ Status check_reflectors(const ReferencesArguments& arguments) {
 
 void add_convert(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ConvertArguments>();
-  CLI::App* command = app.add_subcommand("convert", "Make a batch of what other programs measured");
+  CLI::App* command = app.add_subcommand("convert", "Make a batch of measurements that other programs exported");
   CLI::Option_group* what = command->add_option_group("Measurements");
   CLI::Option* points = what->add_option("--points", arguments->points,
                                          "Points or frames exported by SpatialAnalyzer (ASCII), with --joints");
   what->add_option("--robodk", arguments->robodk, "Measurements exported by a RoboDK calibration project (CSV)");
   what->require_option(1);
-  command->add_option("--joints", arguments->joints, "Plan that was measured (CSV); pose_id is the point's name")
+  command
+      ->add_option("--joints", arguments->joints,
+                   "Plan that was measured (CSV: joints in deg, rails in mm); its pose_id is the point's name")
       ->needs(points);
-  command->add_option("--unit", arguments->unit, "Unit of the points' lengths where the file does not say (default mm)")
+  command->add_option("--unit", arguments->unit, "Unit of the points' lengths where the file does not say; else mm")
       ->check(one_of(kUnits))
       ->needs(points);
-  command->add_option("--coordinates", arguments->coordinates, "Coordinates of the points where the file does not say")
+  command
+      ->add_option("--coordinates", arguments->coordinates,
+                   "Coordinates of the points where the file does not say; else cartesian")
       ->check(one_of(kCoordinates))
       ->needs(points);
   command
@@ -194,29 +202,42 @@ void add_convert(CLI::App& app, Action& chosen) {
                    "What three values behind the coordinates are, where the file does not say")
       ->check(one_of(kBehind))
       ->needs(points);
-  command->add_option("--coverage", arguments->coverage, "Standard deviations that the uncertainties in the file are")
+  command
+      ->add_option("--coverage", arguments->coverage, "How many standard deviations the uncertainties in the file are")
       ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str()
       ->needs(points);
   add_tool_options(*command, arguments->tool, arguments->payload);
-  command->add_option("-o,--output", arguments->output, "Batch to write (CSV: deg, mm)")->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Batch to write (CSV: joints in deg, rails in mm; positions in mm)")
+      ->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return convert(*arguments); }; });
 }
 
 void add_references(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReferencesArguments>();
-  CLI::App* command = app.add_subcommand(
-      "references", "Tell from the reference reflectors whether the tracker has moved, and where to");
-  command->add_option("--nominal", arguments->nominal, "Reflectors as first measured (CSV: name,x_mm,y_mm,z_mm)")
+  CLI::App* command =
+      app.add_subcommand("references", "Tell from reference reflectors whether the tracker has moved, and where to");
+  command->add_option("--nominal", arguments->nominal, "Reflectors as first measured (CSV: name, x_mm, y_mm, z_mm)")
       ->required();
-  command->add_option("--measured", arguments->measured, "The same reflectors measured now")->required();
-  command->add_option("--batch", arguments->batch,
-                      "Batch to move into the frame of the nominal reflectors; stays as it is when all is fine");
-  command->add_option("-o,--output", arguments->output, "The moved batch (CSV: deg, mm)");
-  command->add_option("--localise-above-mm", arguments->localise_above_mm, "Rms difference above which to localise")
+  command
+      ->add_option("--measured", arguments->measured,
+                   "The same reflectors as measured now (CSV: name, x_mm, y_mm, z_mm)")
+      ->required();
+  command->add_option(
+      "--batch", arguments->batch,
+      "Batch to move into the frame of the nominal reflectors (needs --output); stays as it is where all is fine");
+  command->add_option("-o,--output", arguments->output,
+                      "The moved batch to write (CSV: joints in deg, rails in mm; positions in mm)");
+  command
+      ->add_option("--localise-above-mm", arguments->localise_above_mm,
+                   "Rms difference above which the tracker is to be localised again, mm")
       ->capture_default_str();
-  command->add_option("--repeat-above-mm", arguments->repeat_above_mm, "Rms difference above which to repeat the test")
+  command
+      ->add_option("--repeat-above-mm", arguments->repeat_above_mm,
+                   "Rms difference above which the test before is to be repeated, too, mm")
       ->capture_default_str();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return check_reflectors(*arguments); }; });

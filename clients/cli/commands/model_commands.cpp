@@ -1,12 +1,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <map>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "server/compensate/known_rows.h"
+#include "server/compensate/model_file.h"
 #include "server/diagnose/triage.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/model_page.h"
@@ -21,6 +22,12 @@ std::int64_t unix_time() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
+Result<CheckedBatch> read_checked_batch(const std::string& path, const Cell& cell,
+                                        const HoldOut& hold_out = drawn(0, 0)) {
+  return read_batch(path).and_then(
+      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), cell, hold_out); });
+}
+
 struct TrainArguments {
   std::string from;
   std::string refit = "base,tool";
@@ -33,16 +40,12 @@ struct TrainArguments {
 /// As the service does before it learns from a batch: holds it against the model to start from. What is refitted may
 /// differ; anything else would be learned as if it belonged to it.
 Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
-                    const MeasurementBatch& batch) {
-  const Result<MeasurementBatch> checked = check_against_cell(batch, from.cell());
-  const Result<MeasurementBatch> here = check_against_cell(batch, cell);
-  if (!checked || !here) return {};  // its tools are others: nothing to compare
-  if (const Status fits = check_may_start_from(from, cell, *here, refit); !fits) return fits;
-  const bool known = std::all_of(checked->measurements.begin(), checked->measurements.end(), [&](const Measurement& m) {
-    return from.check_trained_with(m.context.tool, m.context.payload).has_value();
-  });
-  if (!known) return {};
-  const Triage seen = triage(from, *checked, with_known_tools(cell, from, refit));
+                    const CheckedBatch& batch) {
+  if (const Status fits = check_may_start_from(from, cell, batch.rows(), refit); !fits) return fits;
+  const auto& rows = batch.rows().measurements;
+  const bool known = std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return knows(from, m); });
+  if (!known) return {};  // its tools are others: nothing to compare
+  const Triage seen = triage(from, batch, with_known_tools(cell, from, refit));
   const auto is_refitted = [&](const Cause& cause) {
     const causes::Rival* whole = whole_of(record_of(cause));
     return whole != nullptr && std::find(refit.begin(), refit.end(), whole->cause) != refit.end();
@@ -50,20 +53,22 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   const bool refitted = seen.verdict == TriageVerdict::kExplained && seen.cause.pose_id.empty() &&
                         is_refitted(seen.cause) && (!seen.tracker_elsewhere || corrects(refit, causes::Part::kBase));
   if (seen.learn || refitted) return {};
-  return refused("batch {}: {}; refitting {} would not learn that (train without --from)", batch.id, seen.sentence,
-                 fmt::join(refit, ","));
+  return refused("{}", seen.sentence)
+      .in("batch " + batch.id())
+      .of("--refit")
+      .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
 }
 
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  const Result<MeasurementBatch> batch = read_batch(arguments.batch);
+  const Result<CheckedBatch> batch =
+      read_checked_batch(arguments.batch, *cell, drawn(arguments.validation_share, arguments.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   TrainOptions options;
   options.level = arguments.level;
   options.bias = arguments.bias;
   options.seed = arguments.seed;
-  options.validation_share = arguments.validation_share;
   options.trained_at = unix_time();
   if (!arguments.from.empty()) {
     Result<CompensatedModel> from = load_model(arguments.from);
@@ -99,19 +104,13 @@ struct EvaluateArguments {
   std::string model, batch, json;
 };
 
-/// The batch, ready for the model's cell.
-Result<MeasurementBatch> read_checked_batch(const std::string& path, const CompensatedModel& model) {
-  return read_batch(path).and_then(
-      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), model.cell()); });
-}
-
 Status evaluate(const EvaluateArguments& arguments) {
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
-  const Result<MeasurementBatch> batch = read_checked_batch(arguments.batch, *model);
+  const Result<CheckedBatch> batch = read_checked_batch(arguments.batch, model->cell());
   if (!batch) return tl::make_unexpected(batch.error());
-  const Evaluation evaluation = model->evaluate(*batch);
-  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id) +
+  const Evaluation evaluation = model->evaluate(batch->rows());
+  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id()) +
            evaluation_table(evaluation),
        {arguments.json});
   return write_json(arguments.json, evaluation_json(evaluation));
@@ -126,9 +125,9 @@ Status report(const ReportArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   std::optional<MeasurementBatch> batch;
   if (!arguments.batch.empty()) {
-    Result<MeasurementBatch> checked = read_checked_batch(arguments.batch, *model);
+    const Result<CheckedBatch> checked = read_checked_batch(arguments.batch, model->cell());
     if (!checked) return tl::make_unexpected(checked.error());
-    batch = std::move(*checked);
+    batch = checked->rows();
   }
   if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
   tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
@@ -138,14 +137,18 @@ Status report(const ReportArguments& arguments) {
 
 void add_train(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot and learn what calibration leaves over");
+  CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot, and learn what calibration leaves over");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
-  command->add_option("--level", arguments->level,
-                      "What to identify instead of the cell's error sources: M0, M1 (base), M2 (+ geometry), M3 (+ "
-                      "compliance), a list of sources, or a level and more: M2,gear_transmission:3");
-  command->add_option("--bias", arguments->bias,
-                      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none or auto");
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+      ->required();
+  command->add_option(
+      "--level", arguments->level,
+      "What to identify instead of the cell's error sources: M0 (nothing), M1 (base), M2 (base, geometry), M3 "
+      "(base, geometry, compliance), a list of sources, or a level and more: M2,gear_transmission:3");
+  command->add_option(
+      "--bias", arguments->bias,
+      "Kernel of the learned bias instead of the cell's: se, matern52 + joint_map, ..., none, or auto (the simplest "
+      "that poses left out say is worth it)");
   command->add_option("--from", arguments->from,
                       "Model file of the same robot to start from: all but the sources of --refit stay as they are");
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
@@ -154,19 +157,21 @@ void add_train(CLI::App& app, Action& chosen) {
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
-                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column")
+                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
-  command->add_option("-o,--output", arguments->output, "Model to write")->required();
+  command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
 }
 
 void add_evaluate(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<EvaluateArguments>();
-  CLI::App* command = app.add_subcommand("evaluate", "Compare a model with measurements; errors in mm");
+  CLI::App* command =
+      app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: deg, mm)")->required();
+  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+      ->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }
@@ -175,7 +180,8 @@ void add_report(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReportArguments>();
   CLI::App* command = app.add_subcommand("report", "Write a model's report as a page that opens offline");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements to compare it with (CSV: deg, mm)");
+  command->add_option("--batch", arguments->batch,
+                      "Measurements to compare it with (CSV: joints in deg, rails in mm; positions in mm)");
   command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return report(*arguments); }; });

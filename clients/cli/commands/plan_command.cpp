@@ -32,7 +32,9 @@ Status read_criterion(const std::string& text, PlanOptions& options) {
   }
   const std::size_t comma = text.find(',');
   if (!text.starts_with(separate) || comma == std::string::npos) {
-    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text);
+    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text)
+        .of("--criterion")
+        .with_text(text);
   }
   options.criterion = PlanCriterion::kSeparation;
   options.cause = text.substr(separate.size(), comma - separate.size());
@@ -65,7 +67,7 @@ Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& 
   const auto add = [&](const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
     Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
-    if (!text) return refused("{}: {}", path, sentence(text.error()));
+    if (!text) return Failure(text.error()).as(ErrorCode::kRefused).in(path);
     outputs.emplace_back(path, std::move(*text));
     return {};
   };
@@ -153,7 +155,7 @@ Result<Plan> plan_from(const Cell& cell, const std::string& path) {
 
 Status plan(PlanArguments arguments) {
   if (arguments.options.count == 0 && arguments.from.empty()) {
-    return failure(ErrorCode::kUsage, "--count or --from is required");
+    return failure(ErrorCode::kUsage, "--count or --from is required").of("--count");
   }
   if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
   arguments.options.orientation = !arguments.positions_only;
@@ -177,34 +179,48 @@ Status plan(PlanArguments arguments) {
 void add_plan_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<PlanArguments>();
   PlanOptions& options = arguments->options;
-  CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell");
+  CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell, and write them as robot programs");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  CLI::Option* count = command->add_option("--count", options.count, "Number of poses")->check(CLI::Range(1, 1000000));
+  CLI::Option* count = command->add_option("--count", options.count, "Number of poses; this or --from is required")
+                           ->check(CLI::Range(1, 1000000));
   command
       ->add_option("--from", arguments->from,
-                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them")
+                   "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them, to "
+                   "write programs of")
       ->excludes(count);
   add_seed_option(*command, options.seed, "Seed of the draw");
   command
-      ->add_option("--criterion", arguments->criterion,
-                   "How poses are chosen: lhs, a Latin hypercube; observability, for the parameters of the cell's "
-                   "error sources; separate:CAUSE,CAUSE, to tell the first cause from the second")
+      ->add_option(
+          "--criterion", arguments->criterion,
+          "How poses are chosen: lhs, spread evenly over the joint ranges (Latin hypercube); observability, so that "
+          "the "
+          "parameters of the cell's error sources become certain; separate:CAUSE,CAUSE, to tell the first cause "
+          "from the second")
       ->capture_default_str();
   command->add_flag("--bidirectional", options.bidirectional,
-                    "Every pose twice, approached from both sides (else from above)");
+                    "Every pose twice, each joint approached from both sides (else from above only)");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Choose for a single reflector, which shows no orientations");
-  command->add_option("--tool", options.tools, "Tool id of the cell; several are planned for in turn")->delimiter(',');
-  command->add_option("--payload", options.payloads, "Payload id of the cell; several are planned for in turn")
+  command
+      ->add_option("--tool", options.tools, "Tool id of the cell; several, joined by commas, are planned for in turn")
+      ->delimiter(',');
+  command
+      ->add_option("--payload", options.payloads,
+                   "Payload id of the cell; several, joined by commas, are planned for in turn")
       ->delimiter(',');
   command->add_option("-o,--output", arguments->output, "Plan to write (CSV: joints in deg, rails in mm)")->required();
   command->add_option("--rapid", arguments->rapid, "Program to write for an ABB controller (.mod)")->type_name("FILE");
   command->add_option("--krl", arguments->krl, "Program to write for a KUKA controller (.src)")->type_name("FILE");
-  command->add_option("--rapid-tool", arguments->program.rapid_tool, "Tooldata that the ABB controller has")
+  command
+      ->add_option("--rapid-tool", arguments->program.rapid_tool,
+                   "Tooldata of the ABB controller that the program names")
       ->capture_default_str();
-  command->add_option("--krl-tool", arguments->program.krl_tool, "Number of the tool in the KUKA controller")
+  command
+      ->add_option("--krl-tool", arguments->program.krl_tool,
+                   "Number of the tool in the KUKA controller that the program names")
       ->capture_default_str();
-  command->add_option("--wait", arguments->program.wait_s, "Wait at each pose of a program, s")->capture_default_str();
+  command->add_option("--wait", arguments->program.wait_s, "How long a program waits at each pose, s")
+      ->capture_default_str();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return plan(*arguments); }; });
 }

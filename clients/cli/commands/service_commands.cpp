@@ -46,7 +46,10 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
   }
   const std::string next = next_step(*end);
   if (end->stage == "failed") {
-    return refused("job {} of cell {} failed: {}{}{}", end->job, end->cell, end->what, next.empty() ? "" : "\n", next);
+    return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what)
+        .of("job")
+        .with_value(end->job)
+        .next(next);
   }
   std::string text = fmt::format("job {} of cell {} {}", end->job, end->cell, end->stage);
   if (end->model_version > 0) {
@@ -80,7 +83,7 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   if (arguments.release && arguments.batch_ids.empty()) {
-    return failure(ErrorCode::kUsage, "--release needs --batch: which one is good");
+    return failure(ErrorCode::kUsage, "--release needs --batch").of("--batch").next("say which one is good");
   }
   const Result<std::int64_t> job =
       arguments.release ? session.release_and_train(*cell, arguments.batch_ids, arguments.level, arguments.bias)
@@ -134,7 +137,9 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   if (model->version == 0) {
-    return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model);
+    return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model)
+        .of("--model")
+        .with_text(arguments.model);
   }
   return now_in_force(model->cell, session.activate(model->cell, model->version), arguments);
 }
@@ -179,7 +184,7 @@ class ServiceCommands {
     CLI::App* command = app_.add_subcommand(name, description);
     add_options(*command, *arguments);
     add_json_option(*command, arguments->json);
-    add_service_options(*command, arguments->service);
+    add_options_of_service_command(*command, arguments->service);
     command->callback([arguments, talk, &chosen = chosen_] {
       chosen = [arguments, talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
         const auto session = open_session(arguments->service);
@@ -195,12 +200,12 @@ class ServiceCommands {
 };
 
 void add_cell(CLI::App& command, ServiceArguments& arguments) {
-  command.add_option("--cell", arguments.cell, "Cell id, or the cell file that holds it")->required();
+  command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it")->required();
 }
 
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
-  command.add_flag("--watch", arguments.watch, "Wait until the training is done");
-  command.add_option("--limit", arguments.limit_s, "Longest time to wait for it, s")
+  command.add_flag("--watch", arguments.watch, "Wait until the training is done, and say how it ended");
+  command.add_option("--limit", arguments.limit_s, "Longest wait with --watch, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
 }
@@ -209,51 +214,62 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
 
 void add_service_commands(CLI::App& app, Action& chosen) {
   ServiceCommands commands(app, chosen);
-  commands.add("submit", "Hand measurements to a service, which trains a new model from them", submit,
+  commands.add(
+      "submit", "Hand measurements to a service, which trains a model from them and puts it in force if it is better",
+      submit, [](CLI::App& command, ServiceArguments& arguments) {
+        add_cell(command, arguments);
+        command
+            .add_option("--batch", arguments.batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
+            ->required();
+        command.add_option(
+            "--id", arguments.batch_id,
+            "Id of the batch, unique within the cell for ever; left out: the file's name without its ending");
+        add_watch(command, arguments);
+      });
+  commands.add(
+      "retrain", "Train again from batches that the service has", retrain,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        add_cell(command, arguments);
+        command
+            .add_option(
+                "--batch", arguments.batch_ids,
+                "Id of a batch that the service has; once for each to train from together; left out: the newest")
+            ->allow_extra_args(false);
+        command.add_option("--level", arguments.level,
+                           "What to identify instead of the cell's error sources, as train spells it");
+        command.add_option("--bias", arguments.bias,
+                           "Kernel of the learned bias instead of the cell's, as train spells it");
+        command.add_flag("--release", arguments.release,
+                         "The batches that --batch names are good: train from them though they are in quarantine. They "
+                         "leave it when the "
+                         "new model is put in force, or when too few poses can judge it");
+        add_watch(command, arguments);
+      });
+  commands.add("status", "Show the servers that answer, the models in force, jobs, and batches in quarantine", status,
+               [](CLI::App&, ServiceArguments&) {});
+  commands.add("watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
                [](CLI::App& command, ServiceArguments& arguments) {
-                 add_cell(command, arguments);
-                 command.add_option("--batch", arguments.batch, "Measurements (CSV: deg, mm)")->required();
-                 command.add_option("--id", arguments.batch_id,
-                                    "Id of the batch, unique within the cell; else the file's name without its ending");
-                 add_watch(command, arguments);
-               });
-  commands.add("retrain", "Train again from batches that the service has", retrain,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 add_cell(command, arguments);
-                 command
-                     .add_option("--batch", arguments.batch_ids,
-                                 "Id of a batch; once for each to train together; else the newest")
-                     ->allow_extra_args(false);
-                 command.add_option("--level", arguments.level, "What to identify instead of the cell's error sources");
-                 command.add_option("--bias", arguments.bias, "Kernel of the learned bias instead of the cell's");
-                 command.add_flag(
-                     "--release", arguments.release,
-                     "The batches named are good: take them out of quarantine, if the training is accepted");
-                 add_watch(command, arguments);
-               });
-  commands.add("status", "Show the servers that answer, the models in force, jobs, and the batches in quarantine",
-               status, [](CLI::App&, ServiceArguments&) {});
-  commands.add("watch", "Follow a training until it is done", watch,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 command.add_option("--job", arguments.job, "Number that submit or retrain gave")->required();
-                 command.add_option("--limit", arguments.limit_s, "Longest time to wait, s")
+                 command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
+                     ->required();
+                 command.add_option("--limit", arguments.limit_s, "Longest wait, s")
                      ->check(CLI::PositiveNumber)
                      ->capture_default_str();
                });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
-  commands.add("activate", "Put a version of a cell's model in force", activate,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 command.add_option("--model", arguments.model, "cell@version")->required();
-               });
-  commands.add("rollback", "Put the model back in force that was before", rollback, add_cell);
+  commands.add(
+      "activate", "Put a stored version of a cell's model in force", activate,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
+      });
+  commands.add("rollback", "Put back in force the model that was before", rollback, add_cell);
   commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
-    command.add_option("--model", arguments.model, "cell (its model in force) or cell@version")->required();
+    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
     command.add_option("-o,--output", arguments.output, "Model file to write")->required();
   });
   commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
                [](CLI::App& command, ServiceArguments& arguments) {
                  add_cell(command, arguments);
-                 command.add_option("--model", arguments.model, "Model file")->required();
+                 command.add_option("--model", arguments.model, "Model file to add")->required();
                });
 }
 

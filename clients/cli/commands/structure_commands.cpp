@@ -60,7 +60,7 @@ void add_cpa(CLI::App& app, Action& chosen) {
       ->required();
   command
       ->add_option("--sigma-mm", arguments->sigma_mm,
-                   "Sigma of one coordinate of a point, mm; left out: from how well the arcs fit")
+                   "Standard deviation of one coordinate of a point, mm; left out: from how well the arcs fit")
       ->check(CLI::PositiveNumber);
   command->add_option("-o,--output", arguments->output, "Table of parameters to write (CSV: mm, deg)");
   add_json_option(*command, arguments->json);
@@ -76,15 +76,21 @@ void add_deflection(CLI::App& app, Action& chosen) {
                    "Deflections (CSV: element, load_n, x_mm, dx_mm, dz_mm, theta_deg, length_mm, lever_mm; optional "
                    "sigma_mm, set)")
       ->required();
-  command->add_option("--sigma-mm", arguments->sigma_mm, "Sigma of one coordinate where the file has none, mm")
+  command
+      ->add_option("--sigma-mm", arguments->sigma_mm,
+                   "Standard deviation of one coordinate where the file has none, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_flag("--chained", arguments->chained,
-                    "Deflections are against the ground: elements further in are part of them");
-  command->add_option("--load-bias", arguments->load_bias, "Elements whose foot moves with the load")->delimiter(',');
+                    "Deflections were measured against the ground, so they contain those of the elements before");
   command
-      ->add_option("--validate", arguments->validate,
-                   "Loads to hold out, N; left out: the column set, else every third load from the second on")
+      ->add_option("--load-bias", arguments->load_bias,
+                   "Numbers of elements whose foot moves with the load, joined by commas")
+      ->delimiter(',');
+  command
+      ->add_option(
+          "--validate", arguments->validate,
+          "Loads to hold out, N, joined by commas; left out: the column set, else every third load from the second on")
       ->delimiter(',');
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return deflection(*arguments); }; });

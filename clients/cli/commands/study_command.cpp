@@ -69,13 +69,14 @@ Status run(const StudyArguments& arguments) {
 void add_study_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<StudyArguments>();
   CLI::App* command = app.add_subcommand(
-      "study", "Repeat a study of the thesis on the shipped virtual robot; its figures beside ours, mm");
-  command->add_option("name", arguments->name, "Which one")->required()->check(CLI::IsMember(study_names()));
+      "study", "Repeat a study of the thesis on the shipped virtual robot: its figures beside ours, mm");
+  command->add_option("name", arguments->name, "Which study")->required()->check(CLI::IsMember(study_names()));
   command->add_option("--cell", arguments->cell, "Cell file (YAML) instead of the shipped one")->type_name("FILE");
-  command->add_option("--truth", arguments->truth, "Virtual robot's true parameters (YAML) instead of the shipped ones")
+  command->add_option("--truth", arguments->truth, "Truth file (YAML) of the virtual robot instead of the shipped one")
       ->type_name("FILE");
   add_seed_option(*command, arguments->seed, "Seed of all draws: poses, noise, search");
-  command->add_option("--bias", arguments->bias, "Kernel of the learned bias instead of the cell's, see train");
+  command->add_option("--bias", arguments->bias,
+                      "Kernel of the learned bias instead of the cell's, as train spells it");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
 }

@@ -28,11 +28,13 @@ Result<TargetColumns> find_columns(const CsvTable& table) {
   TargetColumns columns{std::move(*commanded), std::move(*pose), table.find("conf")};
   const bool joints = !columns.commanded.joint_types().empty();
   if (columns.pose.empty() && !joints) {
-    return refused("{}: neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...); the header has: {}",
-                   table.where(), fmt::join(table.columns(), ","));
+    return refused("neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...)")
+        .in(table.where())
+        .of("x_mm")
+        .next(fmt::format("the header has: {}", fmt::join(table.columns(), ",")));
   }
   if (!columns.conf && !joints) {
-    return refused("{}: missing column conf, or q1_deg... as the seed of the poses", table.where());
+    return refused("missing column conf, or q1_deg... as the seed of the poses").in(table.where()).of("conf");
   }
   return columns;
 }
@@ -67,7 +69,8 @@ Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& 
     if (!conf) return tl::make_unexpected(conf.error());
     target.conf = *conf;
   }
-  if (!target.conf && !target.seed) return table.refuse(row, "neither conf nor joints as the seed of the pose");
+  if (!target.conf && !target.seed)
+    return table.refuse(row, "neither conf nor joints as the seed of the pose").of("conf");
   return {};
 }
 
@@ -78,7 +81,7 @@ Result<TargetFile> parse_targets_csv(const std::string& text, const std::string&
   if (!table) return tl::make_unexpected(table.error());
   const Result<TargetColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
-  if (table->size() == 0) return refused("{}: no targets below the header, at least 1 is needed", where);
+  if (table->size() == 0) return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);
   TargetFile file{where, columns->commanded.joint_types(), {}, table->columns()};
   for (std::size_t row = 0; row < table->size(); ++row) {
     TargetRow& target = file.rows.emplace_back();
@@ -102,8 +105,13 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;
-    return refused("{} row {}: conf is {}, but robot {} has no spherical wrist to number branches by; give q1_deg...",
-                   file.where, row.row, *row.target.conf, robot.name());
+    return refused("conf is {}, but robot {} has no spherical wrist to number branches by", *row.target.conf,
+                   robot.name())
+        .in(file.where)
+        .at_row(row.row)
+        .of("conf")
+        .with_value(*row.target.conf)
+        .next("give q1_deg...");
   }
   return {};
 }

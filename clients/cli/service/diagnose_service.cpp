@@ -55,7 +55,9 @@ Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
 
 Status diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!arguments.model.empty() || !arguments.cell_out.empty()) {
-    return failure(ErrorCode::kUsage, "--model and --cell-out are for files; a service keeps its models itself");
+    return failure(ErrorCode::kUsage, "--model and --cell-out are for files")
+        .of(arguments.model.empty() ? "--cell-out" : "--model")
+        .next("a service keeps its models itself");
   }
   Outputs outputs = outputs_of(arguments);
   if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
@@ -67,7 +69,8 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!job) return tl::make_unexpected(job.error());
   const Result<client::JobStatus> end = wait(**session, *job);
   if (!end) return tl::make_unexpected(end.error());
-  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what);
+  if (end->stage == "failed")
+    return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job").with_value(end->job);
   auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
   if (!found) return tl::make_unexpected(found.error());
   Result<Findings> findings = findings_of(found->findings_json, *job);
@@ -88,7 +91,7 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
         arguments);
   }
   if (!arguments.report.empty() && found->page_html.empty()) {
-    return refused("{}: the service has this page no more", arguments.report);
+    return refused("the service has this page no more").in(arguments.report).of("--report");
   }
   const Status written = write_diagnosis(json, std::move(found->page_html), outputs, arguments);
   if (!written) return written;

@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
+#include "server/trainer/pipeline/leftover.h"
 #include "server/trainer/pipeline/train.h"
 
 namespace trammel::cli {
@@ -57,14 +58,18 @@ class Laboratory {
     TrainOptions train_options = options("calibrating " + level);
     train_options.level = level;
     train_options.bias = "none";
-    return train(cell(), batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return train(cell(), checked, train_options);
+    });
   }
   Result<CompensatedModel> learn(const std::string& level, const CompensatedModel& calibrated,
                                  const MeasurementBatch& batch) {
     const std::string stage = fmt::format("learning what {} leaves over of {} poses", level, batch.measurements.size());
     TrainOptions train_options = options(stage);
     train_options.bias = options_.bias;
-    return learn_bias(calibrated, batch, train_options);
+    return check_against_cell(batch, *cell()).and_then([&](const CheckedBatch& checked) {
+      return learn_bias(calibrated, checked, train_options);
+    });
   }
 
  private:
@@ -232,7 +237,7 @@ Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT, const
     const Result<InverseResult> joints = nominal_joints(cell, X_FT, holes[i].target);
     if (!joints) return tl::make_unexpected(joints.error());
     if (joints->status != InverseStatus::kOk) {
-      return refused("holes row {}: cell {} does not reach it", holes[i].row, cell.name);
+      return refused("cell {} does not reach it", cell.name).in("holes").at_row(holes[i].row);
     }
     q.row(static_cast<Eigen::Index>(i)) = joints->q.transpose();
   }
@@ -372,7 +377,9 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
   const Cell& cell = *robot.truth.cell;
   if (cell.robot.size() != static_cast<int>(kCalibrationRanges.size())) {
     return refused("cell {}: a robot of {} joints, the studies are of {}", cell.name, cell.robot.size(),
-                   kCalibrationRanges.size());
+                   kCalibrationRanges.size())
+        .of("joints")
+        .beyond(cell.robot.size(), kCalibrationRanges.size());
   }
   Study study;
   study.name = name;
@@ -386,7 +393,10 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
     if (name == "cal") return run_calibration_study(laboratory, study);
     if (name == "drilling") return run_drilling_study(laboratory, options.holes, study);
     if (name == "quantity") return run_quantity_study(laboratory, study);
-    return failure(ErrorCode::kUsage, "study {}: known are {}", name, fmt::join(study_names(), ", "));
+    return failure(ErrorCode::kUsage, "study '{}' is unknown", name)
+        .of("study")
+        .with_text(name)
+        .next(fmt::format("known are {}", fmt::join(study_names(), ", ")));
   }();
   if (!done) return tl::make_unexpected(done.error());
   return study;

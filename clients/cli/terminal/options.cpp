@@ -12,23 +12,30 @@ namespace {
 
 constexpr double kLongestTimeout = 3600;  // s
 
-}  // namespace
-
-void add_service_options(CLI::App& command, ServiceOptions& options) {
-  command.add_flag("--service", options.service, "Ask a running trammeld instead of working on files")
-      ->group("Service");
-  command.add_option("--port", options.ports, "UDP port of the service on this host; once a replica")
+void add_service_options(CLI::App& command, ServiceOptions& options, const std::string& help) {
+  command.add_flag("--service", options.service, help)->group("Service");
+  command.add_option("--port", options.ports, "UDP port of the service on this host; once for each replica")
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
-  command.add_option("--domain", options.domain, "DDS domain of the service")
+  command.add_option("--domain", options.domain, "DDS domain of the service; servers of other domains are not heard")
       ->check(CLI::Range(0, 232))
       ->capture_default_str()
       ->group("Service");
-  command.add_option("--timeout", options.timeout_s, "Time to wait for an answer, s")
+  command.add_option("--timeout", options.timeout_s, "Longest wait for one answer, finding the service included, s")
       ->check(CLI::Range(0.01, kLongestTimeout))
       ->capture_default_str()
       ->group("Service");
+}
+
+}  // namespace
+
+void add_service_options(CLI::App& command, ServiceOptions& options) {
+  add_service_options(command, options, "Ask a running trammeld instead of working on files");
+}
+
+void add_options_of_service_command(CLI::App& command, ServiceOptions& options) {
+  add_service_options(command, options, "Said or not: this command always asks a running trammeld");
 }
 
 Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
@@ -52,25 +59,33 @@ void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& 
 }
 
 void add_json_option(CLI::App& command, std::string& path) {
-  command.add_option("--json", path, "Write the result for programs to this file ('-': standard output)")
+  command
+      .add_option("--json", path, "Also write the result as JSON, for programs, to this file ('-': standard output)")
       ->type_name("FILE");
 }
 
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload) {
-  command.add_option("--tool", tool, "Tool id of the cell; may be left out where the cell has one tool");
-  command.add_option("--payload", payload, "Payload id of the cell; may be left out where the cell has one payload");
+  command.add_option("--tool", tool,
+                     "Tool id of the cell, for rows that name none; may be left out where the cell has only one");
+  command.add_option("--payload", payload,
+                     "Payload id of the cell, for rows that name none; may be left out where the cell has only one");
 }
 
 Result<ModelReference> parse_model_reference(const std::string& text) {
   ModelReference reference;
   const std::size_t at = text.find('@');
   reference.cell = text.substr(0, at);
-  if (reference.cell.empty()) return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text);
+  if (reference.cell.empty())
+    return failure(ErrorCode::kUsage, "--model '{}': expected cell or cell@version", text)
+        .of("--model")
+        .with_text(text);
   if (at == std::string::npos) return reference;
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + at + 1, end, reference.version);
   if (error != std::errc() || stop != end || reference.version < 1) {
-    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text);
+    return failure(ErrorCode::kUsage, "--model '{}': expected a version from 1 after '@'", text)
+        .of("--model")
+        .with_text(text);
   }
   return reference;
 }

@@ -26,13 +26,42 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
 }
 
+/// Whether this process has written a result there: a second one beside it would be nobody's JSON.
+bool& standard_output_is_taken() {
+  static bool taken = false;
+  return taken;
+}
+
 }  // namespace
 
 Status write_output(const std::string& path, const std::string& text) {
   if (path != "-") return write_text_file(path, text);
+  standard_output_is_taken() = true;
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
-  if (!written) return refused("standard output: cannot be written: {}", std::strerror(errno));
+  if (!written) return refused("cannot be written: {}", std::strerror(errno)).in("standard output");
   return {};
+}
+
+nlohmann::ordered_json error_json(const Error& error) {
+  nlohmann::ordered_json json = {{"code", to_text(error.code)}, {"message", error.message}};
+  const auto add = [&](const char* key, const std::string& text) {
+    if (!text.empty()) json[key] = text;
+  };
+  add("file", error.file);
+  if (error.row) json["row"] = *error.row;
+  add("field", error.field);
+  if (error.value) json["value"] = *error.value;
+  if (error.limit) json["limit"] = *error.limit;
+  add("text", error.text);
+  add("next", error.next);
+  for (const Error& other : error.also) json["also"].push_back(error_json(other));
+  json["sentence"] = sentence(error);
+  return json;
+}
+
+void tell_refusal(const Error& error, const std::string& json_path) {
+  if (!is_standard_output(json_path) || standard_output_is_taken()) return;
+  static_cast<void>(write_json(json_path, {{"error", error_json(error)}}));
 }
 
 Status write_json(const std::string& path, const nlohmann::ordered_json& value) {
@@ -59,11 +88,15 @@ Status Outputs::check(const std::vector<NamedFile>& inputs) const {
     for (std::size_t i = 0; i < k; ++i) {
       if (!same_file(path, outputs_[i].file.path)) continue;
       return failure(ErrorCode::kUsage, "{} and {} both go to {}", outputs_[i].file.option, option,
-                     is_standard_output(path) ? "standard output" : path);
+                     is_standard_output(path) ? "standard output" : path)
+          .of(option)
+          .with_text(path);
     }
     for (const NamedFile& input : inputs) {
       if (input.path.empty() || input.option == outputs_[k].may_replace || !same_file(path, input.path)) continue;
-      return failure(ErrorCode::kUsage, "{} {} would overwrite {}", option, path, input.option);
+      return failure(ErrorCode::kUsage, "{} {} would overwrite {}", option, path, input.option)
+          .of(option)
+          .with_text(path);
     }
     if (is_standard_output(path)) continue;
     if (const Status writable = check_writable(path); !writable) return writable;

@@ -15,6 +15,13 @@ namespace trammel::cli {
 /// Writes `value` where --json says; nothing when it was not given (empty path).
 [[nodiscard]] Status write_json(const std::string& path, const nlohmann::ordered_json& value);
 
+/// The members of an error that are known, and the whole sentence.
+[[nodiscard]] nlohmann::ordered_json error_json(const Error& error);
+
+/// A refusal as `{"error": {...}}` where the result for programs would have stood: on standard output, and only where
+/// no result stands there already. Files stay as they were.
+void tell_refusal(const Error& error, const std::string& json_path);
+
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
 /// Text for people on standard output, left out when a result for programs goes there (`paths`: where results go).

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "server/base/check.h"
@@ -15,25 +14,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kTile = 64;
-constexpr double kLogMax = 40.0;
-const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
-
-FeatureBlock rows_of(const AlignedMatrix& features, Index first, Index count) {
-  return {features.data() + first, count, features.rows()};
-}
-
-AlignedMatrix storage(Index rows) {
-  const Index padded = padded_rows(rows);
-  return {padded % 64 == 0 ? padded + kTargetBlock : padded, padded};
-}
-
 // [σ_f² R + σ_n² diag(shape) .; yᵀ; Hᵀ 0], lower triangle.
 AlignedMatrix assembled(const Kernel& kernel, const CoupledData& data, const GpHyperparameters& at,
                         const AlignedMatrix& features, const VectorXd& column_scale, Index output) {
   const Index n = data.q.rows();
   const Index p = column_scale.size();
-  AlignedMatrix matrix = storage(n + 1 + p);
+  AlignedMatrix matrix = factor_storage(n + 1 + p);
   const double signal = std::exp(2 * at.log_signal_stddev);
   const double noise = std::exp(2 * at.log_noise_stddev);
   AlignedMatrix tile(4 * kTile + kRowPadding, kTile);
@@ -101,7 +87,7 @@ AlignedMatrix precision_of(const CoupledSolution& solution, Index points, Index 
   const Index n = points;
   const Index p = solution.weights.size();
   const AlignedMatrix& eliminated = solution.eliminated[static_cast<std::size_t>(output)];
-  AlignedMatrix matrix = storage(p + n);
+  AlignedMatrix matrix = factor_storage(p + n);
   matrix.map().topLeftCorner(p, p) = solution.A;
   matrix.map().block(p, 0, n, p) = eliminated.map().block(n + 1, 0, p, n).transpose();
   matrix.map().block(p, p, n, n) = -eliminated.map().topLeftCorner(n, n);
@@ -149,7 +135,7 @@ VectorXd CoupledLikelihood::pack(const CoupledHyperparameters& at) const {
 }
 
 bool CoupledLikelihood::evaluate(const VectorXd& x, ObjectiveValue* out) const {
-  if (!x.allFinite() || x.cwiseAbs().maxCoeff() > kLogMax) return false;
+  if (!x.allFinite() || x.cwiseAbs().maxCoeff() > kMostLogParameter) return false;
   const CoupledHyperparameters at = unpack(x);
   const std::optional<CoupledSolution> solution = solve(*kernel_, blocks_, data_, at);
   if (!solution) return false;

@@ -30,7 +30,7 @@ struct CoupledHyperparameters {
   Eigen::VectorXd blocks;
 };
 
-/// The matrices of one set of hyperparameters.
+/// What follows from one set of hyperparameters.
 struct CoupledSolution {
   std::vector<AlignedMatrix> eliminated;  ///< D: [-M⁻¹ .; y M⁻¹; Hᵀ M⁻¹ ...], lower triangle
   std::vector<AlignedMatrix> features;    ///< D: the kernel's, of all points
@@ -47,13 +47,13 @@ struct CoupledSolution {
 [[nodiscard]] std::optional<CoupledSolution> solve(const Kernel& kernel, const LinearBlocks& blocks,
                                                    const CoupledData& data, const CoupledHyperparameters& at);
 
-/// C⁻¹ of output d with itself: its lower triangle stands in the rows and columns of the result from p on, which is
-/// returned with A⁻¹ Hᵀ M⁻¹ and -A⁻¹ before it.
+/// C⁻¹ of one output with itself. Its lower triangle stands in the rows and columns from p on; before it stand -A⁻¹ and
+/// A⁻¹ Hᵀ M⁻¹.
 [[nodiscard]] AlignedMatrix precision_of(const CoupledSolution& solution, Eigen::Index points, Eigen::Index output);
 
-/// Weak priors, as GpPrior says of one process.
+/// Weak priors, as GpPrior of one process.
 struct CoupledPrior {
-  Eigen::VectorXd noise_stddev;  ///< D, from metrology
+  Eigen::VectorXd noise_stddev;  ///< D, the instrument's
   double noise_spread = 0.1;
   Eigen::VectorXd parameter_centre;
   double parameter_spread = 3.0;
@@ -62,8 +62,8 @@ struct CoupledPrior {
   bool shared_scales = true;  ///< one set of kernel parameters for all outputs
 };
 
-/// Minus the log of (likelihood x prior) as a function of [kernel parameters, once or for each output; log σ_f of each;
-/// log σ_n of each; the blocks' hyperparameters].
+/// Minus the log of (likelihood x prior), as a function of: kernel parameters, once or for each output; log σ_f of each
+/// output; log σ_n of each output; hyperparameters of the blocks.
 class CoupledLikelihood {
  public:
   CoupledLikelihood(std::shared_ptr<const Kernel> kernel, LinearBlocks blocks, CoupledData data, CoupledPrior prior);
@@ -78,8 +78,7 @@ class CoupledLikelihood {
   [[nodiscard]] Eigen::Index outputs() const { return data_.y.cols(); }
   [[nodiscard]] Eigen::Index kernel_sets() const { return prior_.shared_scales ? 1 : outputs(); }
   void add_prior(const Eigen::VectorXd& x, ObjectiveValue* out) const;
-  /// ½ tr((C⁻¹ - α αᵀ) dM_d) by [kernel parameters, log σ_f, log σ_n] of output d; `precision` as precision_of() gives
-  /// it.
+  /// ½ tr((C⁻¹ - α αᵀ) dM_d) by kernel parameters, log σ_f and log σ_n of one output; `precision` is precision_of().
   [[nodiscard]] Eigen::VectorXd contract(const CoupledSolution& solution, const GpHyperparameters& at,
                                          const AlignedMatrix& precision, Eigen::Index output) const;
 

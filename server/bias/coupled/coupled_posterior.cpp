@@ -15,22 +15,21 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr Index kRun = 10;  // poses that follow one another are left out together
-constexpr Index kFolds = 3;
-constexpr Index kTargets = 64;  // at once: the matrices pass through the cache once for all of them
+constexpr Index kRun = 10;       // poses that follow one another and are left out together: they share a drift
+constexpr Index kThreefold = 3;  // parts of the cross-validation: two thirds still tell the weights
+constexpr Index kTargets = 64;   // at once: the matrices pass through the cache once for all of them
 
-// With δ the covariances passed over and σ² the least noise variance, |Δ kᵀM⁻¹k| <= 2 σ_f |δ|/σ + |δ|²/σ², and the
-// standard deviations of R A⁻¹ Rᵀ move by |δ|/σ at most; so |δ| = kPassedOver σ³/σ_f keeps both below the noise.
+// δ: the covariances that are left out; σ²: the least noise variance. |Δ kᵀM⁻¹k| <= 2 σ_f |δ|/σ + |δ|²/σ², and the
+// standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver σ³/σ_f both stay below the noise.
 constexpr double kPassedOver = 1e-3;
-constexpr Index kWorthPassing = 8;  // where at most one in so many poses matters
+constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
 
 AlignedMatrix packed_inverse_root(const MatrixXd& A) {
   const Index p = A.rows();
   const Numerics& n = numerics();
   AlignedMatrix packed(n.packed_size(p), 1);
   if (p == 0) return packed;
-  const Index padded = padded_rows(p);
-  AlignedMatrix matrix(padded % 64 == 0 ? padded + kTargetBlock : padded, padded);
+  AlignedMatrix matrix = factor_storage(p);
   matrix.map().topLeftCorner(p, p).triangularView<Eigen::Lower>() = A;
   AlignedMatrix work(n.work_size(p), 1);
   double log_det = 0;
@@ -109,7 +108,7 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   return posterior;
 }
 
-// With B the rows and columns of C⁻¹ that belong to the poses left out: covariance B⁻¹, error B⁻¹ α.
+// B: the rows and columns of C⁻¹ that belong to the poses left out. Their covariance is B⁻¹, their error B⁻¹ α.
 void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledData& data) {
   const Index outputs = data.y.cols();
   leave_one_out_mean_.resize(points_, outputs);
@@ -132,8 +131,7 @@ void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledD
           solution.eliminated[static_cast<std::size_t>(d)].map()(poses, poses);
     }
     const Index size = B.rows();
-    const Index padded = padded_rows(size + 1);
-    AlignedMatrix matrix(padded % 64 == 0 ? padded + kTargetBlock : padded, padded);
+    AlignedMatrix matrix = factor_storage(size + 1);
     matrix.map().topLeftCorner(size, size).triangularView<Eigen::Lower>() = B;
     matrix.map().row(size).head(size) = alpha.transpose();
     AlignedMatrix work(numerics().work_size(size + 1), 1);
@@ -150,10 +148,10 @@ void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledD
     leave_one_out_variance_.row(i) = variance.transpose();
   }
   double surprise = 0;
-  for (Index fold = 0; fold < kFolds; ++fold) {
+  for (Index fold = 0; fold < kThreefold; ++fold) {
     std::vector<Index> poses;
     for (Index i = 0; i < points_; ++i) {
-      if (i / kRun % kFolds == fold) poses.push_back(i);
+      if (i / kRun % kThreefold == fold) poses.push_back(i);
     }
     if (poses.empty()) break;
     const auto [error, variance] = left_out(poses);
@@ -263,7 +261,7 @@ std::vector<Index> CoupledPosterior::near_poses(const double* k, std::size_t out
   return near;
 }
 
-// From |L⁻¹ r_d|² and |L⁻¹ (r_d + r_e)|², so many at once.
+// From |L⁻¹ r_d|² and |L⁻¹ (r_d + r_e)|², kTargetBlock of them at once.
 MatrixXd CoupledPosterior::shared_covariance(const std::vector<Part>& parts, Index i) const {
   const auto outputs = static_cast<Index>(parts.size());
   const Index p = weights_.size();

@@ -7,15 +7,15 @@ namespace trammel {
 /// At one joint vector, of D outputs.
 struct CoupledPrediction {
   Eigen::VectorXd mean;
-  Eigen::VectorXd own_mean;    ///< what of it the outputs' own processes add to H w
+  Eigen::VectorXd own_mean;    ///< the part that the processes of the outputs add to H w
   Eigen::MatrixXd covariance;  ///< D x D, of the functions themselves
-  Eigen::VectorXd prior;       ///< their variances before any data
+  Eigen::VectorXd prior;       ///< prior variances
 };
 
-/// What coupled processes know after their data. Immutable, thread-safe.
+/// Coupled processes, conditioned on their data. Immutable, thread-safe.
 /// At a target, with h = H(q) scaled and k_d the covariance of output d with the data: R_d = h_d - k_dᵀ M_d⁻¹ H_d and
 ///   mean_d = h_d ŵ + k_dᵀ α_d,  covariance = diag(k_d** - k_dᵀ M_d⁻¹ k_d) + R A⁻¹ Rᵀ.
-/// The parts that do not mix outputs are those of a GaussianProcess conditioned on y_d - H_d ŵ.
+/// The parts that do not mix outputs come from a GaussianProcess conditioned on y_d - H_d ŵ.
 class CoupledPosterior {
  public:
   /// Empty when a covariance is not positive definite.
@@ -24,26 +24,26 @@ class CoupledPosterior {
                                                                  const CoupledHyperparameters& at,
                                                                  VarianceForm form = VarianceForm::kCompressed);
 
-  /// At the rows of `q`; `columns`: H there, not scaled, as CoupledData has it. Where kExact was not asked for, poses
-  /// whose covariance with the target is too small to matter are passed over: the variance of an output is then off by
-  /// less than 0.003 of its noise's (bound: DECISIONS.md).
+  /// At the rows of `q`; `columns` is H there, not scaled, as in CoupledData. Unless the form is kExact, training poses
+  /// whose covariance with the target is too small to matter are left out. The variance of an output is then off by
+  /// less than 0.003 of its noise variance (bound: DECISIONS.md).
   [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
                                                        const std::vector<Eigen::MatrixXd>& columns) const;
-  /// What the outputs' own processes add to H w, M x D.
+  /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
-  /// p, of the columns as they are (not scaled).
+  /// p: ŵ of the columns of H, not scaled.
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// A whole pose left out, all its outputs at once: mean, N x D; variances of the measurement, N x D
-  /// (blocks of C⁻¹ instead of its diagonal in Rasmussen & Williams, eqs. 5.10-5.12).
+  /// N x D: each pose predicted with all its outputs left out; mean, and variance of the measurement (Rasmussen &
+  /// Williams, eqs. 5.10-5.12, with blocks of C⁻¹ instead of its diagonal).
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
-  /// Mean square of the standardised errors of measurements in threefold cross-validation by runs of ten poses, the
-  /// hyperparameters held: 1 where the process is as sure as it may be.
+  /// Mean square of the standardised errors in threefold cross-validation by runs of ten poses, with the
+  /// hyperparameters as they are: 1 where the predicted variances are right.
   [[nodiscard]] double surprise() const { return surprise_; }
-  /// N x D: variances at the data before any.
+  /// N x D: prior variances at the data.
   [[nodiscard]] const Eigen::MatrixXd& prior() const { return prior_; }
 
  private:
@@ -55,7 +55,7 @@ class CoupledPosterior {
     Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
     Eigen::VectorXd prior;  // of both parts
   };
-  // Rising: those whose covariance matters; none where no inverse is kept.
+  // The poses whose covariance matters, rising; empty where no inverse is kept.
   [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
   [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
   // R A⁻¹ Rᵀ of target i.

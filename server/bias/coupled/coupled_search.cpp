@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/bias/search/starts.h"
 #include "server/numerics/seeded_random.h"
 
 namespace trammel {
@@ -13,11 +14,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kStartPoints = 150;
-constexpr Index kCarryPoints = 400;
-constexpr int kMaxStarts = 6;           // a start costs as much as twenty of a plain process
-constexpr double kSameOptimum = 0.1;    // nat
-constexpr double kSmallestLog = -21.0;  // of σ_f: 1 nm
+constexpr Index kMediumPoints = 400;    // a step between the first searches and all points
+constexpr int kMostStarts = 6;          // each takes as long as twenty of a plain process
+constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is zero
 
 CoupledData subset(const CoupledData& data, const std::vector<Index>& order, Index count) {
   const std::vector<Index> rows(order.begin(), order.begin() + count);
@@ -59,7 +58,7 @@ class CoupledSearch {
     std::optional<CoupledHyperparameters> best = from_several_starts();
     if (result_.given_up) return result_;
     if (!best) return std::nullopt;
-    const Index medium = std::min(all(), kCarryPoints);
+    const Index medium = std::min(all(), kMediumPoints);
     if (medium > kStartPoints) best = improved(*best, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
     if (all() > medium) best = improved(*best, all(), true, {.max_evaluations = 8, .tolerance = 0.3}, 0.7);
     if (!shared_scales_) best = improved(*best, all(), false, {.max_evaluations = 10, .tolerance = 0.3}, 0.95);
@@ -104,7 +103,7 @@ class CoupledSearch {
 
   std::optional<CoupledHyperparameters> from_several_starts() {
     const CoupledLikelihood small = likelihood(std::min(all(), kStartPoints), true);
-    const int starts = std::clamp(options_.starts, 1, kMaxStarts);
+    const int starts = std::clamp(options_.starts, 1, kMostStarts);
     std::vector<BfgsResult> ends;
     for (int s = 0; s < starts && !result_.given_up; ++s) {
       BfgsResult end = improve(small, random_start(), {.max_evaluations = 60, .tolerance = 0.02});

@@ -9,7 +9,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeastAmplitude = 0.05;  // of the first part's: where the search starts
+constexpr double kLeastAmplitude = 0.05;  // over that of the first part: where a search starts at the least
 
 std::string joined(const std::vector<KernelPtr>& parts, std::string_view separator) {
   std::string name = "(";
@@ -17,7 +17,7 @@ std::string joined(const std::vector<KernelPtr>& parts, std::string_view separat
   return name + ")";
 }
 
-/// Parameters and features of the parts side by side; a part may have a log amplitude before its own parameters.
+/// Has the parameters and features of its parts side by side. A part may have a log amplitude before its parameters.
 class CompositeKernel : public Kernel {
  public:
   CompositeKernel(std::vector<KernelPtr> parts, std::string_view separator)
@@ -75,10 +75,10 @@ class CompositeKernel : public Kernel {
   }
 
  protected:
-  /// Where a part finds its own.
+  /// Where the parameters and features of one part stand.
   struct Place {
     const Kernel* kernel;
-    Index parameter;  // first of its own, behind the amplitude
+    Index parameter;  // its first, after the amplitude
     Index parameters;
     Index feature;
 
@@ -107,9 +107,9 @@ class CompositeKernel : public Kernel {
   using ConstTable = Eigen::Ref<const Eigen::ArrayXXd, 0, Eigen::OuterStride<>>;
 
  private:
-  // How many log amplitudes stand before the parameters of a part: one or none.
+  // How many log amplitudes stand before the parameters of a part: 0 or 1.
   virtual Index amplitudes(std::size_t part) const = 0;
-  // What `total` is before any part, and how a part enters it.
+  // `total` before any part, and with one more part.
   virtual double neutral() const = 0;
   virtual void join(const Place& place, const VectorXd& parameters, const ConstTable& own, Table total) const = 0;
 
@@ -150,7 +150,7 @@ class SumKernel : public CompositeKernel {
  private:
   static bool is_first(const Place& place) { return place.feature == 0; }
 
-  // Relative to the first part.
+  // Amplitude squared, relative to the first part.
   static double variance(const Place& place, const VectorXd& parameters) {
     return is_first(place) ? 1.0 : std::exp(2.0 * parameters[place.parameter - 1]);
   }

@@ -2,8 +2,6 @@
 
 #include <array>
 
-#include "server/bias/kernels/kernel_spelling.h"
-
 namespace trammel {
 namespace {
 
@@ -28,8 +26,6 @@ KernelPtr make_leaf_kernel(std::string_view word) {
   }
   return nullptr;
 }
-
-KernelPtr make_kernel(std::string_view spelling) { return spelled_kernel(spelling).value_or(nullptr); }
 
 std::string kernel_names() {
   std::string names;

@@ -6,27 +6,35 @@
 #include <string_view>
 #include <vector>
 
-/// Covariance functions of joint vectors (source eqs. 3.18-3.24), without amplitude: σ_f² is the process', not theirs.
+/// Covariance functions of joint vectors (source eqs. 3.18-3.24), without amplitude: σ_f² belongs to the process.
 namespace trammel {
 
-/// Rows of a table of features: one column per feature, one row per joint vector. As `a` below the block must be
-/// followed by the padding of its table (padded_rows) or by more rows.
+/// Rows of a table of features: a column for each feature, a row for each joint vector. The argument `a` of a Kernel
+/// must be followed by the padding of its table (padded_rows()) or by more rows.
 struct FeatureBlock {
   const double* data = nullptr;
   Eigen::Index rows = 0;
   Eigen::Index ld = 0;
 };
 
-/// Where a search of the kernel's parameters starts, natural logarithms.
+/// `count` rows from `first` of a table, an AlignedMatrix or a MatrixXd.
+template <typename Table>
+[[nodiscard]] FeatureBlock rows_of(const Table& features, Eigen::Index first, Eigen::Index count) {
+  return {features.data() + first, count, features.rows()};
+}
+
+/// Rows and columns of a tile: covariance, weights and the features of both sides stay in the second-level cache.
+inline constexpr Eigen::Index kTile = 64;
+
+/// The box that a search of the kernel's parameters starts in, natural logarithms.
 struct SearchBox {
   Eigen::VectorXd low;
   Eigen::VectorXd high;
 };
 
-/// One covariance function: a value without state, its parameters are passed in as natural logarithms, as many for each
-/// joint alike and some for all of them.
-/// Work is done in tiles, so that a sum or a product of kernels is a few lines over the tiles of its parts.
-/// Thread-safe.
+/// One covariance function. A value without state: its parameters are passed in as natural logarithms, some for each
+/// joint and some for all joints. Works in tiles, so that a sum or a product of kernels is a few lines over the tiles
+/// of its parts. Thread-safe.
 class Kernel {
  public:
   virtual ~Kernel() = default;
@@ -55,28 +63,28 @@ class Kernel {
 
 using KernelPtr = std::shared_ptr<const Kernel>;
 
-/// The kernel that is spelled so (kernel_spelling.h), or null. `kernel_names` lists the words for messages.
-[[nodiscard]] KernelPtr make_kernel(std::string_view spelling);
-[[nodiscard]] std::string kernel_names();
-
 /// The kernel of one word; null when there is none.
 [[nodiscard]] KernelPtr make_leaf_kernel(std::string_view word);
+/// These words, for messages.
+[[nodiscard]] std::string kernel_names();
 
 /// Squared exponential (eq. 3.19, one length scale per joint) and Matérn 3/2, 5/2 (eq. 3.20): `se`, `matern32`,
 /// `matern52`; null otherwise. Parameters: log length scale of each joint, rad.
 [[nodiscard]] KernelPtr make_radial_kernel(std::string_view name);
-/// exp(-2 Σ sin²(π (q - q') / p) / l²) (MacKay 1998). Parameters: log l of each joint (no unit), then log p, rad.
+/// exp(-2 Σ sin²(π (q - q') / p) / l²) (MacKay 1998). Parameters: log l of each joint (no unit), then log p of each,
+/// rad.
 [[nodiscard]] KernelPtr make_periodic_kernel();
 /// (1 + r²/2α)^-α: squared exponentials of many scales (Rasmussen & Williams, eq. 4.19). Parameters: log length scale
 /// of each joint, rad, then log α.
 [[nodiscard]] KernelPtr make_rational_quadratic_kernel();
-/// 1 + Σ q q' / l²: affine functions. The 1 is their value at q = 0, so that they may be centred anywhere and no joint
-/// vector has a prior variance of 0. Parameters: log length scale of each joint, rad.
+/// 1 + Σ q q' / l²: affine functions. The 1 is the variance of their value at q = 0: no joint vector has a prior
+/// variance of 0. Parameters: log length scale of each joint, rad.
 [[nodiscard]] KernelPtr make_linear_kernel();
-/// 1 where the joint vectors are equal, otherwise 0: what a pose repeats and its neighbours don't know. No parameters.
+/// 1 where the joint vectors are equal, else 0: an error that repeats at a pose and is not shared by its neighbours. No
+/// parameters.
 [[nodiscard]] KernelPtr make_white_kernel();
 
-/// `inner`, one of the above, on (cos q, sin q), each joint's two with the same parameters: q and q + 2π are the same.
+/// `inner`, one of the above, on (cos q, sin q), both with the parameters of their joint: q and q + 2π are the same.
 [[nodiscard]] KernelPtr make_sincos_kernel(KernelPtr inner);
 /// Σ a² k with a = 1 for the first part. Parameters: those of the first part; then for each other log a, and its own.
 [[nodiscard]] KernelPtr sum_of(std::vector<KernelPtr> parts);

@@ -9,9 +9,10 @@
 namespace trammel {
 namespace {
 
-constexpr int kMostDepth = 20;            // of parentheses; nobody means more, and the stack ends somewhere
-constexpr std::size_t kMostBytes = 1000;  // of a spelling
-constexpr std::size_t kMostWords = 32;  // each has hyperparameters to be searched for: the time grows faster than they
+constexpr int kMostParentheses = 20;              // inside one another: reading recurses, and nobody means more
+constexpr std::size_t kMostSpellingBytes = 1000;  // as long as 32 words with room to spare
+constexpr std::size_t kMostWords =
+    32;  // the search for their hyperparameters takes more than twice as long for twice as many
 
 const std::array<LinearBlockPtr, 2>& known_blocks() {
   static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
@@ -54,7 +55,8 @@ class Reader {
         parts.push_back(*std::move(part));
         continue;
       }
-      if (bias.has(block->name())) return refused("bias kernel `{}`: `{}` is named twice", all_, block->name());
+      if (bias.has(block->name()))
+        return refused("bias kernel `{}`: `{}` is named twice", all_, block->name()).of("bias").with_text(all_);
       if (take('*') || take('(')) return misplaced(block->name());
       bias.blocks.push_back(block);
     } while (take('+'));
@@ -62,7 +64,9 @@ class Reader {
     if (!rest_.empty()) return expected("`+`, `*` or the end");
     if (parts.empty()) {
       const std::string_view block = bias.blocks.front()->name();
-      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, block, block);
+      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, block, block)
+          .of("bias")
+          .with_text(all_);
     }
     bias.kernel = parts.size() == 1 ? parts.front() : sum_of(std::move(parts));
     return bias;
@@ -87,7 +91,11 @@ class Reader {
 
   Result<KernelPtr> factor() {
     if (!take('(')) return leaf();
-    if (++depth_ > kMostDepth) return refused("bias kernel `{}`: more than {} parentheses deep", all_, kMostDepth);
+    if (++depth_ > kMostParentheses)
+      return refused("bias kernel `{}`: more than {} parentheses deep", all_, kMostParentheses)
+          .of("bias")
+          .with_text(all_)
+          .beyond(depth_, kMostParentheses);
     auto inside = list(
         '+', [this] { return product(); }, sum_of);
     if (inside && !take(')')) return expected("`)`");
@@ -101,21 +109,27 @@ class Reader {
     if (find_block(name)) return misplaced(name);
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
-      return refused(
-          "bias kernel `{}`: `{}` is unknown; known are none and auto (alone), {}, and to be added joint_map, "
-          "parameters",
-          all_, name, kernel_names());
+      return refused("bias kernel `{}`: `{}` is unknown", all_, name)
+          .of("bias")
+          .with_text(name)
+          .next(fmt::format("known are none and auto (alone), {}, and to be added joint_map, parameters",
+                            kernel_names()));
     if (!take('(')) return kernel;
     if (word() != "sincos" || !take(')')) return expected(fmt::format("`{}(sincos)`", name));
     return make_sincos_kernel(std::move(kernel));
   }
 
-  tl::unexpected<Error> misplaced(std::string_view block) const {
-    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", all_, block, block);
+  Failure misplaced(std::string_view block) const {
+    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", all_, block, block)
+        .of("bias")
+        .with_text(all_);
   }
 
-  tl::unexpected<Error> expected(std::string_view what) const {
-    return refused("bias kernel `{}`, character {}: {} is expected", all_, all_.size() - rest_.size() + 1, what);
+  Failure expected(std::string_view what) const {
+    return refused("bias kernel `{}`, character {}: {} is expected", all_, all_.size() - rest_.size() + 1, what)
+        .of("bias")
+        .with_text(all_)
+        .with_value(all_.size() - rest_.size() + 1);
   }
 
   void skip_space() { rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size())); }
@@ -144,14 +158,19 @@ class Reader {
 
 namespace {
 
-/// Before anything is made of it.
+/// Asked first: nothing is built from a spelling that is too long.
 Status check_length(std::string_view spelling) {
-  if (spelling.size() > kMostBytes) {
-    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostBytes);
+  if (spelling.size() > kMostSpellingBytes) {
+    return failure(ErrorCode::kTooLarge, "bias kernel: {} bytes, limit {}", spelling.size(), kMostSpellingBytes)
+        .of("bias")
+        .beyond(spelling.size(), kMostSpellingBytes);
   }
   const auto joins = std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
   if (const auto words = static_cast<std::size_t>(joins) + 1; words > kMostWords) {
-    return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}", spelling, words, kMostWords);
+    return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}", spelling, words, kMostWords)
+        .of("bias")
+        .with_text(spelling)
+        .beyond(words, kMostWords);
   }
   return {};
 }

@@ -9,23 +9,24 @@
 
 namespace trammel {
 
-/// `matern52 + periodic`, `se(sincos) * (linear + white)`: words of kernel_names(), each also on (cos q, sin q); `*`
-/// binds before `+`. One word alone is that kernel itself. Refuses other words, naming them and those that are known,
-/// and what is not such a sum, and more than 32 words or 1000 bytes.
+/// The kernel that is written so: `matern52 + periodic`, `se(sincos) * (linear + white)`. Words are those of
+/// kernel_names(), each also with `(sincos)`; `*` binds before `+`. Refuses unknown words, naming the known ones; what
+/// is no such sum; more than 32 words or 1000 bytes.
 [[nodiscard]] Result<KernelPtr> spelled_kernel(std::string_view spelling);
 
-/// What a bias is made of: what each coordinate has by itself, and what they share.
+/// What a bias is made of.
 struct SpelledBias {
-  KernelPtr kernel;
-  std::vector<LinearBlockPtr> blocks;
+  KernelPtr kernel;                    ///< of each coordinate by itself
+  std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share
   [[nodiscard]] bool has(std::string_view block) const;
 };
 
-/// A kernel as above and, added to it once each at most, `joint_map` and `parameters`: `matern52 + joint_map`. Refuses
-/// what spelled_kernel() refuses, a block in a product or in parentheses, twice, or without a kernel beside it.
+/// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 + joint_map`. Refuses
+/// what spelled_kernel() refuses, and a block that stands in a product or in parentheses, comes twice, or has no kernel
+/// beside it.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
 
-/// Whether a bias can be spelled so; `none` can, and `auto`: the one that choose_bias() takes.
+/// Whether a bias may be written so: as above, `none`, or `auto` (choose_bias.h).
 [[nodiscard]] Status check_bias_spelling(std::string_view spelling);
 
 }  // namespace trammel

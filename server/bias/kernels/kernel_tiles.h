@@ -7,7 +7,7 @@
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/numerics.h"
 
-/// What kernels other than the radial ones share.
+/// What the kernels share that work with Eigen on tiles.
 namespace trammel {
 
 using StridedColumns = Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>>;
@@ -23,14 +23,14 @@ inline MutableStridedColumns columns_of(double* k, Eigen::Index rows, Eigen::Ind
   return {k, rows, cols, Eigen::OuterStride<>(ld)};
 }
 
-/// How many joints so many parameters are for; 0 when their number does not tell, since all are shared.
+/// The number of joints that a kernel with so many parameters is for; 0 where all its parameters are shared.
 inline Eigen::Index joints_of(const Kernel& kernel, Eigen::Index parameters) {
   const Eigen::Index shared = kernel.parameter_count(0);
   const Eigen::Index each = kernel.parameter_count(1) - shared;
   return each == 0 ? 0 : (parameters - shared) / each;
 }
 
-/// k(i, j) in a matrix of its own, with its padding.
+/// k(i, j) in a new matrix, with its padding.
 inline AlignedMatrix tile_of(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& a,
                              const FeatureBlock& b) {
   AlignedMatrix k(padded_rows(a.rows), b.rows);
@@ -38,16 +38,15 @@ inline AlignedMatrix tile_of(const Kernel& kernel, const Eigen::VectorXd& parame
   return k;
 }
 
-/// Kernel::weighted_sum by tiles, for kernels that know nothing better.
+/// Kernel::weighted_sum() by tiles, for kernels that have no faster way.
 inline void weighted_sum_by_tiles(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& a,
                                   const FeatureBlock& b, const double* weights, double* out) {
-  constexpr Eigen::Index kChunk = 10 * kRowPadding;
-  constexpr Eigen::Index kColumns = 64;
+  constexpr Eigen::Index kRowsAtATime = 10 * kRowPadding;  // 120 kB with 64 columns: the second-level cache
   std::fill_n(out, b.rows, 0.0);
-  for (Eigen::Index j = 0; j < b.rows; j += kColumns) {
-    const FeatureBlock columns = {b.data + j, std::min(kColumns, b.rows - j), b.ld};
-    for (Eigen::Index i = 0; i < a.rows; i += kChunk) {
-      const Eigen::Index rows = std::min(kChunk, a.rows - i);
+  for (Eigen::Index j = 0; j < b.rows; j += kTile) {
+    const FeatureBlock columns = {b.data + j, std::min(kTile, b.rows - j), b.ld};
+    for (Eigen::Index i = 0; i < a.rows; i += kRowsAtATime) {
+      const Eigen::Index rows = std::min(kRowsAtATime, a.rows - i);
       const AlignedMatrix k = tile_of(kernel, parameters, {a.data + i, rows, a.ld}, columns);
       const Eigen::Map<const Eigen::VectorXd> w(weights + i, rows);
       for (Eigen::Index c = 0; c < columns.rows; ++c) out[j + c] += k.map().col(c).head(rows).dot(w);
@@ -55,7 +54,7 @@ inline void weighted_sum_by_tiles(const Kernel& kernel, const Eigen::VectorXd& p
   }
 }
 
-/// Where a search of length scales starts, for values that spread like the columns of `x`.
+/// Where a search of length scales starts: half to ten times the standard deviation of each column of `x`.
 inline SearchBox length_scale_box(const Eigen::MatrixXd& x) {
   const Eigen::RowVectorXd mean = x.colwise().mean();
   SearchBox box{Eigen::VectorXd(x.cols()), Eigen::VectorXd(x.cols())};

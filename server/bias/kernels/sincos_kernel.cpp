@@ -23,7 +23,7 @@ class SincosKernel : public Kernel {
   Index parameter_count(Index joints) const override { return inner_->parameter_count(joints); }
   Index feature_count(Index joints) const override { return inner_->feature_count(2 * joints); }
 
-  // Of a joint's two the one that moves more has the say.
+  // Of cosine and sine of a joint the one that spreads more decides.
   SearchBox search_box(const MatrixXd& q) const override {
     const SearchBox both = inner_->search_box(sincos(q));
     SearchBox box{VectorXd::Constant(parameter_count(q.cols()), -HUGE_VAL),
@@ -64,7 +64,7 @@ class SincosKernel : public Kernel {
   }
 
  private:
-  // Which of the parameters of `joints` stands at place `p` of the inner kernel's, which knows twice as many joints.
+  // The inner kernel has twice as many joints; its parameter `p` is this one of ours.
   Index own_parameter(Index p, Index joints) const {
     const Index of_joints = (inner_->parameter_count(1) - inner_->parameter_count(0)) * joints;
     return p < 2 * of_joints ? p / (2 * joints) * joints + p % joints : p - of_joints;

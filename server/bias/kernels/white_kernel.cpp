@@ -9,8 +9,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// 53 bits of all joints, exact in a double: two of 50,000 different poses share them once in 10 million such sets.
-// Mixed as in SplitMix64. Adding 0 makes the two zeros one.
+// 53 bits made from all joints, which a double holds exactly. Two of 50,000 different poses share them in one of 10
+// million such sets. Mixed as in SplitMix64. Adding 0 makes -0 and 0 equal.
 double fingerprint(const Eigen::RowVectorXd& q) {
   std::uint64_t state = 0;
   for (Index k = 0; k < q.size(); ++k) {

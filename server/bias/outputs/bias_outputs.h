@@ -8,27 +8,30 @@
 #include "server/bias/coupled/coupled_search.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// What stands behind a BiasModel: D outputs that know nothing, something each by itself, or something together.
+/// What a BiasModel predicts with: D outputs that are silent, independent, or coupled by blocks.
 namespace trammel {
+
+/// Outputs that share a unit: the coordinates of a position, or of a rotation.
+inline constexpr Eigen::Index kOfOneUnit = 3;
 
 /// What outputs learn from.
 struct OutputData {
   Eigen::MatrixXd q;                   ///< N x n, rad
   Eigen::MatrixXd y;                   ///< N x D, offset removed
   Eigen::VectorXd noise_shape;         ///< N, noise variance of each point relative to σ_n²
-  std::vector<BiasFeatures> features;  ///< N, or none where no block asks for them
+  std::vector<BiasFeatures> features;  ///< N; empty without blocks
 };
 
 /// At one joint vector.
 struct OutputPrediction {
   Eigen::VectorXd mean;         ///< D
   Eigen::MatrixXd covariance;   ///< D x D, of the functions themselves
-  double prior_share = 0;       ///< as BiasPrediction says, of the first three outputs
-  Eigen::VectorXd nearby = {};  ///< D: what of the mean the kernel says; empty without blocks: all of it
+  double prior_share = 0;       ///< of the first three outputs, as in BiasPrediction
+  Eigen::VectorXd nearby = {};  ///< D: the part of the mean that the kernel predicts; empty without blocks
 };
 
-/// D outputs conditioned on their data. Immutable, thread-safe. `features` are as many as joint vectors or, where no
-/// block asks for them, none.
+/// D outputs conditioned on their data. Immutable, thread-safe. `features`: one for each joint vector; empty without
+/// blocks.
 class BiasOutputs {
  public:
   virtual ~BiasOutputs() = default;
@@ -38,15 +41,16 @@ class BiasOutputs {
                                              const std::vector<BiasFeatures>& features) const = 0;
   [[nodiscard]] virtual std::vector<OutputPrediction> predict(const Eigen::MatrixXd& q,
                                                               const std::vector<BiasFeatures>& features) const = 0;
-  /// M x D: what of the mean the kernel says, without blocks all of it.
+  /// M x D: the part of the mean that the kernel predicts; all of it without blocks.
   [[nodiscard]] virtual Eigen::MatrixXd nearby_mean(const Eigen::MatrixXd& q) const { return mean(q, {}); }
-  /// P: of the block `parameters`, what the data say of its weights; empty without.
+  /// P: weights of the block `parameters`; empty without that block.
   [[nodiscard]] virtual Eigen::VectorXd parameter_weights() const { return {}; }
   /// D, of one measurement.
   [[nodiscard]] virtual Eigen::VectorXd noise_variance() const = 0;
-  /// Nat: of each output, or one number where they have one likelihood together.
+  /// Nat: of each output, or one number for coupled outputs.
   [[nodiscard]] virtual Eigen::VectorXd log_likelihood() const = 0;
-  /// N x D: mean of every training pose from all the others, and variance of its measurement; N: share as BiasModel.
+  /// Every training pose predicted from all the others. N x D: mean, and variance of the measurement. N: prior share,
+  /// as in BiasModel.
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_mean() const = 0;
   [[nodiscard]] virtual Eigen::MatrixXd leave_one_out_variance() const = 0;
   [[nodiscard]] virtual Eigen::VectorXd leave_one_out_share() const = 0;
@@ -58,7 +62,7 @@ class BiasOutputs {
     return std::nullopt;
   }
 
-  /// With more points, or without some (rising indices); null where only conditioning anew does it.
+  /// With more points, or without some (rising indices); null where the outputs must be conditioned anew.
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const { return nullptr; }
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> without(const std::vector<Eigen::Index>& /*points*/) const {
     return nullptr;
@@ -70,12 +74,12 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 /// Predicts zero, with the rms of `residual` (N x D) as its stddev.
 [[nodiscard]] BiasOutputsPtr make_silent_outputs(const Eigen::MatrixXd& residual);
 
-/// Each output by itself. Null when a covariance is not positive definite.
+/// Independent outputs. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
                                                    const std::vector<GpHyperparameters>& at);
-/// Most probable hyperparameters; outputs from the fourth on are of another unit and searched by themselves.
-/// `metrology_stddev`: D. From `last`, where given, without new starts. Empty when no start gave a positive definite
-/// covariance.
+/// The most probable hyperparameters of independent outputs; those of another unit (from the fourth on) are searched
+/// apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there are no other starts. Empty when no
+/// start gave a positive definite covariance.
 [[nodiscard]] std::optional<CoupledSearchResult> search_independent(const KernelPtr& kernel, const OutputData& data,
                                                                     const Eigen::VectorXd& metrology_stddev,
                                                                     const SearchOptions& options,

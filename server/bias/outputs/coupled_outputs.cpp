@@ -13,10 +13,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kOfOneUnit = 3;
-constexpr Index kTargets = 256;  // at once: their columns of H are a few megabytes
+constexpr Index kPosesAtATime = 256;  // their columns of H are a few megabytes
 
-// D times `many` x p: H from row `first` on before it is scaled, output by output.
+// H of each output at `many` poses from `first` on, `many` x p, not scaled.
 std::vector<MatrixXd> columns_of(const LinearBlocks& blocks, const MatrixXd& q,
                                  const std::vector<BiasFeatures>& features, Index first, Index many, Index outputs) {
   TRAMMEL_CHECK(static_cast<Index>(features.size()) == q.rows());
@@ -34,7 +33,7 @@ CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
   return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, 0, data.q.rows(), data.y.cols())};
 }
 
-// Variances are widened by what cross-validation shows: many hyperparameters, and the drift of a measuring session,
+// Variances are widened by what cross-validation shows. Many hyperparameters, and the drift of a measuring session,
 // make the process surer than it should be.
 class CoupledOutputs final : public BiasOutputs {
  public:
@@ -62,8 +61,8 @@ class CoupledOutputs final : public BiasOutputs {
 
   std::vector<OutputPrediction> predict(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
     std::vector<OutputPrediction> predictions;
-    for (Index first = 0; first < q.rows(); first += kTargets) {
-      const Index many = std::min(kTargets, q.rows() - first);
+    for (Index first = 0; first < q.rows(); first += kPosesAtATime) {
+      const Index many = std::min(kPosesAtATime, q.rows() - first);
       for (CoupledPrediction& at :
            posterior_.predict(q.middleRows(first, many), columns_of(blocks_, q, features, first, many, count()))) {
         const double share = share_of(at.covariance.diagonal(), at.prior);
@@ -100,7 +99,7 @@ class CoupledOutputs final : public BiasOutputs {
   CoupledPosterior posterior_;
   VectorXd noise_shape_;
   VectorXd parameter_weights_;
-  double widening_;  // of all variances, by what poses left out together show
+  double widening_;  // factor of all variances
   VectorXd noise_variance_;
 };
 

@@ -12,10 +12,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kOfOneUnit = 3;
-constexpr double kSilence = 1e-9;  // m rms; an output below it has nothing to learn, and no scale to search with
+constexpr double kSilence = 1e-9;  // m rms: an output below it has nothing to learn, and no scale to search with
 
-// What stands for an output that is constant: no signal, metrology's noise.
+// An output that is constant: no signal, the instrument's noise.
 GpHyperparameters silent(const VectorXd& kernel, double metrology_stddev) {
   return {kernel, std::log(kSilence), std::log(metrology_stddev)};
 }

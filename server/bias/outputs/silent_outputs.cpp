@@ -11,9 +11,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeastVariance = 1e-18;
+constexpr double kLeastVariance = 1e-18;  // m²: 1 nm; keeps the logarithm of an output that is zero finite
 
-/// Independent Gaussian residuals about zero.
+/// Predicts zero; the residual counts as noise.
 class SilentOutputs final : public BiasOutputs {
  public:
   explicit SilentOutputs(const MatrixXd& residual)

@@ -16,28 +16,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kTile = 64;
 constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an output that is exactly zero
-constexpr double kLogParameterMax = 40.0;
-constexpr double kLogRatioMin = -20.0;  // below it thousands of smooth points are no longer positive
-                                        // definite in doubles
+constexpr double kLeastLogRatio = -20.0;  // of η: with less noise thousands of smooth points are not positive definite
 
-// Of the compressed variance: what may stay unexplained at any of the data, relative to the noise; where it pays.
-constexpr double kUnexplained = 1e-3;
-constexpr double kMostKept = 0.75;
-constexpr Index kMostPoints = 2000;
-constexpr Index kFewestToCompress = 200;
-
-const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
-
-// Of an AlignedMatrix or of a MatrixXd.
-template <typename Table>
-FeatureBlock rows_of(const Table& features, Index first, Index count) {
-  return {features.data() + first, count, features.rows()};
-}
-
-// Leading dimensions that are multiples of 4 KiB would put whole rows into the same few cache sets.
-Index leading_dimension(Index rows) { return rows % 64 == 0 ? rows + kTargetBlock : rows; }
+// The compressed variance.
+constexpr double kUnexplained = 1e-3;     // of the noise variance, at any training point: far below what anybody sees
+constexpr double kMostKept = 0.75;        // of the points: with more, little time would be saved
+constexpr Index kMostKeptPoints = 2000;   // finding them takes time with the square of their number
+constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
 
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
 void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
@@ -59,16 +45,13 @@ void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const 
   matrix->map().rightCols(matrix->cols() - n).setZero();
 }
 
-AlignedMatrix augmented_storage(Index n, Index outputs) {
-  const Index rows = padded_rows(n + outputs);
-  return {leading_dimension(rows), rows};
-}
+AlignedMatrix augmented_storage(Index n, Index outputs) { return factor_storage(n + outputs); }
 
 AlignedMatrix feature_table(const Kernel& kernel, const MatrixXd& q) {
   return {padded_rows(q.rows()), kernel.feature_count(q.cols())};
 }
 
-// Targets need no padding: their rows are taken one by one.
+// Targets need no padding: they are the second argument of a kernel.
 MatrixXd target_features(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   MatrixXd table(q.rows(), kernel.feature_count(q.cols()));
   kernel.features(parameters, q, table.data(), table.rows());
@@ -90,8 +73,8 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
   const Index n = size();
   const Index outputs = data_.y.cols();
   const Index count = parameters.size() - 1;
-  if (!parameters.allFinite() || parameters.cwiseAbs().maxCoeff() > kLogParameterMax) return false;
-  if (parameters[count] < kLogRatioMin) return false;
+  if (!parameters.allFinite() || parameters.cwiseAbs().maxCoeff() > kMostLogParameter) return false;
+  if (parameters[count] < kLeastLogRatio) return false;
   const double log_ratio = parameters[count];
   const double ratio = std::exp(log_ratio);
 
@@ -112,7 +95,7 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
     const double variance = std::max(quadratic, 0.0) / points + kSmallestSignal * kSmallestSignal;
     signal_variance_[d] = variance;
     out->value += 0.5 * points * (std::log(variance) + 1.0 + kLogTwoPi);
-    // The noise prior sees log σ_n = ½ (log η + log σ_f²), and σ_f² moves with the parameters too.
+    // The prior of the noise is one of log σ_n = ½ (log η + log σ_f²), and σ_f² depends on the parameters, too.
     const double below = std::min(0.5 * (log_ratio + std::log(variance)) - std::log(prior_.noise_stddev), 0.0);
     out->value += 0.5 * std::pow(below / prior_.noise_spread, 2);
     const double slope = below / (prior_.noise_spread * prior_.noise_spread);
@@ -132,7 +115,8 @@ bool ProfiledLikelihood::evaluate(const VectorXd& parameters, ObjectiveValue* ou
   return std::isfinite(out->value) && out->gradient.allFinite();
 }
 
-// ½ tr(G dM), G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, over the lower triangle: off the diagonal once, on it half.
+// ½ tr(G dM) with G = outputs M⁻¹ - Σ_d weight_d α_d α_dᵀ, from the lower triangle: elements off the diagonal count
+// once, those on it half.
 VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, const VectorXd& output_weights) {
   const Index n = size();
   const Index ld = matrix_.rows();
@@ -211,7 +195,7 @@ void GaussianProcess::finish(VarianceForm form) {
 
 void GaussianProcess::compress() {
   if (size_ < kFewestToCompress) return;
-  const Index most = std::min(kMostPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
+  const Index most = std::min(kMostKeptPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
   const double tolerance = kUnexplained * noise_.minCoeff();
   const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
   if (static_cast<Index>(points.size()) == most) return;
@@ -221,7 +205,7 @@ void GaussianProcess::compress() {
   few->learn(*kernel_, parameters_, all, noise_, y_);
   auto posterior = few->posterior();
   if (!posterior) return;
-  // Widened to the exact variance at the data, D - D² diag(M⁻¹).
+  // Widened so that it is nowhere below the exact variance at the data, D - D² diag(M⁻¹).
   const VectorXd known = noise_ - noise_.cwiseAbs2().cwiseProduct(inverse_diagonal_);
   VectorXd share(size_);
   VectorXd prior(size_);

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -13,6 +15,10 @@
 /// Exact Gaussian processes (source eqs. 3.15-3.26): K = σ_f² R(parameters) + σ_n² diag(w) = σ_f² M, M = R + η diag(w).
 namespace trammel {
 
+inline const double kLogTwoPi = std::log(2.0 * std::numbers::pi);
+/// Natural logarithms of hyperparameters beyond this are refused: their squares would be no numbers to compute with.
+inline constexpr double kMostLogParameter = 40.0;
+
 /// What a process learns from. All outputs share the joint vectors.
 struct GpData {
   Eigen::MatrixXd q;            ///< N x n, rad
@@ -22,25 +28,25 @@ struct GpData {
 
 /// Weak log-normal priors; they decide only what the data leave open.
 struct GpPrior {
-  double noise_stddev = 1e-5;  ///< m, from metrology; below it the noise costs ½ (log ratio / spread)², above 0
-  double noise_spread = 0.1;   ///< in logs: metrology is believed to 10 %; noise below it would be learned as bias
+  double noise_stddev =
+      1e-5;  ///< m, the instrument's; noise below it costs ½ (log ratio / spread)², noise above it nothing
+  double noise_spread = 0.1;  ///< in logs: the instrument's noise is known to 10 %; less noise would mean learning it
   Eigen::VectorXd parameter_centre;  ///< of the kernel's log parameters
-  double parameter_spread = 3.0;     ///< in logs: keeps an idle joint's length scale from running away
-  double log_ratio_centre = -4.6;    ///< of log η
+  double parameter_spread = 3.0;     ///< in logs: holds the length scale of a joint that has no influence
+  double log_ratio_centre = -4.6;    ///< of log η: noise a tenth of the signal
   double log_ratio_spread = 5.0;
 };
 
-/// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over the outputs, with the
-/// σ_f² of each output at its best value y'M⁻¹y / N. Keeps its matrix between calls: one thread at a time.
+/// Minus the log of (likelihood x prior) as a function of [kernel parameters, log η], summed over the outputs. σ_f² of
+/// each output is at its best value y'M⁻¹y / N. Keeps its matrix between calls: for one thread at a time.
 class ProfiledLikelihood {
  public:
   ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior);
 
-  /// False when M is not positive definite or the parameters are absurd.
+  /// False where M is not positive definite, or a parameter is beyond kMostLogParameter.
   [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, ObjectiveValue* out);
 
-  /// Of the last successful evaluation: σ_f² of each output, m²; rms over the points of the Euclidean leave-one-out
-  /// error, m.
+  /// Both of the last evaluation that succeeded: σ_f² of each output, m²; rms of the Euclidean leave-one-out error, m.
   [[nodiscard]] const Eigen::VectorXd& signal_variance() const { return signal_variance_; }
   [[nodiscard]] double leave_one_out_rms() const;
 
@@ -68,11 +74,12 @@ struct GpHyperparameters {
   double log_noise_stddev;   ///< log σ_n, m
 };
 
-/// How a process keeps what its variance needs.
+/// How a process computes its variance.
 enum class VarianceForm {
-  /// In a few of its points, where few are enough: several times faster. At the data never below the exact variance;
-  /// elsewhere measured 0.2 % of the stddev below it at most (bound: DECISIONS.md), and above it by what the few leave
-  /// unexplained, at the data 0.001 σ_n². Exact where they would not be few.
+  /// From a few of its points, where few are enough: several times faster. At the data it is never below the exact
+  /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to be at most 0.2 %
+  /// too
+  /// small (bound: DECISIONS.md). Exact where many points would be needed.
   kCompressed,
   kExact,
 };
@@ -87,17 +94,17 @@ class GaussianProcess {
                                                                 const GpHyperparameters& hyperparameters,
                                                                 VarianceForm form = VarianceForm::kCompressed);
 
-  /// Conditioned on more points too, with the same hyperparameters, in N² operations a point; equal to `condition` on
-  /// all of them to rounding. Empty when the covariance is no longer positive definite.
+  /// Conditioned on more points, with the same hyperparameters, in N² operations for each point. Equal to condition()
+  /// on all points, to rounding. Empty when the covariance is no longer positive definite.
   [[nodiscard]] std::optional<GaussianProcess> with(const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                     const Eigen::VectorXd& noise_shape,
                                                     VarianceForm form = VarianceForm::kExact) const;
-  /// Conditioned on all points but these (rising indices), in N² operations a point; to rounding as `with`.
+  /// Conditioned on all points but these (rising indices), in N² operations for each; equal to rounding, too.
   [[nodiscard]] GaussianProcess without(const std::vector<Eigen::Index>& points,
                                         VarianceForm form = VarianceForm::kExact) const;
 
-  /// What of `y` (N, m; observations instead of those conditioned on) these points miss by when they are predicted from
-  /// all others, in N operations a pair of them.
+  /// Errors of these points when they are predicted from all others, in N operations for each pair of them; `y` (N, m)
+  /// takes the place of the observations.
   [[nodiscard]] Eigen::VectorXd left_out_error(const Eigen::VectorXd& y, const std::vector<Eigen::Index>& points) const;
 
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
@@ -111,7 +118,7 @@ class GaussianProcess {
   [[nodiscard]] double noise_variance() const { return noise_variance_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// Mean of every training point from all the others, m; posterior / prior variance share of the function there
+  /// Every training point predicted from all the others: mean, m, and posterior over prior variance of the function
   /// (Rasmussen & Williams, eqs. 5.10-5.12).
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
@@ -122,9 +129,9 @@ class GaussianProcess {
 
  private:
   GaussianProcess() = default;
-  // Of the same kernel and hyperparameters, without data.
+  // With the same kernel and hyperparameters, and room for `size` points.
   [[nodiscard]] GaussianProcess like(Eigen::Index size) const;
-  // What follows from the data, weights, inverse diagonal and root.
+  // Computes what follows from data, weights, inverse diagonal and root.
   void finish(VarianceForm form);
   void compress();
 

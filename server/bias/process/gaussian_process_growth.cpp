@@ -60,7 +60,7 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   return gp;
 }
 
-// With G = L⁻¹ and M⁻¹ = Gᵀ G: (M⁻¹)_pp⁻¹ (M⁻¹ y)_p, the blocks of Rasmussen & Williams, eqs. 5.10-5.12.
+// (M⁻¹)_pp⁻¹ (M⁻¹ y)_p with M⁻¹ = Gᵀ G, G = L⁻¹: Rasmussen & Williams, eqs. 5.10-5.12, for several points at once.
 VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<Index>& points) const {
   TRAMMEL_CHECK(y.size() == size_);
   const std::vector<double> rows = exact_.rows(0);
@@ -87,7 +87,7 @@ GaussianProcess GaussianProcess::without(const std::vector<Index>& points, Varia
   std::vector<Index> kept(static_cast<std::size_t>(size_));
   for (Index i = 0; i < size_; ++i) kept[static_cast<std::size_t>(i)] = i;
   double log_det = log_det_;
-  // From the last, so that the indices of the others stay.
+  // The last one first: the indices of the others stay valid.
   for (auto point = points.rbegin(); point != points.rend(); ++point) {
     TRAMMEL_CHECK(*point >= 0 && *point < static_cast<Index>(kept.size()));
     const VectorXd gone = root.remove(*point);

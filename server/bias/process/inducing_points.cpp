@@ -14,9 +14,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kPanel = 48;          // candidates looked at together
-constexpr double kPanelShare = 0.25;  // a candidate is taken while it tells this
-                                      // much of what the best one did
+constexpr Index kPanel = 48;  // candidates at a time: their columns are computed together
+constexpr double kPanelShare =
+    0.25;  // of the variance that the best candidate explains: below it a new panel is better
 
 AlignedMatrix gathered(const AlignedMatrix& features, const std::vector<Index>& rows) {
   AlignedMatrix table(padded_rows(static_cast<Index>(rows.size())), features.cols());
@@ -26,7 +26,7 @@ AlignedMatrix gathered(const AlignedMatrix& features, const std::vector<Index>& 
 
 FeatureBlock all_of(const AlignedMatrix& features, Index count) { return {features.data(), count, features.rows()}; }
 
-// Points with the most variance left, by index where equal.
+// The points with the most variance left; of equal ones the first.
 std::vector<Index> candidates(const VectorXd& left, double tolerance) {
   std::vector<Index> order(static_cast<std::size_t>(left.size()));
   std::iota(order.begin(), order.end(), Index{0});
@@ -38,7 +38,7 @@ std::vector<Index> candidates(const VectorXd& left, double tolerance) {
   return order;
 }
 
-// Pivoted Cholesky of the candidates' own block: the positions taken, and their factor.
+// Pivoted Cholesky of the candidates' block. Returns the positions taken, and their factor.
 std::vector<Index> take(MatrixXd block, double least, Index most, MatrixXd* factor) {
   std::vector<Index> taken;
   MatrixXd lower = MatrixXd::Zero(block.rows(), block.rows());

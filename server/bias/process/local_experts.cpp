@@ -15,12 +15,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kMostExact = 5000;
-constexpr Index kMostOfAnExpert = 1200;
-constexpr double kLeastShare = 1e-12;  // of the prior; keeps the precision of a point known exactly finite
+constexpr Index kMostExact =
+    5000;  // an exact process of so many takes 100 MB for each output, of twice as many four times that
+constexpr Index kMostOfAnExpert =
+    1200;  // neighbours: twice as many take twice the time and leave a tenth less (DECISIONS.md)
+constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
 
-// In length scales for a kernel that has one of each joint and hardly more; for others, which tell neighbours in more
-// than one way or in none, in rad.
+// In units of the length scales for a kernel with one length scale for each joint; in rad for all others, whose idea of
+// neighbours is not a single distance.
 MatrixXd joints_as_seen_by(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
   if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
@@ -115,7 +117,7 @@ LocalExperts::Committee LocalExperts::committee(const MatrixXd& q) const {
     const std::vector<PosteriorVariance> variance = expert.variance(q);
     for (Index i = 0; i < count; ++i) {
       const PosteriorVariance& at = variance[static_cast<std::size_t>(i)];
-      const double posterior = std::max(at.posterior, kLeastShare * at.prior);
+      const double posterior = std::max(at.posterior, kKnownExactly * at.prior);
       const double beta = 0.5 * std::log(at.prior / posterior);
       prior[i] = at.prior;
       confidence[i] += beta;

@@ -7,11 +7,11 @@
 
 namespace trammel {
 
-/// One output of any number of points: one exact process up to 5000; beyond, exact processes of neighbouring points
-/// that share their hyperparameters, joined by the robust Bayesian committee machine (Deisenroth & Ng, ICML 2015): with
-/// β_k = ½ log(prior variance / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior. Every expert speaks everywhere, so
-/// prediction is as smooth as theirs; where none knows anything it is the prior. Immutable, thread-safe. Memory is
-/// 4 N m bytes for experts of m points, between 600 and 1200; time N m².
+/// One output with any number of points. Up to 5000 it is one exact process. Beyond, it is several exact processes of
+/// neighbouring points with the same hyperparameters, the experts, joined by the robust Bayesian committee machine
+/// (Deisenroth & Ng, ICML 2015): with β_k = ½ log(prior variance / v_k), precision = Σ β_k / v_k + (1 - Σ β_k) / prior.
+/// All experts predict everywhere, so the prediction is as smooth as theirs; where none knows anything it is the prior.
+/// Immutable, thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
 class LocalExperts {
  public:
   /// Empty when a covariance is not positive definite.
@@ -20,13 +20,13 @@ class LocalExperts {
                                                              const Eigen::VectorXd& noise_shape,
                                                              const GpHyperparameters& hyperparameters);
 
-  /// As GaussianProcess has them; `with` gives each point to the expert that knows most of it, in m² operations;
-  /// `without` takes the points out of their experts, and an expert that has none left with them.
+  /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the expert that knows it
+  /// best. without() takes points out of their experts, and drops an expert without points.
   [[nodiscard]] std::optional<LocalExperts> with(const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                  const Eigen::VectorXd& noise_shape) const;
   [[nodiscard]] LocalExperts without(const std::vector<Eigen::Index>& points) const;
 
-  /// As GaussianProcess has it; empty where there is more than one expert.
+  /// As GaussianProcess has it; empty with more than one expert.
   [[nodiscard]] std::optional<Eigen::VectorXd> left_out_error(const Eigen::VectorXd& y,
                                                               const std::vector<Eigen::Index>& points) const {
     if (experts_.size() > 1) return std::nullopt;
@@ -38,9 +38,9 @@ class LocalExperts {
 
   [[nodiscard]] double signal_variance() const { return experts_.front().signal_variance(); }
   [[nodiscard]] double noise_variance() const { return experts_.front().noise_variance(); }
-  /// Of the experts' data each by itself.
+  /// Sum over the experts, each with its own data.
   [[nodiscard]] double log_likelihood() const;
-  /// Of every point from the others of its own expert.
+  /// Every point predicted from the others of its expert.
   [[nodiscard]] Eigen::VectorXd leave_one_out_mean() const;
   [[nodiscard]] Eigen::VectorXd leave_one_out_share() const;
   [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const;

@@ -9,8 +9,8 @@ namespace trammel {
 
 using Eigen::Index;
 
-// From the last rows up: columns to the right of a row are not needed above it, so that never more than one triangle
-// and one matrix are there.
+// The last rows first. Columns to the right of a row are not needed for the rows above, and their memory is given back:
+// there is never more than one matrix and one triangle.
 VarianceTable::VarianceTable(AlignedMatrix features, Index size, AlignedMatrix root)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
   const Numerics& n = numerics();

@@ -14,14 +14,15 @@ struct PosteriorVariance {
   double prior;
 };
 
-/// What some points explain of the variance anywhere: prior - |G k(points, x)|², G lower triangular.
+/// The variance that some points leave: prior - |G k(points, x)|², G lower triangular.
 class VarianceTable {
  public:
   VarianceTable() = default;
   /// `features` of `size` points, padded; `root` holds G in its lower triangle.
   VarianceTable(AlignedMatrix features, Eigen::Index size, AlignedMatrix root);
 
-  /// posterior / prior share of each row of `targets` (features), and k(x, x) in `prior`. Both targets.rows long.
+  /// For each row of `targets` (features) the variance left and the prior k(x, x), both in units of σ_f² and
+  /// targets.rows long.
   void shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets, double* posterior,
               double* prior) const;
 
@@ -30,7 +31,7 @@ class VarianceTable {
   VarianceTable(AlignedMatrix features, Eigen::Index size, const std::vector<double>& rows);
   /// G row after row, with room for `more` rows.
   [[nodiscard]] std::vector<double> rows(Eigen::Index more) const;
-  /// Multiplies every posterior variance from now on; never below what makes it 1.
+  /// Multiplies every posterior variance by `factor`, up to the prior.
   void widen(double factor) { factor_ *= factor; }
 
  private:

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/bias/search/optima.h"
+#include "server/bias/search/starts.h"
 #include "server/numerics/seeded_random.h"
 
 namespace trammel {
@@ -14,26 +15,29 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index kStartPoints = 150;    // at least, and where there are many:
-constexpr double kStartShare = 0.125;  // of all,
-constexpr Index kCarryPoints = 300;    // at most
-constexpr double kCarryShare = 0.45;
-constexpr Index kCurvaturePoints = 1000;  // most for which the curvature is differenced
-constexpr Index kMostPoints = 2500;       // the rest would cost more than the last nats are worth
-constexpr std::size_t kCarried = 5;
-constexpr std::size_t kRivals = 3;         // of one output, on all points
-constexpr double kLeastLogRatio = -14.0;   // where a start is still well conditioned
-constexpr double kUnexplainedNoise = 1.4;  // in logs, above metrology's
-constexpr Index kFinerPoints = 400;
-constexpr Index kAroundPoints = 2000;  // most to look around on
-constexpr double kBeyondBox = 1.0;     // in logs: what starts there is finer or idler than any start on few points
-constexpr double kWeak = 0.5;          // in logs, below the box: what is longer has no strong influence
-constexpr double kLessNoise = 1.4;     // in logs of the variance, for what finer length scales may explain
-constexpr double kFineLogRatio = -4.0;
-constexpr double kGain = 0.5;         // nat, of an optimum worth moving to
-constexpr double kWideSpread = 10.0;  // in logs, of the prior on kernel parameters
-constexpr double kWorseLeaveOneOut = 1.1;
-constexpr double kRefined = 0.4;  // of the progress of an output, before looking around
+// Points of each stage. Cheap stages do most of the work, so that few evaluations on all points are enough.
+constexpr double kStartShare = 0.125;     // of all points, for the first searches; kStartPoints at least
+constexpr Index kCarryPoints = 300;       // to which the first optima are carried: they judge them by leave-one-out
+constexpr double kCarryShare = 0.45;      // of all points, for the stage before the last
+constexpr Index kCurvaturePoints = 1000;  // at most, to difference the curvature on: more points show the same
+constexpr Index kMostSearched = 2500;     // more points would take longer than the last nats are worth
+constexpr Index kFinerPoints = 400;       // at least, to look for finer length scales: fewer cannot show them
+constexpr Index kAroundPoints = 2000;     // at most, to look around on: each try costs as much as a start
+// How many optima are kept.
+constexpr std::size_t kCarried = 5;  // from the first searches: each is carried at full cost
+constexpr std::size_t kRivals = 3;   // of one output before the last stage
+// In natural logarithms.
+constexpr double kLeastLogRatio = -14.0;   // of η: with less noise a start is badly conditioned
+constexpr double kUnexplainedNoise = 1.4;  // four times the instrument's noise: something is left to explain
+constexpr double kLessNoise = 1.4;      // of the variance: half the noise, as finer length scales may explain the rest
+constexpr double kFineLogRatio = -4.0;  // of η: noise a seventh of the signal
+constexpr double kBeyondBox = 1.0;      // length scales finer or longer than those of any start
+constexpr double kWeak = 0.5;           // below the box: longer length scales have no strong influence
+constexpr double kWideSpread = 10.0;    // of the prior on kernel parameters, which on all points must not matter
+// Others.
+constexpr double kGain = 0.5;              // nat: an optimum worth moving to
+constexpr double kWorseLeaveOneOut = 1.1;  // over the least error: a likelier optimum that predicts worse won by luck
+constexpr double kRefined = 0.4;           // of the progress of one output: before looking around
 
 GpData subset(const GpData& data, const std::vector<Index>& order, Index count, Index first_output, Index outputs) {
   GpData part{MatrixXd(count, data.q.cols()), MatrixXd(count, outputs), VectorXd(count)};
@@ -46,7 +50,7 @@ GpData subset(const GpData& data, const std::vector<Index>& order, Index count, 
   return part;
 }
 
-// One search in progress: the data in its seeded order, the priors, and what has been counted.
+// One search in progress.
 class Search {
  public:
   Search(std::shared_ptr<const Kernel> kernel, const GpData& data, double metrology_stddev,
@@ -75,8 +79,8 @@ class Search {
   }
 
  private:
-  // Few points cannot tell a joint's fine influence from noise, so the search on few finds it in no start. Where more
-  // noise is left than metrology knows of, more points are asked once whether shorter length scales explain it.
+  // On few points the fine influence of a joint looks like noise, and no start finds it. Where more noise is left than
+  // the instrument has, one search on more points tries shorter length scales.
   void look_finer(ProfiledLikelihood* likelihood, std::vector<Optimum>* rivals) {
     const Optimum& best = rivals->front();
     const double unexplained = unexplained_noise(best);
@@ -92,16 +96,17 @@ class Search {
     if (finer.defined) rivals->push_back(std::move(finer));
   }
 
-  // In logs, above metrology's.
+  // In logs, above the instrument's.
   double unexplained_noise(const Optimum& optimum) const { return log_noise(optimum) - std::log(prior_.noise_stddev); }
 
-  // Functions finer than the spacing of the points that the search was on show on all points only, and joints whose
-  // influence is too weak for these hide each other. Where that much noise is left: all joints fine at once; then,
-  // until none gains, all weak joints idle at once, and each idle joint awake and fine.
+  // A function that is finer than the spacing of few points shows on many points only, and joints of weak influence
+  // hide each other. Where much noise is left, this tries all joints fine at once. Then, until nothing gains, it tries
+  // all weak joints without influence at once, and each joint without influence with a fine one.
   Optimum looked_around(Index d, const Optimum& from, double share_before, double share_after) {
     ProfiledLikelihood many = likelihood(std::min(all(), kAroundPoints), d, 1);
     Optimum best = counted(searched(&many, from.x, {.max_evaluations = 1}), many);
-    double left = share_after - share_before;  // nobody knows how many tries: each takes a tenth of it
+    double left =
+        share_after - share_before;  // how many tries there will be is unknown: each takes a tenth of the rest
     const auto worthwhile = [&] { return !result_.given_up && unexplained_noise(best) >= kUnexplainedNoise; };
     const auto gains = [&](const VectorXd& kernel, double log_ratio) {
       VectorXd start(kernel.size() + 1);
@@ -129,12 +134,12 @@ class Search {
         gained = gains(awake, best.x[count] - kLessNoise) || gained;
       }
     }
-    best.x.head(count) = best.x.head(count).cwiseMin(idle);  // farther out nothing changes, and there is no slope back
+    best.x.head(count) = best.x.head(count).cwiseMin(idle);  // farther out the likelihood is flat
     const Optimum end = polished(d, best.x);
     return end.defined && end.value < from.value ? end : from;
   }
 
-  // On all points, from where the optimum must be near.
+  // On all points, from a start near the optimum.
   Optimum polished(Index d, const VectorXd& start) {
     ProfiledLikelihood middle = likelihood(std::min(all(), kCurvaturePoints), d, 1);
     ProfiledLikelihood whole = likelihood(all(), d, 1);
@@ -156,9 +161,9 @@ class Search {
     return std::min(all(), std::clamp(share, kStartPoints, kCarryPoints));
   }
 
-  Index all() const { return std::min(data_.q.rows(), kMostPoints); }
+  Index all() const { return std::min(data_.q.rows(), kMostSearched); }
 
-  // On few points the prior must lead; on all it must not cost the likelihood 0.1 nat.
+  // On few points the prior leads. On all points it must not cost the likelihood 0.1 nat.
   ProfiledLikelihood likelihood(Index count, Index first_output, Index outputs) const {
     GpPrior prior = prior_;
     if (count == all()) prior.parameter_spread = kWideSpread;
@@ -190,7 +195,7 @@ class Search {
     return different(std::move(found), kCarried);
   }
 
-  // By likelihood; one that predicts left-out points clearly worse than another has won by luck and is passed over.
+  // By likelihood, without those that predict left-out points clearly worse than another.
   std::vector<Optimum> carried(std::vector<Optimum> candidates) {
     ProfiledLikelihood medium = likelihood(std::min(all(), kCarryPoints), 0, data_.y.cols());
     std::vector<double> leave_one_out;
@@ -212,7 +217,7 @@ class Search {
     return different(std::move(honest), kCarried);
   }
 
-  // From where the last fit ended. What it was is kept where it is no longer defined.
+  // From where the last fit ended; kept as it was where the likelihood is not defined there.
   void refit(Index d) {
     const GpHyperparameters& last = options_.last[static_cast<std::size_t>(d)];
     VectorXd start(last.kernel.size() + 1);
@@ -235,7 +240,6 @@ class Search {
     bool curvature;      // differenced at the end, for the next stage
   };
 
-  // What is cheap is done well, so that a few evaluations on all points are enough.
   std::vector<Stage> stages() const {
     const Index share = static_cast<Index>(kCarryShare * static_cast<double>(all()));
     const Index middle = std::clamp(share, kCarryPoints, kCurvaturePoints);
@@ -244,16 +248,16 @@ class Search {
                                   kCarried,
                                   false}};
     if (all() > kCarryPoints) {
-      const std::size_t rivals = all() < kMostPoints ? kRivals : 1;
+      const std::size_t rivals = all() < kMostSearched ? kRivals : 1;
       stages.push_back({std::min(all(), middle), {.max_evaluations = 15, .tolerance = 0.02}, rivals, true});
     }
     if (all() > middle)
-      stages.push_back({all(), {.max_evaluations = all() < kMostPoints ? 12 : 4, .tolerance = 0.02}, 1, false});
+      stages.push_back({all(), {.max_evaluations = all() < kMostSearched ? 12 : 4, .tolerance = 0.02}, 1, false});
     return stages;
   }
 
-  // Output d alone, from the shared optima, over growing subsets. The last nats decide between optima, so all that may
-  // still win are carried on.
+  // Output d alone, from the shared optima, over growing subsets. All optima that may still win are carried on, since
+  // the last nats decide between them.
   void refine(Index d, const std::vector<Optimum>& shared) {
     const auto outputs = static_cast<double>(data_.y.cols());
     std::vector<Optimum> rivals = shared;

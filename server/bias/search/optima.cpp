@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/bias/search/starts.h"
+
 namespace trammel {
 namespace {
 
@@ -11,13 +13,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSamePlace = 0.1;  // in logs, every parameter
-constexpr double kHopeless = 30.0;  // nat, between optima of one kind
-constexpr double kOtherKind = 0.7;  // in logs of the noise
-constexpr double kDifference = 0.02;
+constexpr double kSameParameters = 0.1;  // in logs, of every parameter: ends so near to each other are one optimum
+constexpr double kHopeless = 30.0;       // nat behind the best on the same points: more points will not make up for it
+constexpr double kOtherKind = 0.7;       // in logs of the noise: half or twice as much
+constexpr double kDifference = 0.02;     // in logs: a step over which a curvature stays the same
 
 bool same(const Optimum& a, const Optimum& b) {
-  return std::abs(a.value - b.value) < kSameOptimum || (a.x - b.x).cwiseAbs().maxCoeff() < kSamePlace;
+  return std::abs(a.value - b.value) < kSameOptimum || (a.x - b.x).cwiseAbs().maxCoeff() < kSameParameters;
 }
 
 }  // namespace

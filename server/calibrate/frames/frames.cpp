@@ -20,55 +20,89 @@ std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, con
   return sources;
 }
 
+namespace {
+
+/// What was measured of one tool, and where the nominal flange was.
+struct ToolPoses {
+  std::vector<Vector3> points_W;
+  std::vector<Pose> X_BF;
+  std::vector<Pose> oriented_X_WT, oriented_X_BF;  ///< of the poses that have an orientation
+
+  [[nodiscard]] Eigen::Matrix3Xd p_W() const {
+    return Eigen::Map<const Eigen::Matrix3Xd>(points_W.front().data(), 3, static_cast<Eigen::Index>(points_W.size()));
+  }
+  /// Whether orientations are used: three at least, and of half the poses.
+  [[nodiscard]] bool full() const { return oriented_X_WT.size() >= 3 && 2 * oriented_X_WT.size() >= points_W.size(); }
+};
+
+ToolPoses poses_of(const std::string& tool, const MeasurementBatch& batch, const Chain& robot) {
+  ToolPoses poses;
+  for (const Measurement& m : batch.measurements) {
+    if (m.context.tool != tool) continue;
+    poses.X_BF.push_back(robot.flange_pose(m.context.q));
+    poses.points_W.push_back(m.p_W);
+    if (!m.R_WT) continue;
+    poses.oriented_X_BF.push_back(poses.X_BF.back());
+    poses.oriented_X_WT.push_back(make_pose(*m.R_WT, m.p_W));
+  }
+  return poses;
+}
+
+std::vector<Pose> in_world(const Pose& X_WB, const std::vector<Pose>& X_BF) {
+  std::vector<Pose> X_WF;
+  for (const Pose& X : X_BF) X_WF.push_back(X_WB * X);
+  return X_WF;
+}
+
+/// The base from a tool that is known.
+Status locate_base(const ToolPoses& poses, const Pose& X_FT, PhysicalModel& model) {
+  Eigen::Matrix3Xd p_B(3, static_cast<Eigen::Index>(poses.X_BF.size()));
+  for (std::size_t i = 0; i < poses.X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = poses.X_BF[i] * X_FT.translation();
+  const Result<Pose> X_WB = fit_transform(poses.p_W(), p_B);
+  if (!X_WB) return tl::make_unexpected(X_WB.error());
+  model.X_WB = *X_WB;
+  return {};
+}
+
+/// The tool from a base that is known.
+Status locate_tool_at(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
+  if (poses.full()) {
+    const Result<Pose> found = locate_tool(poses.oriented_X_WT, in_world(model.X_WB, poses.oriented_X_BF));
+    if (!found) return tl::make_unexpected(found.error());
+    X_FT = *found;
+    return {};
+  }
+  const Result<Vector3> point = locate_tool_point(poses.p_W(), in_world(model.X_WB, poses.X_BF));
+  if (!point) return tl::make_unexpected(point.error());
+  X_FT = make_pose(Matrix3::Identity(), *point);
+  return {};
+}
+
+/// Both at once. Where the orientations turn about too few axes, the positions still tell the base.
+Result<BaseAndTool> locate_both(const ToolPoses& poses) {
+  Result<BaseAndTool> found = poses.full() ? locate_base_and_tool(poses.oriented_X_WT, poses.oriented_X_BF)
+                                           : locate_base_and_tool_point(poses.p_W(), poses.X_BF);
+  if (found || !poses.full()) return found;
+  found = locate_base_and_tool_point(poses.p_W(), poses.X_BF);
+  if (found)
+    found->X_FT.linear() = locate_tool(poses.oriented_X_WT, in_world(found->X_WB, poses.oriented_X_BF))->linear();
+  return found;
+}
+
+}  // namespace
+
 Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch) {
   const Cell& cell = *model.cell;
   bool base_known = cell.X_WB.has_value();
   for (const auto& [tool, known] : cell.tools) {
-    std::vector<Pose> X_WT;
-    std::vector<Pose> X_BF;
-    std::vector<Pose> X_BF_full;
-    std::vector<Vector3> points;
-    for (const Measurement& m : batch.measurements) {
-      if (m.context.tool != tool) continue;
-      X_BF.push_back(cell.robot.flange_pose(m.context.q));
-      points.push_back(m.p_W);
-      if (m.R_WT) {
-        X_BF_full.push_back(X_BF.back());
-        X_WT.push_back(make_pose(*m.R_WT, m.p_W));
-      }
-    }
-    if (points.empty() || (known && base_known)) continue;
-    const Eigen::Matrix3Xd p_W =
-        Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3, static_cast<Eigen::Index>(points.size()));
-    const bool full = X_WT.size() >= 3 && 2 * X_WT.size() >= points.size();
-    if (known) {  // base from this tool
-      Eigen::Matrix3Xd p_B(3, p_W.cols());
-      for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * known->translation();
-      const Result<Pose> X_WB = fit_transform(p_W, p_B);
-      if (!X_WB) return tl::make_unexpected(X_WB.error());
-      model.X_WB = *X_WB;
-    } else if (base_known) {  // tool from this base
-      std::vector<Pose> X_WF;
-      for (const Pose& X : full ? X_BF_full : X_BF) X_WF.push_back(model.X_WB * X);
-      if (full) {
-        const Result<Pose> X_FT = locate_tool(X_WT, X_WF);
-        if (!X_FT) return tl::make_unexpected(X_FT.error());
-        model.tools[tool] = *X_FT;
-      } else {
-        const Result<Vector3> point = locate_tool_point(p_W, X_WF);
-        if (!point) return tl::make_unexpected(point.error());
-        model.tools[tool] = make_pose(Matrix3::Identity(), *point);
-      }
+    const ToolPoses poses = poses_of(tool, batch, cell.robot);
+    if (poses.points_W.empty() || (known && base_known)) continue;
+    if (known) {
+      if (const Status located = locate_base(poses, *known, model); !located) return located;
+    } else if (base_known) {
+      if (const Status located = locate_tool_at(poses, model.tools[tool], model); !located) return located;
     } else {
-      Result<BaseAndTool> found = full ? locate_base_and_tool(X_WT, X_BF_full) : locate_base_and_tool_point(p_W, X_BF);
-      if (full && !found) {  // too few axes of rotation for the orientations alone; the positions still tell the base
-        found = locate_base_and_tool_point(p_W, X_BF);
-        if (found) {
-          std::vector<Pose> X_WF;
-          for (const Pose& X : X_BF_full) X_WF.push_back(found->X_WB * X);
-          found->X_FT.linear() = locate_tool(X_WT, X_WF)->linear();
-        }
-      }
+      const Result<BaseAndTool> found = locate_both(poses);
       if (!found) return tl::make_unexpected(found.error());
       model.X_WB = found->X_WB;
       model.tools[tool] = found->X_FT;

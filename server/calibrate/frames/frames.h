@@ -4,23 +4,23 @@
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
-/// Where base and tool stand, in closed form, before anything is refined.
+/// Where base and tools are: closed forms, before anything is refined.
 namespace trammel {
 
 [[nodiscard]] bool has_unknown_tool(const Cell& cell);
-/// `sources`, and the tool besides the geometry where nobody knows the tool.
+/// `sources`, with `tool` added where they have `geometry` and a tool of the cell is unknown.
 [[nodiscard]] std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell);
 
-/// Where the cell says unknown: base and tools from the nominal chain and `batch`, written into the model. Refuses a
-/// batch that does not determine them.
+/// Finds base and tools that the cell calls unknown, from the nominal chain and `batch`, and writes them into the
+/// model. Refuses a batch that does not determine them.
 [[nodiscard]] Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch);
 
-/// The six values of a frame's source that move it by `X`: x y z, then the angles about z, y, x (a turn about y by
-/// less than 90 degrees).
+/// The six values with which the source of a frame moves it by `X`: x y z, then angles about z, y, x, that about y
+/// below 90 degrees.
 [[nodiscard]] Vector6 motion_values(const Pose& X);
 
-/// A known base to be corrected starts, and has its prior, where SVD localisation of the nominal chain puts it, eqs.
-/// (3.8)-(3.10): the values of the model's `base` source. Too few points to localise leave it at nominal.
+/// Puts the model's `base` source where localisation of the nominal chain by singular values has it, eqs. (3.8)-(3.10):
+/// identification starts there, and the priors are centred there. With too few points the base stays nominal.
 void localise_base(PhysicalModel& model, const MeasurementBatch& batch);
 
 }  // namespace trammel

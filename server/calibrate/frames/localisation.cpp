@@ -9,9 +9,9 @@ namespace trammel {
 
 namespace {
 
-// rad^2: turning by less than 10 mrad is not told from the errors of the nominal chain.
-constexpr double kLeastTurning = 1e-4;
-constexpr int kMaxAlternations = 10000;
+constexpr double kLeastTurning = 1e-4;    // rad²: the nominal chain is itself some 10 mrad off
+constexpr int kMostAlternations = 10000;  // nearly flat valleys take thousands; each costs microseconds
+constexpr double kLastStep = 1e-9;        // m
 
 /// The point t with R_i t ~ difference_i for all poses: the mean of R_iᵀ difference_i.
 Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
@@ -20,12 +20,9 @@ Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
   return sum / static_cast<double>(X_WF.size());
 }
 
-}  // namespace
-
-Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
-  TRAMMEL_CHECK(X_WT.size() == X_BF.size());
-  if (X_WT.size() < 3) return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size());
-  // R_WT R_FTᵀ = R_WB R_BF, so vec(R_WB) and vec(R_FTᵀ) are the singular pair of K = sum kron(R_BF, R_WT), value N.
+/// The rotations of base and tool; translations zero. R_WT R_FTᵀ = R_WB R_BF, so vec(R_WB) and vec(R_FTᵀ) are the
+/// singular pair of K = Σ kron(R_BF, R_WT) with the largest singular value.
+Result<BaseAndTool> locate_rotations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
   Eigen::Matrix<double, 9, 9> K = Eigen::Matrix<double, 9, 9>::Zero();
   for (std::size_t i = 0; i < X_WT.size(); ++i) {
     const Matrix3 F = X_BF[i].linear();
@@ -50,7 +47,11 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
   BaseAndTool found;
   found.X_WB.linear() = nearest_rotation(B);
   found.X_FT.linear() = nearest_rotation(A).transpose();
-  // p_WT = p_WB + R_WB (p_BF + R_BF p_FT): linear in the two translations.
+  return found;
+}
+
+/// Both translations, the rotations known. p_WT = p_WB + R_WB (p_BF + R_BF p_FT) is linear in them.
+Status add_translations(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF, BaseAndTool& found) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 right = Vector6::Zero();
   for (std::size_t i = 0; i < X_WT.size(); ++i) {
@@ -66,46 +67,73 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
   const Vector6 solution = normal.ldlt().solve(right);
   found.X_WB.translation() = solution.head<3>();
   found.X_FT.translation() = solution.tail<3>();
+  return {};
+}
+
+}  // namespace
+
+Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const std::vector<Pose>& X_BF) {
+  TRAMMEL_CHECK(X_WT.size() == X_BF.size());
+  if (X_WT.size() < 3)
+    return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size()).beyond(X_WT.size(), 3);
+  Result<BaseAndTool> found = locate_rotations(X_WT, X_BF);
+  if (!found) return found;
+  if (const Status added = add_translations(X_WT, X_BF, *found); !added) return tl::make_unexpected(added.error());
   return found;
 }
 
-Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF) {
-  TRAMMEL_CHECK(p_W.cols() == static_cast<int>(X_BF.size()));
-  if (X_BF.size() < 6) return refused("base and tool: {} positions, at least 6 are needed", X_BF.size());
+namespace {
+
+Matrix3 mean_rotation(const std::vector<Pose>& X_BF) {
   Matrix3 mean_R = Matrix3::Zero();
   for (const Pose& X : X_BF) mean_R += X.linear();
-  mean_R /= static_cast<double>(X_BF.size());
+  return mean_R / static_cast<double>(X_BF.size());
+}
+
+/// The tool point and the base's translation, given the base's rotation in `found`. Where the flange turns about one
+/// axis only, a shift along it is left open: it stays at its smallest. Returns the step of the tool point, m.
+double solve_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF, const Matrix3& mean_R,
+                   BaseAndTool& found) {
+  const Matrix3 R_WB = found.X_WB.linear();
+  Matrix3 normal = Matrix3::Zero();
+  Vector3 right = Vector3::Zero();
+  Vector3 shift = Vector3::Zero();
+  for (std::size_t i = 0; i < X_BF.size(); ++i) {
+    const Matrix3 turned = R_WB * (X_BF[i].linear() - mean_R);
+    normal += turned.transpose() * turned;
+    right += turned.transpose() * (p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation());
+    shift += p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation();
+  }
+  Eigen::CompleteOrthogonalDecomposition<Matrix3> decomposition;
+  decomposition.setThreshold(kLeastTurning);
+  decomposition.compute(normal);
+  const Vector3 point = decomposition.solve(right);
+  const double step = (point - found.X_FT.translation()).norm();
+  found.X_WB.translation() = shift / static_cast<double>(X_BF.size()) - R_WB * mean_R * point;
+  found.X_FT.translation() = point;
+  return step;
+}
+
+}  // namespace
+
+Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_BF) {
+  TRAMMEL_CHECK(p_W.cols() == static_cast<int>(X_BF.size()));
+  if (X_BF.size() < 6)
+    return refused("base and tool: {} positions, at least 6 are needed", X_BF.size()).beyond(X_BF.size(), 6);
+  const Matrix3 mean_R = mean_rotation(X_BF);
   const double turning = 1 - Eigen::JacobiSVD<Matrix3>(mean_R).singularValues()(1);
   if (!(turning > kLeastTurning))
     return refused("base and tool: the flange turns too little to tell the tool from the base");
   BaseAndTool found;
   Eigen::Matrix3Xd p_B(3, p_W.cols());
-  for (int round = 0; round < kMaxAlternations; ++round) {
+  for (int round = 0; round < kMostAlternations; ++round) {
     for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * found.X_FT.translation();
     const Result<Pose> X_WB = fit_transform(p_W, p_B);
     if (!X_WB) return tl::make_unexpected(X_WB.error());
     found.X_WB = *X_WB;
-    // The tool point, given the base's rotation and with its translation projected out. What the flange's turning
-    // leaves open (a shift along its only axis) stays at its smallest.
-    const Matrix3 R_WB = found.X_WB.linear();
-    Matrix3 normal = Matrix3::Zero();
-    Vector3 right = Vector3::Zero();
-    Vector3 shift = Vector3::Zero();
-    for (std::size_t i = 0; i < X_BF.size(); ++i) {
-      const Matrix3 turned = R_WB * (X_BF[i].linear() - mean_R);
-      normal += turned.transpose() * turned;
-      right += turned.transpose() * (p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation());
-      shift += p_W.col(static_cast<int>(i)) - R_WB * X_BF[i].translation();
-    }
-    Eigen::CompleteOrthogonalDecomposition<Matrix3> decomposition;
-    decomposition.setThreshold(kLeastTurning);
-    decomposition.compute(normal);
-    const Vector3 point = decomposition.solve(right);
-    const double step = (point - found.X_FT.translation()).norm();
-    found.X_WB.translation() = shift / static_cast<double>(X_BF.size()) - R_WB * mean_R * point;
-    found.X_FT.translation() = point;
+    const double step = solve_point(p_W, X_BF, mean_R, found);
     if (!std::isfinite(step)) return refused("base and tool: the positions do not determine the tool point");
-    if (step < 1e-9) break;
+    if (step < kLastStep) break;
   }
   return found;
 }

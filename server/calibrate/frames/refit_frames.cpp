@@ -10,7 +10,7 @@ namespace trammel {
 
 namespace {
 
-/// Where the flange really was, and what was measured of one tool on it.
+/// Where the flange was by the arm of before, and what was measured of one tool.
 struct ToolPoses {
   std::vector<Pose> X_BF, oriented_X_BF, oriented_X_WT;
   std::vector<Vector3> points;
@@ -37,7 +37,7 @@ std::map<std::string, ToolPoses> poses_by_tool(const PhysicalModel& before, cons
   return tools;
 }
 
-/// The base under tools that are known: of positions or, where they do not span a plane, of orientations.
+/// The base from tools that are known: by positions or, where they do not span a plane, by orientations.
 Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
   std::vector<Vector3> measured, expected;
   Matrix3 turn = Matrix3::Zero();
@@ -58,7 +58,7 @@ Result<Pose> base_under(const std::vector<const ToolPoses*>& tools) {
   return make_pose(R_WB, p_W.rowwise().mean() - R_WB * p_B.rowwise().mean());
 }
 
-/// Base and tool at once, from the poses of one tool that nobody knows.
+/// Base and tool at once, from the poses of one unknown tool.
 Result<BaseAndTool> base_and_tool(const ToolPoses& tool) {
   Result<BaseAndTool> found = tool.full() ? locate_base_and_tool(tool.oriented_X_WT, tool.oriented_X_BF)
                                           : locate_base_and_tool_point(tool.p_W(), tool.X_BF);
@@ -72,7 +72,7 @@ Result<BaseAndTool> base_and_tool(const ToolPoses& tool) {
   return found;
 }
 
-/// The tool on a base that is known; how it is turned, where no orientation says it, as it was.
+/// The tool from a base that is known; without orientations its rotation stays as it was.
 Result<Pose> tool_on(const Pose& X_WB, const ToolPoses& tool) {
   std::vector<Pose> X_WF;
   for (const Pose& X : tool.full() ? tool.oriented_X_BF : tool.X_BF) X_WF.push_back(X_WB * X);
@@ -82,7 +82,7 @@ Result<Pose> tool_on(const Pose& X_WB, const ToolPoses& tool) {
   });
 }
 
-/// The model's base stands at `X_WB`: by its nominal frame where nobody knows that, else by its source.
+/// Puts the model's base at `X_WB`: by the nominal frame where the cell calls the base unknown, else by the source.
 void place_base(PhysicalModel& model, const Pose& X_WB) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {

@@ -1,36 +1,55 @@
 #include "server/calibrate/identify/check_needs.h"
 
 #include <algorithm>
+#include <functional>
+#include <string>
+#include <vector>
 
 namespace trammel {
 
-Status check_needs(const CalibrationProblem& problem) {
-  const auto any = [&](auto has) {
-    return std::any_of(problem.batch.measurements.begin(), problem.batch.measurements.end(),
-                       [&](const Measurement& m) { return has(m.context); });
+namespace {
+
+bool has_mass(const PoseContext& context, const Cell& cell) {
+  const auto payload = cell.payloads.find(context.payload);
+  return payload != cell.payloads.end() && payload->second.mass > 0;
+}
+
+/// What a source needs, whether a pose has it, and the column that would record it.
+struct Need {
+  bool needed;
+  std::function<bool(const PoseContext&)> has;
+  const char* what;
+  std::string column;
+};
+
+std::vector<Need> needs_of(const ErrorSource& source, const Cell& cell) {
+  const ContextNeeds needs = source.needs();
+  const int joint = source.joint();
+  const auto directed = [joint](const PoseContext& c) {
+    return !c.direction.empty() && c.direction[static_cast<std::size_t>(joint)] != 0;
   };
+  return {{needs.time, [](const PoseContext& c) { return c.time.has_value(); }, "a time", "time_s"},
+          {needs.temperature, [](const PoseContext& c) { return c.temperature.has_value(); }, "a temperature",
+           "temperature_c"},
+          {needs.direction, directed, "an approach direction", fmt::format("dir{}", joint + 1)},
+          {needs.velocity, [](const PoseContext& c) { return c.velocity.has_value(); }, "a continuous path with times",
+           "time_s"},
+          {needs.payload, [&cell](const PoseContext& c) { return has_mass(c, cell); }, "a payload with a mass", ""}};
+}
+
+}  // namespace
+
+Status check_needs(const CalibrationProblem& problem) {
+  const std::vector<Measurement>& poses = problem.batch.measurements;
   for (const ErrorSourcePtr& source : problem.model.sources) {
-    const ContextNeeds needs = source->needs();
-    const auto lacks = [&](const char* what) {
-      return refused("batch {}: error source {} needs {}, which no pose has", problem.batch.id, source->name(), what);
-    };
-    if (needs.time && !any([](const PoseContext& c) { return c.time.has_value(); })) return lacks("a time (time_s)");
-    if (needs.temperature && !any([](const PoseContext& c) { return c.temperature.has_value(); })) {
-      return lacks("a temperature (temperature_c)");
+    for (const Need& need : needs_of(*source, *problem.model.cell)) {
+      const auto has = [&](const Measurement& m) { return need.has(m.context); };
+      if (!need.needed || std::any_of(poses.begin(), poses.end(), has)) continue;
+      return refused("error source {} needs {}{}, which no pose has", source->name(), need.what,
+                     need.column.empty() ? "" : " (" + need.column + ")")
+          .of(need.column)
+          .in("batch " + problem.batch.id);
     }
-    const auto directed = [&](const PoseContext& c) {
-      return !c.direction.empty() && c.direction[static_cast<std::size_t>(source->joint())] != 0;
-    };
-    if (needs.direction && !any(directed))
-      return lacks(fmt::format("an approach direction (dir{})", source->joint() + 1).c_str());
-    if (needs.velocity && !any([](const PoseContext& c) { return c.velocity.has_value(); })) {
-      return lacks("a continuous path with times (time_s)");
-    }
-    const auto loaded = [&](const PoseContext& c) {
-      const auto payload = problem.model.cell->payloads.find(c.payload);
-      return payload != problem.model.cell->payloads.end() && payload->second.mass > 0;
-    };
-    if (needs.payload && !any(loaded)) return lacks("a payload with a mass");
   }
   return {};
 }

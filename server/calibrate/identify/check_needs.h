@@ -1,11 +1,11 @@
 #pragma once
 
-#include "server/calibrate/calibrate.h"
+#include "server/base/result.h"
+#include "server/calibrate/calibration.h"
 
 namespace trammel {
 
-/// Every source must find what it needs (times, temperatures, directions, velocities, a payload) in at least one pose;
-/// refuses where one does not.
+/// Refuses a source that needs what no pose has: a time, a temperature, an approach direction, a velocity, a payload.
 [[nodiscard]] Status check_needs(const CalibrationProblem& problem);
 
 }  // namespace trammel

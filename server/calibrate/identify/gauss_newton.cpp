@@ -10,12 +10,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSettledStep = 0.05;       // standard deviations; a smaller step is the last one
-constexpr double kFirstSettledStep = 1;     // the same while residuals only serve to find the discrepancy
-constexpr double kNoise = 1e-6;             // of the cost: a rise by less is no rise
-constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together
+constexpr double kSettledStep = 0.05;       // standard deviations: a smaller step changes nothing anybody sees
+constexpr double kFirstSettledStep = 1;     // the same as long as residuals only serve to find the discrepancy
+constexpr double kNoRise = 1e-6;            // of the cost, which has thousands of terms: rounding
+constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together: they stay in the cache
 
-/// Gauss-Newton step from where `at` was taken. Parameters that stand at their bound and would leave it are held.
+/// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it stay.
 Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
   Eigen::VectorXd downhill = -at.gradient;
   Eigen::MatrixXd curvature = at.information;
@@ -41,7 +41,7 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
   Eigen::VectorXd residuals(6 * kPosesAtATime);
   Eigen::Index filled = 0;
   const auto add_filled = [&] {
-    if (filled == 0) return;  // Eigen divides by the inner dimension of a large rank update
+    if (filled == 0) return;  // Eigen's rank update divides by the number of columns
     const auto J = jacobians.leftCols(filled);
     at.gradient.noalias() += J * residuals.head(filled);
     at.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
@@ -77,7 +77,7 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
   Minimum now{start.cwiseMax(lower), {}, {}, false, "too many steps"};
   for (int k = 0; k < std::max(1, options.max_iterations) && !now.converged; ++k) {
     Expansion at = expand(problem, s, weights, is_robust(options, weights), now.x);
-    if (!std::isfinite(at.cost) || (k > 0 && at.cost > now.costs.back() + kNoise)) return std::nullopt;
+    if (!std::isfinite(at.cost) || (k > 0 && at.cost > now.costs.back() + kNoRise)) return std::nullopt;
     now.costs.push_back(at.cost);
     const Eigen::VectorXd step = bounded_step(at, now.x, lower);
     const double in_standard_deviations = std::sqrt(step.dot(at.information * step) + step.squaredNorm());

@@ -16,8 +16,8 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-/// The null directions (columns, typical units) as few parameters at a time as they allow: Gaussian elimination with
-/// complete pivoting, so that each new direction has a parameter of its own.
+/// Combines the null directions (columns, typical units) so that each has few parameters: Gaussian elimination with
+/// complete pivoting, after which each direction has a parameter of its own.
 Eigen::MatrixXd disentangled(Eigen::MatrixXd directions) {
   for (Eigen::Index done = 0; done < directions.cols(); ++done) {
     Eigen::Index row = 0;
@@ -35,11 +35,11 @@ Eigen::MatrixXd disentangled(Eigen::MatrixXd directions) {
 /// `direction` in typical units; `strength` of each parameter alone, in prior units.
 UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd& direction,
                                    const std::vector<Parameter>& parameters, const Eigen::VectorXd& strength) {
-  constexpr double kMatters = 0.1;  // of the largest part
+  constexpr double kMatters = 0.1;  // of the largest part: smaller ones are not worth naming
   std::vector<std::size_t> order(parameters.size());
   std::iota(order.begin(), order.end(), 0u);
   const auto weight = [&](std::size_t i) { return std::abs(direction(static_cast<Eigen::Index>(i))); };
-  // Equal up to rounding keeps the order of the parameters, so that sentences do not depend on the last bit.
+  // Parts that are equal up to rounding stay in the order of the parameters: sentences must not depend on the last bit.
   const auto rank = [&](std::size_t i) { return std::lround(1e3 * weight(i)); };
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return rank(a) > rank(b); });
   UnidentifiableCombination combination;

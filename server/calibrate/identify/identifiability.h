@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// What the data say of the parameters, in units of their priors: right singular vectors and singular values of the
-/// whitened Jacobian, smallest first.
+/// What the data tell of the parameters: singular values and right singular vectors of the Jacobian in units of sigma
+/// and of the priors, smallest first.
 struct Information {
   Eigen::VectorXd singular_values;
   Eigen::MatrixXd directions;  ///< columns
@@ -18,12 +18,12 @@ struct Information {
 /// A direction in parameter space that the data do not show (singular value below 1 in prior units).
 struct UnidentifiableCombination {
   double singular_value = 0;
-  std::vector<std::string> parameters;  ///< those that matter in it, largest first
+  std::vector<std::string> parameters;  ///< those with a large part in it, largest first
   std::string sentence;                 ///< for people
 };
 
-/// Every direction that the data do not show, told apart into as few parameters each as possible, in words.
-/// `to_typical` turns prior units into units in which people compare parameters.
+/// All directions that the data do not show, each with as few parameters as possible, in words. `to_typical` converts
+/// prior units into units in which parameters of one kind can be compared.
 [[nodiscard]] std::vector<UnidentifiableCombination> unidentifiable_combinations(
     const Information& seen, const std::vector<Parameter>& parameters, const Eigen::VectorXd& to_typical);
 

@@ -44,7 +44,7 @@ class PriorCost final : public ceres::CostFunction {
   Eigen::VectorXd prior_;
 };
 
-/// From any start.
+/// By Levenberg-Marquardt, from any start.
 Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
                               const CalibrateOptions& calibrate_options, Eigen::VectorXd x) {
   const bool robust = is_robust(calibrate_options, weights);

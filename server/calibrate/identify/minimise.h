@@ -1,11 +1,12 @@
 #pragma once
 
+#include "server/base/result.h"
 #include "server/calibrate/identify/gauss_newton.h"
 
 namespace trammel {
 
-/// The most probable parameters under `weights`, from `start` (P, in units of the priors): by full Gauss-Newton steps
-/// where they lead downhill, else by guarded ones from any start. Refuses where the solver fails.
+/// The most probable parameters under `weights`, from `start` (P, in units of the priors). Takes full Gauss-Newton
+/// steps where they lead downhill, else the guarded steps of Ceres. Refuses where the solver fails.
 [[nodiscard]] Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParameters& s,
                                        const Weights& weights, const CalibrateOptions& options,
                                        const Eigen::VectorXd& start);

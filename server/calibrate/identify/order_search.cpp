@@ -9,7 +9,10 @@ namespace trammel {
 
 namespace {
 
-/// An order, and what a sine and a cosine of it explain of a joint's share of the residuals.
+constexpr double kDamping = 1e-9;  // of the trace
+constexpr int kRefinement = 100;   // of a step of the search: finer orders change no residual
+
+/// An order, and what a sine and a cosine of it explain of the residuals.
 struct FoundOrder {
   double order = 0;  // cycles a turn of the joint
   double gain = 0;   // weighted sum of squares explained
@@ -25,8 +28,8 @@ FoundOrder fit_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, con
   normal(0, 0) = (square.array() * sine * sine).sum();
   normal(0, 1) = normal(1, 0) = (square.array() * sine * cosine).sum();
   normal(1, 1) = (square.array() * cosine * cosine).sum();
-  // A hair of damping: near order 0, or with few poses, the two columns are alike.
-  normal += 1e-9 * normal.trace() * Eigen::Matrix2d::Identity();
+  // A little damping: near order 0, or with few poses, the two columns are alike.
+  normal += kDamping * normal.trace() * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d right((along.array() * sine).sum(), (along.array() * cosine).sum());
   const Eigen::Vector2d amplitude = normal.inverse() * right;
   return {order, amplitude.dot(right)};
@@ -41,7 +44,7 @@ FoundOrder search_order(const Eigen::VectorXd& q, const Eigen::VectorXd& along, 
     if (candidate.gain > best.gain) best = candidate;
   };
   for (double order = search.from; order <= search.to; order += search.step) consider(order);
-  for (double step = search.step / 4; step > search.step / 100; step /= 2) {
+  for (double step = search.step / 4; step > search.step / kRefinement; step /= 2) {
     const double centre = best.order;
     for (int k = -4; k <= 4; ++k) consider(centre + k * step);
   }
@@ -88,10 +91,10 @@ FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, con
     const Pose X_FT = model.tools.at(context.tool);
     const Vector3 column =
         model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(source.joint()).head<3>();
-    const double weight = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
+    const double inverse_variance = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
     q(i) = context.q(source.joint());
-    along(i) = weight * column.dot(r.position.col(i));
-    square(i) = weight * column.squaredNorm();
+    along(i) = inverse_variance * column.dot(r.position.col(i));
+    square(i) = inverse_variance * column.squaredNorm();
   }
   return search_order(q, along, square, *source.search());
 }

@@ -6,7 +6,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kUnknownWidening = 500;  // of the priors of an unknown base or tool: 1 m, 2.5 rad
+constexpr double kUnknownWidening =
+    500;  // times: 1 m and 2.5 rad, so that the prior of an unknown frame does not matter
 
 }  // namespace
 

@@ -6,14 +6,16 @@ namespace trammel {
 
 namespace {
 
-constexpr double kHuberPosition = 4.03;  // 3 normal axes
+// Norms that 1 in 1000 good poses exceeds: roots of quantiles of chi-squared.
+constexpr double kHuberPosition = 4.03;  // 3 axes
 constexpr double kHuberPose = 4.74;      // 6 axes
+constexpr double kSmallAngle = 1e-4;     // rad: below it the closed form loses digits, and its limit is exact enough
 
 Matrix3 right_jacobian_inverse(const Vector3& w) {
   const double angle = w.norm();
   const Matrix3 W = skew(w);
   const double c =
-      angle < 1e-4 ? 1.0 / 12 : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
+      angle < kSmallAngle ? 1.0 / 12 : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
   return Matrix3::Identity() + 0.5 * W + c * W * W;
 }
 
@@ -25,31 +27,31 @@ WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s
       scale_(s.scale),
       held_(s.held),
       measurement_(measurement),
-      weight_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
-      rotation_weight_(1 / std::hypot(model.cell->tracker.sigma_rotation, weights.discrepancy_rotation)) {}
+      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
+      inverse_rotation_sigma_(1 / std::hypot(model.cell->tracker.sigma_rotation, weights.discrepancy_rotation)) {}
 
 bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
   const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(x, scale_.size()).cwiseProduct(scale_);
   Eigen::MatrixXd J;
   const Pose X_WT = model_.pose_W(measurement_.context, values, jacobian != nullptr ? &J : nullptr);
   Eigen::Map<Eigen::VectorXd> r(residuals, size());
-  r.head<3>() = weight_ * (measurement_.p_W - X_WT.translation());
+  r.head<3>() = inverse_sigma_ * (measurement_.p_W - X_WT.translation());
   Vector3 turn = Vector3::Zero();
   if (measurement_.R_WT) {
     turn = rotation_log(*measurement_.R_WT * X_WT.linear().transpose());
-    r.tail<3>() = rotation_weight_ * turn;
+    r.tail<3>() = inverse_rotation_sigma_ * turn;
   }
   if (jacobian != nullptr) {
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(jacobian, size(),
                                                                                            scale_.size());
     // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
-    const Matrix3 by_turn = -rotation_weight_ * right_jacobian_inverse(turn);
+    const Matrix3 by_turn = -inverse_rotation_sigma_ * right_jacobian_inverse(turn);
     for (Eigen::Index k = 0; k < scale_.size(); ++k) {
       if (!held_.empty() && held_[static_cast<std::size_t>(k)]) {
         out.col(k).setZero();
         continue;
       }
-      out.col(k).head<3>() = -weight_ * scale_(k) * J.col(k).head<3>();
+      out.col(k).head<3>() = -inverse_sigma_ * scale_(k) * J.col(k).head<3>();
       if (measurement_.R_WT) out.col(k).tail<3>() = scale_(k) * (by_turn * J.col(k).tail<3>());
     }
   }

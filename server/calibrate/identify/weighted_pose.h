@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// One measurement's residual in units of its sigma, by parameters in units of their scale; those that are held move
-/// nothing. Refers to what it is made of.
+/// One measurement: its residual in units of sigma, as a function of the parameters in units of their scale. Held
+/// parameters have no derivative. Keeps references to its arguments.
 class WeightedPose {
  public:
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
@@ -18,7 +18,7 @@ class WeightedPose {
   [[nodiscard]] int size() const { return measurement_.R_WT ? 6 : 3; }
   /// At `x` (P): `residuals` (size()), and `jacobian` (size() x P by rows) unless it is null. False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;
-  /// Norm of the residuals that 1 in 1000 good poses exceeds.
+  /// The norm of the residuals that 1 in 1000 good poses exceeds.
   [[nodiscard]] double huber_limit() const;
 
  private:
@@ -26,8 +26,8 @@ class WeightedPose {
   const Eigen::VectorXd& scale_;
   const std::vector<bool>& held_;
   const Measurement& measurement_;
-  double weight_;
-  double rotation_weight_;
+  double inverse_sigma_;           // 1/m, of one axis, discrepancy included
+  double inverse_rotation_sigma_;  // 1/rad
 };
 
 }  // namespace trammel

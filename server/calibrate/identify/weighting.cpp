@@ -9,11 +9,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSuspect = 5.5;        // norm of 3 axes that 1 in 10^6 exceeds
-constexpr double kSettledSigma = 2e-3;  // share by which a weighting sigma may still change
+constexpr double kSuspect = 5.5;        // norm of 3 axes that 1 in 10^6 good poses exceeds
+constexpr double kSettledSigma = 2e-3;  // relative: a sigma that changes by less weighs the same
+constexpr int kBisections = 100;        // more than a double has bits
 
-/// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory variance); 0 when
-/// the residuals are no larger than their sigmas say.
+/// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory variance); 0 where
+/// the residuals are no larger than their sigmas.
 double surplus(const Eigen::Matrix3Xd& r, const Eigen::VectorXd& sigma, double freedom) {
   const auto chi2 = [&](double s) {
     double sum = 0;
@@ -23,7 +24,7 @@ double surplus(const Eigen::Matrix3Xd& r, const Eigen::VectorXd& sigma, double f
   if (r.cols() == 0 || freedom <= 0 || chi2(0) <= freedom) return 0;
   double low = 0;
   double high = std::sqrt(r.squaredNorm() / freedom) + 1e-15;
-  for (int k = 0; k < 100; ++k) {
+  for (int k = 0; k < kBisections; ++k) {
     const double middle = 0.5 * (low + high);
     (chi2(middle) > freedom ? low : high) = middle;
   }

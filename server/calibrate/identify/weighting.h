@@ -3,19 +3,19 @@
 #include <Eigen/Dense>
 #include <vector>
 
-#include "server/calibrate/calibrate.h"
+#include "server/calibrate/calibration.h"
 
-/// What a model leaves over, and with what sigma it is therefore weighed.
+/// What a model leaves over, and the sigmas that measurements are therefore weighed with.
 namespace trammel {
 
-/// Standard deviations that the model's own error adds to the measurement's.
+/// Standard deviations of the model's own error, added to the measurement's in quadrature.
 struct Weights {
   double discrepancy = 0;           ///< m per axis
   double discrepancy_rotation = 0;  ///< rad per axis
-  bool estimated = false;           ///< false: still at the measurement's sigma alone
+  bool estimated = false;           ///< false: not yet, the measurement's sigma counts alone
 };
 
-/// Of one axis of the measured position, m: its own, else the tracker's.
+/// Standard deviation of one axis of the measured position, m: the measurement's own, else the tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
 
 /// Measured - predicted in W, SI.
@@ -29,18 +29,18 @@ struct Residuals {
 [[nodiscard]] Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch,
                                      const Eigen::VectorXd& values);
 
-/// The discrepancies under which the residuals, after `freedom` parameters were fitted to them, are as large as they
-/// should be. `drop_suspects`: positions that are suspects under `before` do not count.
+/// The discrepancies under which the residuals are as large as expected after `freedom` parameters were fitted to them.
+/// `drop_suspects`: positions that are suspects under `before` do not count.
 [[nodiscard]] Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects,
                                         double sigma_rotation);
-/// Whether the sigmas that weigh a measurement of `tracker` are as good as the same under both.
+/// Whether measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
 /// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.
 [[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,
                                                    const Weights& weights);
 
-/// nat; a suspect counts as far off, not as proof against the model.
+/// Nat. A suspect counts as if it were just at the limit: one bad pose is no proof against a model.
 [[nodiscard]] double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation);
 
 }  // namespace trammel

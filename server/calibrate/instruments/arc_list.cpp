@@ -13,26 +13,85 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSameAngle = 1e-6;  // rad, of a joint that is held
-constexpr double kPointLimit = 1e5;  // m
+constexpr double kSameAngle = 1e-6;  // rad: a joint that is held reads the same to its last digit
+constexpr double kPointLimit = 1e5;  // m: no instrument measures farther
 
 /// Refuses a robot whose joints do not all draw arcs about axes that stand still.
 Status check_robot(const Chain& robot, const ArcList& arcs) {
   for (int j = 0; j < robot.size(); ++j) {
     if (robot.joint(j).type == JointType::kPrismatic) {
-      return refused("robot {} joint {} slides and draws no arc; measure the arm without it", robot.name(), j + 1);
+      return refused("robot {} joint {} slides and draws no arc", robot.name(), j + 1)
+          .of(fmt::format("joint {}", j + 1))
+          .next("measure the arm without it");
     }
     for (int before = 0; before < j; ++before) {
       if (robot.transmission()(before, j) == 0) continue;
-      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1);
+      return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1)
+          .of(fmt::format("joint {}", before + 1));
     }
   }
   for (const ArcPoint& point : arcs.points) {
     if (point.q.size() == robot.size() && point.joint >= 0 && point.joint < robot.size()) continue;
-    return refused("{} row {}: {} joints, robot {} has {}", arcs.where, point.row, point.q.size(), robot.name(),
-                   robot.size());
+    return refused("{} joints, robot {} has {}", point.q.size(), robot.name(), robot.size())
+        .in(arcs.where)
+        .at_row(point.row)
+        .beyond(point.q.size(), robot.size());
   }
   return {};
+}
+
+/// Where the numbers of an arc stand.
+struct ArcColumns {
+  std::size_t joint = 0, angle = 0;
+  std::array<std::size_t, 3> position{};
+  std::optional<std::size_t> reflector;
+  PoseColumns posture;  ///< of the joints that are held; without columns they are at zero
+};
+
+Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where, const Chain& robot) {
+  Result<PoseColumns> posture = PoseColumns::find(table);
+  if (!posture) return tl::make_unexpected(posture.error());
+  const std::size_t held = posture->joint_types().size();
+  if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
+    return refused("{} posture columns, robot {} has {} joints", held, robot.name(), robot.size())
+        .in(where)
+        .beyond(held, robot.size());
+  }
+  std::array<std::size_t, 5> found{};
+  for (std::size_t k = 0; const char* name : {"joint", "q_deg", "x_mm", "y_mm", "z_mm"}) {
+    const Result<std::size_t> column = table.require(name);
+    if (!column) return tl::make_unexpected(column.error());
+    found[k++] = *column;
+  }
+  return ArcColumns{.joint = found[0],
+                    .angle = found[1],
+                    .position = {found[2], found[3], found[4]},
+                    .reflector = table.find("reflector"),
+                    .posture = std::move(*posture)};
+}
+
+Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcColumns& columns, const Chain& robot) {
+  const Result<int> joint = table.integer(row, columns.joint, 1, robot.size());
+  if (!joint) return tl::make_unexpected(joint.error());
+  ArcPoint point;
+  point.joint = *joint - 1;
+  point.row = table.line(row);
+  point.q = JointVector::Zero(robot.size());
+  if (!columns.posture.joint_types().empty()) {
+    const Result<JointVector> q = columns.posture.joints(table, row);
+    if (!q) return tl::make_unexpected(q.error());
+    point.q = *q;
+  }
+  const Result<double> angle = table.number(row, columns.angle);
+  if (!angle) return tl::make_unexpected(angle.error());
+  point.q(point.joint) = from_deg(*angle);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Result<double> mm = table.number(row, columns.position[k], to_mm(kPointLimit));
+    if (!mm) return tl::make_unexpected(mm.error());
+    point.p_W(static_cast<Eigen::Index>(k)) = from_mm(*mm);
+  }
+  if (columns.reflector) point.reflector = table.field(row, *columns.reflector);
+  return point;
 }
 
 }  // namespace
@@ -40,42 +99,13 @@ Status check_robot(const Chain& robot, const ArcList& arcs) {
 Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot) {
   const Result<CsvTable> table = CsvTable::parse(text, where);
   if (!table) return tl::make_unexpected(table.error());
-  const Result<PoseColumns> posture = PoseColumns::find(*table);
-  if (!posture) return tl::make_unexpected(posture.error());
-  const std::size_t held = posture->joint_types().size();
-  if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
-    return refused("{}: {} posture columns, robot {} has {} joints", where, held, robot.name(), robot.size());
-  }
-  std::array<std::size_t, 5> columns{};
-  for (std::size_t k = 0; const char* name : {"joint", "q_deg", "x_mm", "y_mm", "z_mm"}) {
-    const Result<std::size_t> column = table->require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns[k++] = *column;
-  }
-  const std::optional<std::size_t> reflector = table->find("reflector");
+  const Result<ArcColumns> columns = find_columns(*table, where, robot);
+  if (!columns) return tl::make_unexpected(columns.error());
   ArcList arcs{where, {}};
   for (std::size_t row = 0; row < table->size(); ++row) {
-    const Result<int> joint = table->integer(row, columns[0], 1, robot.size());
-    if (!joint) return tl::make_unexpected(joint.error());
-    ArcPoint point;
-    point.joint = *joint - 1;
-    point.row = table->line(row);
-    point.q = JointVector::Zero(robot.size());
-    if (held != 0) {
-      const Result<JointVector> q = posture->joints(*table, row);
-      if (!q) return tl::make_unexpected(q.error());
-      point.q = *q;
-    }
-    const Result<double> angle = table->number(row, columns[1]);
-    if (!angle) return tl::make_unexpected(angle.error());
-    point.q(point.joint) = from_deg(*angle);
-    for (int k = 0; k < 3; ++k) {
-      const Result<double> mm = table->number(row, columns[static_cast<std::size_t>(2 + k)], to_mm(kPointLimit));
-      if (!mm) return tl::make_unexpected(mm.error());
-      point.p_W(k) = from_mm(*mm);
-    }
-    if (reflector) point.reflector = table->field(row, *reflector);
-    arcs.points.push_back(std::move(point));
+    Result<ArcPoint> point = read_point(*table, row, *columns, robot);
+    if (!point) return tl::make_unexpected(point.error());
+    arcs.points.push_back(std::move(*point));
   }
   return arcs;
 }
@@ -84,35 +114,60 @@ Result<ArcList> read_arcs_csv(const std::string& path, const Chain& robot) {
   return read_text_file(path).and_then([&](const std::string& text) { return parse_arcs_csv(text, path, robot); });
 }
 
+namespace {
+
+constexpr std::size_t kFewestOfArc = 3;        // points that a circle in space goes through
+constexpr std::size_t kFewestToTellSigma = 5;  // points that leave two equations over
+
+Status check_size(const std::vector<const ArcPoint*>& points, const ArcList& arcs, bool sigma_stated) {
+  const std::size_t least = sigma_stated ? kFewestOfArc : kFewestToTellSigma;
+  if (points.size() >= least) return {};
+  return refused("the arc of joint {} has {} points, at least {} are needed{}", points.front()->joint + 1,
+                 points.size(), least, sigma_stated ? "" : " where sigma is not stated")
+      .in(arcs.where)
+      .at_row(points.front()->row)
+      .of("joint")
+      .beyond(points.size(), least);
+}
+
+/// Refuses an arc during which a held joint moves. Joints before the turning one must be where they were for the
+/// joint's other arcs, too: another reflector may be read with the joints beyond it elsewhere.
+Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& group, const ArcList& arcs) {
+  const int turning = points.front()->joint;
+  for (const ArcPoint* point : points) {
+    for (int j = 0; j < static_cast<int>(point->q.size()); ++j) {
+      const double from = j < turning ? group.posture(j) : points.front()->q(j);
+      if (j == turning || std::abs(point->q(j) - from) < kSameAngle) continue;
+      return refused("joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", j + 1, to_deg(point->q(j)),
+                     to_deg(from), turning + 1)
+          .in(arcs.where)
+          .at_row(point->row)
+          .of(fmt::format("q{}_deg", j + 1))
+          .beyond(to_deg(point->q(j)), to_deg(from));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs, bool sigma_stated) {
   if (const Status fits = check_robot(robot, arcs); !fits) return tl::make_unexpected(fits.error());
   std::map<std::pair<int, std::string>, std::vector<const ArcPoint*>> by_arc;
   for (const ArcPoint& point : arcs.points) by_arc[{point.joint, point.reflector}].push_back(&point);
   std::vector<JointArcs> joints(static_cast<std::size_t>(robot.size()));
-  const std::size_t least = sigma_stated ? 3 : 5;
   for (const auto& [key, points] : by_arc) {
     JointArcs& group = joints[static_cast<std::size_t>(key.first)];
-    if (points.size() < least) {
-      return refused("{} row {}: the arc of joint {} has {} points, at least {} are needed{}", arcs.where,
-                     points.front()->row, key.first + 1, points.size(), least,
-                     sigma_stated ? "" : " where sigma is not stated");
-    }
+    if (const Status enough = check_size(points, arcs, sigma_stated); !enough)
+      return tl::make_unexpected(enough.error());
     if (group.arcs.empty()) group.posture = points.front()->q;
-    for (const ArcPoint* point : points) {
-      for (int j = 0; j < robot.size(); ++j) {
-        // Another reflector may be read with the joints beyond it elsewhere; within an arc nothing may move.
-        const double from = j < key.first ? group.posture(j) : points.front()->q(j);
-        if (j == key.first || std::abs(point->q(j) - from) < kSameAngle) continue;
-        return refused("{} row {}: joint {} is at {:.6g} deg, held at {:.6g} deg while joint {} turns", arcs.where,
-                       point->row, j + 1, to_deg(point->q(j)), to_deg(from), key.first + 1);
-      }
-    }
+    if (const Status held = check_held(points, group, arcs); !held) return tl::make_unexpected(held.error());
     group.arcs.push_back(points);
   }
   for (int j = 0; j < robot.size(); ++j) {
     JointArcs& group = joints[static_cast<std::size_t>(j)];
     group.joint = j;
-    if (group.arcs.empty()) return refused("{}: no arc of joint {}", arcs.where, j + 1);
+    if (group.arcs.empty()) return refused("no arc of joint {}", j + 1).in(arcs.where).of("joint").with_value(j + 1);
   }
   return joints;
 }

@@ -12,9 +12,13 @@ namespace trammel {
 
 namespace {
 
-constexpr double kLengthDeviation = 0.1;  // m, beyond it is another robot
-constexpr double kAngleDeviation = from_deg(10);
+// No robot deviates more from its nominal table: the arcs are of another robot, joint or posture.
+constexpr double kMostLengthDeviation = 0.1;  // m
+constexpr double kMostAngleDeviation = from_deg(10);
 
+constexpr double kLeastStep = 1e-9;  // rad, m: of a difference, above rounding
+
+/// A number of a link, and how files call it.
 struct NamedMember {
   int joint;
   double LinkGeometry::*member;
@@ -66,6 +70,23 @@ std::vector<AxisLine> lines_of(const Fits& fits) {
   return lines;
 }
 
+/// Deviations with axis `i` changed by `step` in one of its four small changes: two turns, two shifts.
+Result<Eigen::VectorXd> changed_deviations(const Chain& robot, const std::vector<JointArcs>& groups, const Fits& fits,
+                                           const std::vector<NamedMember>& members, std::size_t i, int change,
+                                           double step) {
+  const AxisFit& fit = fits.axes[i];
+  std::vector<AxisLine> lines = lines_of(fits);
+  const Vector3 move = across(fit.n).col(change % 2) * step;
+  if (change < 2) {
+    lines[i].n = (fit.n + move).normalized();
+  } else {
+    lines[i].c += move;
+  }
+  const Result<Links> links = links_of(robot, at_zero(robot, groups, lines));
+  if (!links) return tl::make_unexpected(links.error());
+  return deviations(robot, members, links->links);
+}
+
 /// Covariance of the deviations: first derivatives by central differences, a step of one standard deviation each way.
 Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointArcs>& groups, const Fits& fits,
                                    const std::vector<NamedMember>& members) {
@@ -74,24 +95,13 @@ Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointAr
   for (std::size_t i = 0; i < fits.axes.size(); ++i) {
     const AxisFit& fit = fits.axes[i];
     const Eigen::Matrix4d small = fit.normal_inverse.topLeftCorner<4, 4>() * (fits.variance[i] * fits.widening[i]);
-    const auto uv = across(fit.n);
     Eigen::MatrixXd J(size, 4);
     for (int k = 0; k < 4; ++k) {
-      const double step = std::max(std::sqrt(small(k, k)), 1e-9);
-      Eigen::VectorXd sides[2];
-      for (const int side : {0, 1}) {
-        std::vector<AxisLine> lines = lines_of(fits);
-        const Vector3 move = uv.col(k % 2) * (side == 0 ? -step : step);
-        if (k < 2) {
-          lines[i].n = (fit.n + move).normalized();
-        } else {
-          lines[i].c += move;
-        }
-        const Result<Links> links = links_of(robot, at_zero(robot, groups, lines));
-        if (!links) return tl::make_unexpected(links.error());
-        sides[side] = deviations(robot, members, links->links);
-      }
-      J.col(k) = (sides[1] - sides[0]) / (2 * step);
+      const double step = std::max(std::sqrt(small(k, k)), kLeastStep);
+      const Result<Eigen::VectorXd> below = changed_deviations(robot, groups, fits, members, i, k, -step);
+      const Result<Eigen::VectorXd> above = changed_deviations(robot, groups, fits, members, i, k, step);
+      if (!below || !above) return tl::make_unexpected((below ? above : below).error());
+      J.col(k) = (*above - *below) / (2 * step);
     }
     covariance += J * small * J.transpose();
   }
@@ -149,6 +159,88 @@ Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& li
   return Chain::make(robot.name(), std::move(joints), std::move(couplings));
 }
 
+/// Variance of one coordinate from the residuals, as far as it is above what was stated.
+void add_variance(const AxisFit& fit, double stated_sigma, Fits& fits) {
+  const double seen = fit.freedom > 0 ? fit.cost / fit.freedom : 0;
+  const double stated = stated_sigma * stated_sigma;
+  fits.variance.push_back(std::max(seen, stated));
+  // Student's t with f degrees of freedom has the variance f / (f - 2).
+  const bool estimated = seen > stated && fit.freedom > 2;
+  fits.widening.push_back(estimated ? fit.freedom / (fit.freedom - 2.0) : 1);
+}
+
+/// Fits the arcs of one joint, and adds axis and circles to `result`.
+Status add_joint(const JointArcs& group, const ArcList& arcs, double stated_sigma, Fits& fits,
+                 CirclePointResult& result) {
+  Result<AxisFit> fit = axis_fit(group, arcs.where);
+  if (!fit) return tl::make_unexpected(fit.error());
+  const Result<double> angle_rms = orient(*fit, group, arcs.where);
+  if (!angle_rms) return tl::make_unexpected(angle_rms.error());
+  add_variance(*fit, stated_sigma, fits);
+  const double variance = fits.variance.back() * fits.widening.back();
+  JointAxis axis;
+  axis.sigma = std::sqrt(fits.variance.back());
+  axis.freedom = fit->freedom;
+  axis.angle_rms = *angle_rms;
+  axis.direction_u = worst_u(variance * fit->normal_inverse.topLeftCorner<2, 2>());
+  result.axes.push_back(axis);
+  describe_circles(group, *fit, variance, result.circles);
+  fits.axes.push_back(std::move(*fit));
+  return {};
+}
+
+/// One number of the kinematic table; `variance` of its deviation.
+Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Chain& robot, double deviation,
+                                             double variance, const std::string& where) {
+  MeasuredParameter parameter;
+  parameter.name = fmt::format("{}{}", member.symbol, member.joint + 1);
+  parameter.length = member.length;
+  parameter.nominal = robot.joint(member.joint).link.*member.member;
+  parameter.note = why_not_measured(member, robot);
+  parameter.measured = parameter.note.empty();
+  if (!parameter.measured) return parameter;
+  parameter.deviation = deviation;
+  parameter.u = kExpanded * std::sqrt(std::max(0.0, variance));
+  const double limit = member.length ? kMostLengthDeviation : kMostAngleDeviation;
+  if (std::abs(deviation) < limit) return parameter;
+  const auto shown = [&](double si) { return member.length ? to_mm(si) : to_deg(si); };
+  return refused("{} is {:.3f} {} from that of robot {}, limit {:.0f}", parameter.name, shown(deviation),
+                 member.length ? "mm" : "deg", robot.name(), shown(limit))
+      .in(where)
+      .of(parameter.name)
+      .beyond(shown(deviation), shown(limit))
+      .next("another robot, joint or posture?");
+}
+
+/// The kinematic table from the axes, its uncertainty, and the robot that has it.
+Status add_links(const Chain& robot, const ArcList& arcs, const std::vector<JointArcs>& groups, const Fits& fits,
+                 CirclePointResult& result) {
+  const std::vector<AxisLine> lines = at_zero(robot, groups, lines_of(fits));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    result.axes[i].direction_W = lines[i].n;
+    result.axes[i].point_W = lines[i].c;
+  }
+  const Result<Links> links = links_of(robot, lines);
+  if (!links) return tl::make_unexpected(links.error());
+  const std::vector<NamedMember> members = members_of(robot);
+  const Eigen::VectorXd deviation = deviations(robot, members, links->links);
+  Result<Eigen::MatrixXd> covariance = propagated(robot, groups, fits, members);
+  if (!covariance) return tl::make_unexpected(covariance.error());
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    Result<MeasuredParameter> parameter =
+        measured_parameter(members[k], robot, deviation(at), (*covariance)(at, at), arcs.where);
+    if (!parameter) return tl::make_unexpected(parameter.error());
+    result.parameters.push_back(std::move(*parameter));
+  }
+  result.covariance = std::move(*covariance);
+  result.X_WB = links->X_WB;
+  Result<Chain> measured = with_links(robot, links->links);
+  if (!measured) return tl::make_unexpected(measured.error());
+  result.robot = std::move(*measured);
+  return {};
+}
+
 }  // namespace
 
 Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
@@ -158,63 +250,11 @@ Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcLis
   CirclePointResult result;
   Fits fits;
   for (const JointArcs& group : *groups) {
-    Result<AxisFit> fit = axis_fit(group, arcs.where);
-    if (!fit) return tl::make_unexpected(fit.error());
-    const Result<double> angle_rms = orient(*fit, group, arcs.where);
-    if (!angle_rms) return tl::make_unexpected(angle_rms.error());
-    const double seen = fit->freedom > 0 ? fit->cost / fit->freedom : 0;
-    const double stated = options.sigma.value_or(0) * options.sigma.value_or(0);
-    fits.variance.push_back(std::max(seen, stated));
-    // Student's t with f degrees of freedom has the variance f / (f - 2).
-    const bool estimated = seen > stated && fit->freedom > 2;
-    fits.widening.push_back(estimated ? fit->freedom / (fit->freedom - 2.0) : 1);
-    const double variance = fits.variance.back() * fits.widening.back();
-    JointAxis axis;
-    axis.sigma = std::sqrt(fits.variance.back());
-    axis.freedom = fit->freedom;
-    axis.angle_rms = *angle_rms;
-    axis.direction_u = worst_u(variance * fit->normal_inverse.topLeftCorner<2, 2>());
-    result.axes.push_back(axis);
-    describe_circles(group, *fit, variance, result.circles);
-    fits.axes.push_back(std::move(*fit));
+    if (const Status added = add_joint(group, arcs, options.sigma.value_or(0), fits, result); !added)
+      return tl::make_unexpected(added.error());
   }
-  const std::vector<AxisLine> lines = at_zero(robot, *groups, lines_of(fits));
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    result.axes[i].direction_W = lines[i].n;
-    result.axes[i].point_W = lines[i].c;
-  }
-  const Result<Links> links = links_of(robot, lines);
-  if (!links) return tl::make_unexpected(links.error());
-  const std::vector<NamedMember> members = members_of(robot);
-  const Eigen::VectorXd deviation = deviations(robot, members, links->links);
-  const Result<Eigen::MatrixXd> covariance = propagated(robot, *groups, fits, members);
-  if (!covariance) return tl::make_unexpected(covariance.error());
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const NamedMember& member = members[k];
-    const auto at = static_cast<Eigen::Index>(k);
-    MeasuredParameter parameter;
-    parameter.name = fmt::format("{}{}", member.symbol, member.joint + 1);
-    parameter.length = member.length;
-    parameter.nominal = robot.joint(member.joint).link.*member.member;
-    parameter.note = why_not_measured(member, robot);
-    parameter.measured = parameter.note.empty();
-    if (parameter.measured) {
-      parameter.deviation = deviation(at);
-      parameter.u = kExpanded * std::sqrt(std::max(0.0, (*covariance)(at, at)));
-      const double limit = member.length ? kLengthDeviation : kAngleDeviation;
-      if (!(std::abs(deviation(at)) < limit)) {
-        return refused("{}: {} is {:.3f} {} from that of robot {}, limit {:.0f}; another robot, joint or posture?",
-                       arcs.where, parameter.name, member.length ? to_mm(deviation(at)) : to_deg(deviation(at)),
-                       member.length ? "mm" : "deg", robot.name(), member.length ? to_mm(limit) : to_deg(limit));
-      }
-    }
-    result.parameters.push_back(std::move(parameter));
-  }
-  result.covariance = *covariance;
-  result.X_WB = links->X_WB;
-  Result<Chain> measured = with_links(robot, links->links);
-  if (!measured) return tl::make_unexpected(measured.error());
-  result.robot = std::move(*measured);
+  if (const Status added = add_links(robot, arcs, *groups, fits, result); !added)
+    return tl::make_unexpected(added.error());
   return result;
 }
 

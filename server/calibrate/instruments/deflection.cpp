@@ -6,78 +6,18 @@
 #include <set>
 
 #include "server/base/coverage.h"
-#include "server/base/text_file.h"
 #include "server/base/units.h"
-#include "server/measurement/files/csv_table.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kSignificant = 0.01;
-constexpr double kSameLoad = 1e-6;  // N
-
-}  // namespace
-
-Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  std::map<std::string, std::size_t> columns;
-  for (const char* name : {"element", "load_n", "x_mm", "dx_mm", "dz_mm", "theta_deg", "length_mm", "lever_mm"}) {
-    const Result<std::size_t> column = table->require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns[name] = *column;
-  }
-  const std::optional<std::size_t> sigma = table->find("sigma_mm");
-  const std::optional<std::size_t> set = table->find("set");
-  std::map<int, DeflectionElement> elements;
-  DeflectionData data{where, {}, {}};
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    std::map<std::string, double> value;
-    for (const auto& [name, column] : columns) {
-      const Result<double> number = table->number(row, column);
-      if (!number) return tl::make_unexpected(number.error());
-      value[name] = *number;
-    }
-    const Result<int> element = table->integer(row, columns["element"], 1, 100);
-    if (!element) return tl::make_unexpected(element.error());
-    const DeflectionElement stands{*element, from_deg(value["theta_deg"]), from_mm(value["length_mm"]),
-                                   from_mm(value["lever_mm"])};
-    if (!(stands.length > 0)) return table->refuse(row, "length_mm is {}, must be above 0", value["length_mm"]);
-    const DeflectionElement& first = elements.emplace(*element, stands).first->second;
-    if (first.theta != stands.theta || first.length != stands.length || first.lever != stands.lever) {
-      return table->refuse(row, "element {} stands or hangs otherwise than in its first row", *element);
-    }
-    DeflectionReading reading;
-    reading.element = *element;
-    reading.load = value["load_n"];
-    reading.x = from_mm(value["x_mm"]);
-    reading.moved = Eigen::Vector2d(from_mm(value["dx_mm"]), from_mm(value["dz_mm"]));
-    reading.row = table->line(row);
-    if (sigma && !table->field(row, *sigma).empty()) {
-      const Result<double> number = table->number(row, *sigma);
-      if (!number) return tl::make_unexpected(number.error());
-      if (!(*number > 0)) return table->refuse(row, "sigma_mm is {}, must be above 0", *number);
-      reading.sigma = from_mm(*number);
-    }
-    if (set && !table->field(row, *set).empty()) {
-      const std::string& name = table->field(row, *set);
-      if (name != "train" && name != "validation") {
-        return table->refuse(row, "set is '{}', expected train or validation", name);
-      }
-      reading.validation = name == "validation";
-    }
-    data.readings.push_back(reading);
-  }
-  for (const auto& [number, element] : elements) data.elements.push_back(element);
-  return data;
-}
-
-Result<DeflectionData> read_deflection_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_deflection_csv(text, path); });
-}
-
-namespace {
+constexpr double kSignificant = 0.01;        // p-value: a beam is claimed wrongly in one of a hundred cases
+constexpr double kSameLoad = 0.5e-3 + 1e-6;  // N: half the last of three decimals, and rounding
+constexpr double kSeen = 3;                  // standard deviations: a bend at the link's end that would have been seen
+constexpr double kLeastPivot = 1e-9;         // of the largest: parameters below it are not separated
+constexpr std::size_t kFewestLoads = 4;      // of which some can be held out, with the least and the largest to train
+constexpr std::size_t kHeldOut = 3;          // every third load is held out: Table 4.7 has the second and fifth of six
 
 /// Force and moments of a load on an element, Figure 4.8.
 struct Moments {
@@ -177,36 +117,51 @@ double sigma_of(const DeflectionReading& reading, const DeflectionOptions& optio
   return reading.sigma.value_or(options.sigma);
 }
 
+/// The weighted equations of all readings, A values = b.
+struct Equations {
+  Eigen::MatrixXd A;
+  Eigen::VectorXd b;
+};
+
+Equations equations_of(const DeflectionData& data, const std::vector<const DeflectionReading*>& readings,
+                       const DeflectionOptions& options, const Layout& layout) {
+  const auto rows = 2 * static_cast<Eigen::Index>(readings.size());
+  Equations equations{Eigen::MatrixXd(rows, layout.size), Eigen::VectorXd(rows)};
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const auto row = 2 * static_cast<Eigen::Index>(k);
+    const double inverse_sigma = 1 / sigma_of(*readings[k], options);
+    equations.A.middleRows<2>(row) = inverse_sigma * rows_of(*readings[k], data, layout, options.chained);
+    equations.b.segment<2>(row) = inverse_sigma * readings[k]->moved;
+  }
+  return equations;
+}
+
 Result<Solved> solve(const DeflectionData& data, const std::vector<const DeflectionReading*>& readings,
                      const DeflectionOptions& options, const std::set<int>& beams, const std::set<int>& load_biases) {
   Solved solved;
   solved.layout = layout_of(data, beams, load_biases);
   solved.equations = 2 * static_cast<int>(readings.size());
+  const int size = solved.layout.size;
   if (solved.freedom() < 1) {
-    return refused("{}: {} training readings, {} parameters need at least {}", data.where, readings.size(),
-                   solved.layout.size, solved.layout.size / 2 + 1);
+    return refused("{} training readings, {} parameters need at least {}", readings.size(), size, size / 2 + 1)
+        .in(data.where)
+        .beyond(readings.size(), size / 2 + 1);
   }
-  Eigen::MatrixXd A(solved.equations, solved.layout.size);
-  Eigen::VectorXd b(solved.equations);
-  for (std::size_t k = 0; k < readings.size(); ++k) {
-    const auto row = 2 * static_cast<Eigen::Index>(k);
-    const double weight = 1 / sigma_of(*readings[k], options);
-    A.middleRows<2>(row) = weight * rows_of(*readings[k], data, solved.layout, options.chained);
-    b.segment<2>(row) = weight * readings[k]->moved;
-  }
+  const auto [A, b] = equations_of(data, readings, options, solved.layout);
   const Eigen::VectorXd scale = A.colwise().norm().cwiseMax(1e-300);
+  const Eigen::MatrixXd scaled = A * scale.cwiseInverse().asDiagonal();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  qr.setThreshold(1e-9);
-  qr.compute(A * scale.cwiseInverse().asDiagonal());
-  if (qr.rank() < solved.layout.size) {
-    return refused("{}: the readings separate {} of {} parameters; more loads or reflectors at other distances would",
-                   data.where, qr.rank(), solved.layout.size);
+  qr.setThreshold(kLeastPivot);
+  qr.compute(scaled);
+  if (qr.rank() < size) {
+    return refused("the readings separate {} of {} parameters", qr.rank(), size)
+        .in(data.where)
+        .beyond(qr.rank(), size)
+        .next("more loads or reflectors at other distances would");
   }
   solved.values = qr.solve(b).cwiseQuotient(scale);
   solved.cost = (A * solved.values - b).squaredNorm();
-  const Eigen::MatrixXd scaled = A * scale.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd inverse =
-      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(solved.layout.size, solved.layout.size));
+  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
   solved.unscaled = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
   return solved;
 }
@@ -234,7 +189,8 @@ struct Split {
   std::vector<double> training_loads, validation_loads;
 };
 
-Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& options) {
+/// The loads that are held out for validation; nothing where the file says it of each reading.
+Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& data, const DeflectionOptions& options) {
   std::set<double> all;
   bool stated = false;
   for (const DeflectionReading& reading : data.readings) {
@@ -244,26 +200,34 @@ Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& opti
   const std::vector<double> loads(all.begin(), all.end());
   std::set<double> held_out;
   for (const double wanted : options.validation_loads) {
-    const auto found = std::find_if(loads.begin(), loads.end(),
-                                    [&](double load) { return std::abs(load - wanted) < 0.5e-3 + kSameLoad; });
-    if (found == loads.end()) return refused("{}: no readings under the validation load {} N", data.where, wanted);
+    const auto found =
+        std::find_if(loads.begin(), loads.end(), [&](double load) { return std::abs(load - wanted) < kSameLoad; });
+    if (found == loads.end())
+      return refused("no readings under the validation load {} N", wanted).in(data.where).of("load").with_value(wanted);
     held_out.insert(*found);
   }
-  const bool by_load = !options.validation_loads.empty() || !stated;
-  if (options.validation_loads.empty() && !stated && loads.size() >= 4) {
-    for (std::size_t k = 1; k + 1 < loads.size(); k += 3)
-      held_out.insert(loads[k]);  // Table 4.7: second and fifth of six
-  }
+  if (!options.validation_loads.empty()) return held_out;
+  if (stated) return std::nullopt;
+  if (loads.size() < kFewestLoads) return held_out;
+  for (std::size_t k = 1; k + 1 < loads.size(); k += kHeldOut) held_out.insert(loads[k]);
+  return held_out;
+}
+
+Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& options) {
+  const Result<std::optional<std::set<double>>> by_load = held_out_loads(data, options);
+  if (!by_load) return tl::make_unexpected(by_load.error());
   Split split;
   std::set<double> training, validation;
   for (const DeflectionReading& reading : data.readings) {
-    const bool out = by_load ? held_out.contains(reading.load) : reading.validation.value_or(false);
+    const bool out = *by_load ? (*by_load)->contains(reading.load) : reading.validation.value_or(false);
     (out ? split.validation : split.train).push_back(&reading);
     (out ? validation : training).insert(reading.load);
   }
   if (training.size() < 2) {
-    return refused("{}: {} training loads, at least 2 are needed to tell a joint from an offset", data.where,
-                   training.size());
+    return refused("{} training loads, at least 2 are needed to tell a joint from an offset", training.size())
+        .in(data.where)
+        .of("load")
+        .beyond(training.size(), 2);
   }
   split.training_loads.assign(training.begin(), training.end());
   split.validation_loads.assign(validation.begin(), validation.end());
@@ -332,7 +296,7 @@ void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
     result.sentence =
         fmt::format("element {}: the link bends, {:.3f} mm at its end under {:.0f} N (U {:.3f} mm)", element.element,
                     to_mm(result.end_bending), largest_load, to_mm(result.end_bending_u));
-  } else if (unseen < 3 * sigma) {
+  } else if (unseen < kSeen * sigma) {
     result.verdict = LinkVerdict::kRigid;
     result.sentence = fmt::format("element {}: rigid link; more than {:.3f} mm at its end would have been seen",
                                   element.element, to_mm(unseen));
@@ -344,57 +308,88 @@ void judge_beam(const Solved& solved, std::size_t e, const DeflectionData& data,
   }
 }
 
+/// Elements whose reflectors stand at several distances, so that they may show a beam; checks those asked for a load
+/// bias.
+Result<std::set<int>> beams_of(const DeflectionData& data, const Split& split, const std::set<int>& load_biases) {
+  std::map<int, std::set<double>> distances;
+  for (const DeflectionReading* reading : split.train) distances[reading->element].insert(reading->x);
+  for (const int element : load_biases) {
+    if (!distances.contains(element))
+      return refused("no training readings of element {}", element).in(data.where).of("element").with_value(element);
+  }
+  std::set<int> beams;
+  for (const DeflectionElement& element : data.elements) {
+    if (distances[element.element].size() >= 2) beams.insert(element.element);
+  }
+  return beams;
+}
+
+/// Both models, fitted.
+struct BothModels {
+  const DeflectionData& data;
+  const DeflectionOptions& options;
+  const Split& split;
+  std::set<int> beams, load_biases;
+  Solved beam, rigid;
+
+  [[nodiscard]] double largest_load() const {
+    return std::max(split.training_loads.back(), split.validation_loads.empty() ? 0.0 : split.validation_loads.back());
+  }
+  /// The largest sigma of an element's readings, as large as the residuals say.
+  [[nodiscard]] double sigma_of_element(int element) const {
+    double sigma = 0;
+    for (const DeflectionReading* reading : split.train) {
+      if (reading->element == element) sigma = std::max(sigma, sigma_of(*reading, options));
+    }
+    return sigma * std::sqrt(std::max(1.0, beam.factor()));
+  }
+};
+
+/// Whether the foot of the element moves with the load, where nobody asked for a load bias.
+void judge_load_bias(const BothModels& models, ElementResult& element) {
+  if (!models.beams.contains(element.element) || models.load_biases.contains(element.element)) return;
+  std::set<int> more = models.load_biases;
+  more.insert(element.element);
+  const Result<Solved> moved = solve(models.data, models.split.train, models.options, models.beams, more);
+  if (!moved) return;
+  const double f = (models.beam.cost - moved->cost) / 2 / moved->factor();
+  element.load_bias_p_value = p_of_f2(std::max(0.0, f), moved->freedom());
+  if (element.load_bias_p_value >= kSignificant) return;
+  element.sentence +=
+      fmt::format("; its foot moves with the load (p = {:.1g}): fit again with a load bias", element.load_bias_p_value);
+}
+
+ElementResult element_result(const BothModels& models, std::size_t e) {
+  const bool chained = models.options.chained;
+  ElementResult element;
+  element.element = models.data.elements[e].element;
+  element.rigid = fit_of(models.rigid, e, models.data, models.split, chained);
+  if (models.beams.contains(element.element)) element.beam = fit_of(models.beam, e, models.data, models.split, chained);
+  judge_beam(models.beam, e, models.data, models.largest_load(), models.sigma_of_element(element.element), element);
+  judge_load_bias(models, element);
+  return element;
+}
+
 }  // namespace
 
 Result<DeflectionResult> fit_deflection(const DeflectionData& data, const DeflectionOptions& options) {
   const Result<Split> split = split_of(data, options);
   if (!split) return tl::make_unexpected(split.error());
-  std::map<int, std::set<double>> distances;
-  for (const DeflectionReading* reading : split->train) distances[reading->element].insert(reading->x);
-  std::set<int> beams;
-  for (const DeflectionElement& element : data.elements) {
-    if (distances[element.element].size() >= 2) beams.insert(element.element);
-  }
   const std::set<int> load_biases(options.load_bias.begin(), options.load_bias.end());
-  for (const int element : load_biases) {
-    if (!distances.contains(element)) return refused("{}: no training readings of element {}", data.where, element);
-  }
-  const Result<Solved> with = solve(data, split->train, options, beams, load_biases);
+  const Result<std::set<int>> beams = beams_of(data, *split, load_biases);
+  if (!beams) return tl::make_unexpected(beams.error());
+  const Result<Solved> with = solve(data, split->train, options, *beams, load_biases);
   if (!with) return tl::make_unexpected(with.error());
   const Result<Solved> without = solve(data, split->train, options, {}, load_biases);
   if (!without) return tl::make_unexpected(without.error());
+  const BothModels models{data, options, *split, *beams, load_biases, *with, *without};
 
   DeflectionResult result;
   result.training_loads = split->training_loads;
   result.validation_loads = split->validation_loads;
   result.freedom = with->freedom();
   result.variance_factor = with->factor();
-  const double largest =
-      std::max(split->training_loads.back(), split->validation_loads.empty() ? 0.0 : split->validation_loads.back());
-  for (std::size_t e = 0; e < data.elements.size(); ++e) {
-    ElementResult element;
-    element.element = data.elements[e].element;
-    element.rigid = fit_of(*without, e, data, *split, options.chained);
-    if (beams.contains(element.element)) element.beam = fit_of(*with, e, data, *split, options.chained);
-    double sigma = 0;
-    for (const DeflectionReading* reading : split->train) {
-      if (reading->element == element.element) sigma = std::max(sigma, sigma_of(*reading, options));
-    }
-    judge_beam(*with, e, data, largest, sigma * std::sqrt(std::max(1.0, with->factor())), element);
-    if (beams.contains(element.element) && !load_biases.contains(element.element)) {
-      std::set<int> more = load_biases;
-      more.insert(element.element);
-      if (const Result<Solved> moved = solve(data, split->train, options, beams, more)) {
-        const double f = (with->cost - moved->cost) / 2 / moved->factor();
-        element.load_bias_p_value = p_of_f2(std::max(0.0, f), moved->freedom());
-        if (element.load_bias_p_value < kSignificant) {
-          element.sentence += fmt::format("; its foot moves with the load (p = {:.1g}): fit again with a load bias",
-                                          element.load_bias_p_value);
-        }
-      }
-    }
-    result.elements.push_back(std::move(element));
-  }
+  for (std::size_t e = 0; e < data.elements.size(); ++e) result.elements.push_back(element_result(models, e));
   const auto& shown = split->validation.empty() ? split->train : split->validation;
   result.rms_still = rms_of(shown, data, nullptr, options.chained, 0);
   result.rms_beam = rms_of(shown, data, &*with, options.chained, 0);

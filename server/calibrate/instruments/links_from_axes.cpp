@@ -30,8 +30,10 @@ Result<LinkGeometry> row_to(const AxisLine& line, const Joint& nominal, int join
   }
   const double sine = n.head<2>().norm();
   if (sine < kParallel) {
-    return refused("robot {} link {}: axes {} and {} are parallel to {:.3f} deg; the row must be a Hayati one", robot,
-                   joint + 1, joint + 1, joint + 2, to_deg(std::asin(sine)));
+    return refused("robot {} link {}: axes {} and {} are parallel to {:.3f} deg", robot, joint + 1, joint + 1,
+                   joint + 2, to_deg(std::asin(sine)))
+        .of(fmt::format("joints {}: hayati", joint + 1))
+        .next("the row must be a Hayati one");
   }
   const double side = std::sin(nominal.link.alpha) < 0 ? -1 : 1;
   link.theta = near(std::atan2(side * n.x(), -side * n.y()), nominal.link.theta);

@@ -36,6 +36,26 @@ std::vector<std::string> spellings(const std::string& source, const Cell& cell) 
   return all;
 }
 
+/// The sources of `model` that could have another form.
+std::vector<std::string> forms_in(const PhysicalModel& model) {
+  std::vector<std::string> forms;
+  for (const ErrorSourcePtr& source : model.sources) {
+    if (source->cause().forms.size() > 1) forms.push_back(source->name());
+  }
+  return forms;
+}
+
+/// Notes that a cause of the cell's own list now has another form.
+void note(std::vector<Reformed>& reformed, const std::string& from, const std::string& to) {
+  const auto before =
+      std::find_if(reformed.begin(), reformed.end(), [&](const Reformed& one) { return one.to == from; });
+  if (before == reformed.end()) {
+    reformed.push_back({from, to});
+  } else {
+    before->to = to;
+  }
+}
+
 /// `now` with `other` in place of `form`, starting at its values; empty where the cell cannot have it.
 std::optional<PriorModel> with_other_form(const PriorModel& now, const std::string& form, const std::string& other,
                                           const SearchResult& result) {
@@ -75,10 +95,9 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
 
 namespace {
 
-/// Chooses between `form`, which `result.after` has, and the other forms of its cause.
-void choose_again(SearchResult& result, const std::string& form, const std::vector<std::string>& sources) {
+void choose_form_again(SearchResult& result, const std::string& form, const std::vector<std::string>& own_sources) {
   const std::string cause(cause_spelled(form).spelling);
-  const bool own_is_open = std::find(sources.begin(), sources.end(), cause) != sources.end();
+  const bool own_is_open = std::find(own_sources.begin(), own_sources.end(), cause) != own_sources.end();
   const auto finding = std::find_if(result.accepted.begin(), result.accepted.end(),
                                     [&](const Accepted& one) { return one.in_model == form; });
   if (finding == result.accepted.end() && !own_is_open) return;
@@ -99,20 +118,15 @@ void choose_again(SearchResult& result, const std::string& form, const std::vect
   if (chosen == form) return;
   if (finding != result.accepted.end()) {
     finding->in_model = chosen;
-    return;
+  } else {
+    note(result.reformed, form, chosen);
   }
-  if (result.reformed_from.empty()) result.reformed_from = form;
-  result.reformed_to = chosen;
 }
 
 }  // namespace
 
-void choose_forms_again(SearchResult& result, const std::vector<std::string>& sources) {
-  std::vector<std::string> forms;
-  for (const ErrorSourcePtr& source : result.after.model.sources) {
-    if (source->cause().forms.size() > 1) forms.push_back(source->name());
-  }
-  for (const std::string& form : forms) choose_again(result, form, sources);
+void choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources) {
+  for (const std::string& form : forms_in(result.after.model)) choose_form_again(result, form, own_sources);
 }
 
 }  // namespace trammel::cause_search

@@ -2,7 +2,8 @@
 
 #include "server/diagnose/search/search_result.h"
 
-/// The forms in which a cause can go into a model: one of the forms of compliance, a map of more or fewer harmonics.
+/// The forms in which a cause can go into a model: one of those of its record, as compliance has them, or a map of more
+/// or fewer harmonics.
 /// Poses held out decide between them.
 namespace trammel::cause_search {
 
@@ -11,9 +12,9 @@ namespace trammel::cause_search {
 /// predicted no better than without it.
 [[nodiscard]] Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepted* poorer);
 
-/// Chooses the forms of causes that have several anew, beside all that was found since. Chosen while much was missing
-/// they may be others, and what a wrong form leaves over would be given other names. A cause of the cell's own list
-/// (`sources`) is changed only where that list leaves its form open.
-void choose_forms_again(SearchResult& result, const std::vector<std::string>& sources);
+/// Chooses the form of each cause in the model that has several, anew beside all that was found since. Chosen while
+/// much was missing it may be another one, and what a wrong form leaves over would be given other names. A cause of the
+/// cell's own list is changed only where that list (`own_sources`) leaves its form open.
+void choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources);
 
 }  // namespace trammel::cause_search

@@ -8,6 +8,7 @@ namespace trammel::cause_search {
 
 namespace {
 
+using causes::Likeness;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -28,12 +29,6 @@ VectorXd fitted(const Background& background, const MatrixXd& columns, const Vec
       columns.transpose() * background.project(columns) + MatrixXd::Identity(columns.cols(), columns.cols());
   return columns * information.llt().solve(columns.transpose() * background.project(data));
 }
-
-}  // namespace
-
-namespace {
-
-using causes::Likeness;
 
 /// Whether `rival`, as the record of `own` has it, means `other`: of the same joint where it is of one, and the number
 /// that it names. `or_whole`: the cause as a whole counts for its number.
@@ -57,11 +52,6 @@ bool numbers_are_causes(const CauseRecord& record) {
   return record.numbers == causes::Numbers::kApart || record.numbers == causes::Numbers::kOneAJoint;
 }
 
-/// A special case that is not sure where the general one is as likely.
-bool is_doubtful_case(const Cause& general, const Cause& special) {
-  return has_rival(general, special, {Likeness::kDoubtfulCase}, false);
-}
-
 }  // namespace
 
 bool is_whole_of(const Cause& whole, const Cause& step) {
@@ -79,6 +69,10 @@ bool is_description_of(const Cause& general, const Cause& special) {
 
 bool is_simpler_case(const Cause& simple, const Cause& general) {
   return has_rival(general, simple, {Likeness::kSimplerCase}, false);
+}
+
+bool is_doubtful_case(const Cause& general, const Cause& special) {
+  return has_rival(general, special, {Likeness::kDoubtfulCase}, false);
 }
 
 namespace {

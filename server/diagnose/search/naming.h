@@ -14,6 +14,10 @@ namespace trammel::cause_search {
 /// Whether `simple` is the one to name where it explains nearly as much as `general` does.
 [[nodiscard]] bool is_simpler_case(const Cause& simple, const Cause& general);
 
+/// Whether `special` is not sure where `general`, which describes it as well, is as likely: an order of a gear beside a
+/// map of its joint's angle.
+[[nodiscard]] bool is_doubtful_case(const Cause& general, const Cause& special);
+
 /// How sure the name of a cause is.
 struct Naming {
   double frequency = 1;              ///< share of repetitions of the batch, the effect as fitted, that name it

@@ -14,7 +14,6 @@ namespace trammel::cause_search {
 
 namespace {
 
-using causes::SearchFamily;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -47,7 +46,7 @@ class Search {
   [[nodiscard]] Result<bool> step();
   /// Drops one that does not pass any more beside all the rest; false where all pass.
   [[nodiscard]] bool prune();
-  void choose_forms_again() { cause_search::choose_forms_again(result_, sources_); }
+  void choose_forms_again() { cause_search::choose_forms_again(result_, own_sources_); }
   /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
   /// more like it.
   [[nodiscard]] Status reconsider();
@@ -81,16 +80,16 @@ class Search {
   const DiagnoseOptions& options_;
   SearchResult result_;
   Chance chance_;
-  std::vector<std::string> sources_;  // the cell's own list
-  std::size_t renewed_for_ = 0;       // how much had been found when chance_ was drawn
-  std::vector<Cause> closed_;         // were tried and did not hold
+  std::vector<std::string> own_sources_;  // as the cell lists them
+  std::size_t renewed_for_ = 0;           // how much had been found when chance_ was drawn
+  std::vector<Cause> closed_;             // were tried and did not hold
 };
 
 Status Search::start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   result_.all = result_.batch = batch;
   const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
   if (!calibration) return tl::make_unexpected(calibration.error());
-  sources_ = sources;
+  own_sources_ = sources;
   result_.before = {calibration->model, priors_of(*calibration)};
   result_.after = result_.before;
   return {};
@@ -270,9 +269,9 @@ Status Search::take_cause(Accepted one) {
 
 /// The map of that joint among what is accepted.
 std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
+  const bool is_map = record_of(cause).search == causes::SearchFamily::kMap;
   return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
-    return record_of(cause).search == SearchFamily::kMap && one.cause.cause == cause.cause &&
-           one.cause.joint == cause.joint;
+    return is_map && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
   });
 }
 
@@ -324,7 +323,7 @@ Result<bool> Search::name_again(Accepted& one) {
 void Search::open_negative_play() {
   for (std::size_t k = 0; k < result_.accepted.size();) {
     const Accepted one = result_.accepted[k];
-    const bool is_play = record_of(one.cause).search == SearchFamily::kPlay;
+    const bool is_play = record_of(one.cause).search == causes::SearchFamily::kPlay;
     const std::optional<PlaySign> sign = is_play ? std::optional(sign_of(one)) : std::nullopt;
     if (!sign || !sign->negative) {
       ++k;
@@ -362,7 +361,7 @@ SearchResult Search::take() {
   // What was tried and dropped leaves no trace.
   if (!extended) {
     result_.after = result_.before;
-    result_.reformed_from.clear();
+    result_.reformed.clear();
     refine_all();
   }
   // Of the pose itself nothing was learned, and by now all else is known.

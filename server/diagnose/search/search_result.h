@@ -24,6 +24,11 @@ struct Accepted {
   [[nodiscard]] bool is_outlier() const { return source.empty(); }
 };
 
+/// A form of a cause of the model's own that gave way to another beside what was found.
+struct Reformed {
+  std::string from, to;
+};
+
 /// What forward and backward selection ended with.
 struct SearchResult {
   PriorModel before;       ///< calibrated, as the cell has it
@@ -35,8 +40,7 @@ struct SearchResult {
   /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not among the accepted.
   std::vector<PlaySign> negative_play;
   Chance chance;
-  /// The form of the model's own compliance that gave way to another beside what was found; empty where none did.
-  std::string reformed_from, reformed_to;
+  std::vector<Reformed> reformed;
   bool too_many_outliers = false;  ///< more poses are out than may be; the rest stayed in
 };
 

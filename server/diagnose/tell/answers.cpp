@@ -169,9 +169,10 @@ void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) 
     const bool at_a_row = !sorted || finding.cause.pose_id.empty();
     if (!finding.source.empty() && is_sure(finding) && at_a_row) diagnosis.sources_after.push_back(finding.source);
   }
-  if (!found.reformed_from.empty() && diagnosis.sources_after.size() > diagnosis.sources_before.size())
-    std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), found.reformed_from,
-                 found.reformed_to);
+  if (diagnosis.sources_after.size() > diagnosis.sources_before.size()) {
+    for (const Reformed& one : found.reformed)
+      std::replace(diagnosis.sources_after.begin(), diagnosis.sources_after.end(), one.from, one.to);
+  }
 }
 
 void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {

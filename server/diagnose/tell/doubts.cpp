@@ -22,49 +22,34 @@ bool is_dwarfed(double effect_rms, const Unexplained& unexplained) {
   return unexplained.present && effect_rms <= thresholds::kDwarfed * unexplained.rms;
 }
 
-/// The causes that describe a single one of its kind as well, and better where there are several: a map of the joint's
-/// angle for ripples of one gear.
-std::vector<const CauseRecord*> doubts_about(const CauseRecord& record) {
-  std::vector<const CauseRecord*> general;
-  for (const CauseRecord* other : all_causes()) {
-    if (std::any_of(other->rivals.begin(), other->rivals.end(), [&](const causes::Rival& rival) {
-          return rival.likeness == causes::Likeness::kDoubtfulCase && rival.cause == record.spelling;
-        }))
-      general.push_back(other);
-  }
-  return general;
-}
-
-/// What describes `cause` as well and was found besides, or describes better that so many of its kind were found.
-std::vector<Cause> better_descriptions(const Cause& cause, const std::vector<Cause>& found) {
+/// What describes several of its kind better than one by one, where there are too many of them at its joint to be
+/// believed or where that stands beside them: a map of the joint's angle for the orders of a gear.
+std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Cause>& found) {
   const auto at_joint = [&](std::string_view name) {
     return std::count_if(found.begin(), found.end(),
                          [&](const Cause& other) { return other.cause == name && other.joint == cause.joint; });
   };
-  std::vector<Cause> better;
-  for (const CauseRecord* general : doubts_about(record_of(cause))) {
-    if (at_joint(general->spelling) > 0 || at_joint(cause.cause) > thresholds::kMostOrders)
-      better.push_back(cause_at(*general, cause.joint));
-  }
-  return better;
-}
-
-/// Causes that are told by the time alone.
-std::vector<Cause> going_with_time() {
+  const bool too_many = at_joint(cause.cause) > thresholds::kMostOrders;
   std::vector<Cause> all;
   for (const CauseRecord* record : all_causes()) {
-    if (record->goes_with_time && record->needs.time) all.push_back(cause_at(*record));
+    const Cause general = cause_at(*record, cause.joint);
+    if (is_doubtful_case(general, cause) && (too_many || at_joint(general.cause) > 0)) all.push_back(general);
   }
   return all;
+}
+
+/// Adds what is told by the time alone.
+void add_going_with_time(std::vector<Cause>& rivals) {
+  for (const CauseRecord* record : all_causes()) {
+    if (record->goes_with_time && record->needs.time) add(rivals, cause_at(*record));
+  }
 }
 
 /// What a cause that was found by a surrogate may be instead. It is never sure.
 void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   const ContextNeeds& needs = record_of(cause).needs;
   if (needs.direction) return add(rivals, unknown_cause(cause.joint));
-  if (needs.temperature) {
-    for (const Cause& other : going_with_time()) add(rivals, other);
-  }
+  if (needs.temperature) add_going_with_time(rivals);
   if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
@@ -84,17 +69,17 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside) {
   const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
   const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
-  std::vector<Cause> better = better_descriptions(cause, beside.found);
-  std::erase_if(better, [&](const Cause& one) { return contains(rivals, one); });
+  std::vector<Cause> many = descriptions_of_many(cause, beside.found);
+  std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
 
   std::vector<Cause> could_also_be = rivals;
   for (const Cause& rival : untestable_rivals(cause, beside.recorded)) add(could_also_be, rival);
   if (by_surrogate) add_rivals_of_surrogate(cause, could_also_be);
   if (dwarfed) could_also_be.push_back(unknown_cause());
-  could_also_be.insert(could_also_be.end(), better.begin(), better.end());
+  could_also_be.insert(could_also_be.end(), many.begin(), many.end());
 
   const auto action = [&]() -> std::string {
-    if (!better.empty())
+    if (!many.empty())
       return fmt::format("measure more poses over the range of joint {}: its error has no single order",
                          cause.joint + 1);
     if (dwarfed) return "find first what is unknown here: it is several times larger";

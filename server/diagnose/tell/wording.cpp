@@ -28,14 +28,14 @@ std::string listed_clauses(const std::vector<std::string>& clauses) {
   return all;
 }
 
-bool is_single_pose(const Finding& finding) { return record_of(finding.cause).search == causes::SearchFamily::kPose; }
-
 /// Where a step may have begun besides the pose where it was found.
 std::string beginning_said(const Finding& finding) {
   if (finding.may_begin_at.size() < 2) return "";
-  return fmt::format(", or another of {} to {},", finding.may_begin_at.front().pose_id,
+  return fmt::format(", or at another of {} to {},", finding.may_begin_at.front().pose_id,
                      finding.may_begin_at.back().pose_id);
 }
+
+bool is_single_pose(const Finding& finding) { return record_of(finding.cause).search == causes::SearchFamily::kPose; }
 
 std::string said(const Finding& finding) {
   if (is_single_pose(finding))

@@ -70,7 +70,8 @@ Status read_position(const CsvTable& table, std::size_t row, const BatchColumns&
   if (columns.sigma && !empty(*columns.sigma)) {
     const Result<double> sigma = table.number(row, *columns.sigma, kSigmaLimitMm);
     if (!sigma) return tl::make_unexpected(sigma.error());
-    if (*sigma <= 0) return table.refuse(row, "sigma_mm is {:g}, must be above 0", *sigma);
+    if (*sigma <= 0)
+      return table.refuse(row, "sigma_mm is {:g}, must be above 0", *sigma).of("sigma_mm").beyond(*sigma, 0);
     measurement.sigma = from_mm(*sigma);
   }
   return {};
@@ -81,7 +82,7 @@ Result<MeasurementSet> read_set(const CsvTable& table, std::size_t row, const st
   if (name.empty()) return MeasurementSet::kUnassigned;
   if (name == "train") return MeasurementSet::kTrain;
   if (name == "validation") return MeasurementSet::kValidation;
-  return table.refuse(row, "set is '{}', expected train or validation", name);
+  return table.refuse(row, "set is '{}', expected train or validation", name).of("set").with_text(name);
 }
 
 Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
@@ -108,7 +109,8 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
   if (!table) return tl::make_unexpected(table.error());
   const Result<BatchColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
-  if (table->size() == 0) return refused("{}: no measurements below the header, at least 1 is needed", where);
+  if (table->size() == 0)
+    return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
   MeasurementBatch batch;
   batch.id = std::filesystem::path(where).stem().string();
   batch.where = where;
@@ -121,7 +123,9 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
     if (!measurement) return tl::make_unexpected(measurement.error());
     const auto [earlier, is_new] = line_of_pose.emplace(measurement->pose_id, measurement->row);
     if (!is_new) {
-      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second);
+      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+          .of("pose_id")
+          .with_text(measurement->pose_id);
     }
     batch.measurements.push_back(std::move(*measurement));
   }

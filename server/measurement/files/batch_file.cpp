@@ -56,10 +56,10 @@ Result<MeasurementBatch> parse_batch(const std::string& text, const std::string&
     case BatchKind::kRoboDk:
       return parse_robodk_csv(text, where);
     case BatchKind::kPoints:
-      return refused(
-          "{}: measured points without the joints that were commanded; join them with the plan by pose_id first: "
-          "trammel convert --points POINTS --joints PLAN -o BATCH",
-          where);
+      return refused("measured points without the joints that were commanded")
+          .in(where)
+          .of("q1_deg")
+          .next("join them with the plan by pose_id first: trammel convert --points POINTS --joints PLAN -o BATCH");
     case BatchKind::kTrammel:
       break;
   }

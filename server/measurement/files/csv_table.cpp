@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <set>
 
 namespace trammel {
@@ -60,7 +61,7 @@ class Scanner {
     while (!text_.empty()) {
       Result<std::string> field = trimmed_start() == '"' ? quoted() : plain();
       if (!field) return tl::make_unexpected(field.error());
-      if (!is_utf8(*field)) return refused("{} row {}: not UTF-8 text", where_, record.line);
+      if (!is_utf8(*field)) return refused("not UTF-8 text").in(where_).at_row(record.line);
       record.fields.push_back(std::move(*field));
       if (text_.empty()) break;
       const char separator = text_.front();
@@ -109,13 +110,13 @@ class Scanner {
       if (c == '\n') ++line_;
       field += c;
     }
-    return refused("{} row {}: a quote is not closed", where_, first_line);
+    return refused("a quote is not closed").in(where_).at_row(first_line);
   }
 
   Result<std::string> rest_after_quote(int first_line, std::string field) {
     const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
     if (const std::string_view rest = trimmed(text_.substr(0, end)); !rest.empty()) {
-      return refused("{} row {}: '{}' after a closing quote, expected ','", where_, first_line, rest);
+      return refused("'{}' after a closing quote, expected ','", rest).in(where_).at_row(first_line);
     }
     text_.remove_prefix(end);
     return field;
@@ -134,9 +135,13 @@ std::string shown(const std::string& field) { return field.size() <= 40 ? field 
 Status CsvTable::set_columns(Row header) {
   std::set<std::string> seen;
   for (const std::string& name : header.fields) {
-    if (name.empty()) return refused("{} row {}: column {} has no name", where_, header.line, seen.size() + 1);
+    if (name.empty())
+      return refused("column {} has no name", seen.size() + 1)
+          .in(where_)
+          .at_row(header.line)
+          .with_value(seen.size() + 1);
     if (!seen.insert(name).second) {
-      return refused("{} row {}: column {} appears twice", where_, header.line, shown(name));
+      return refused("column {} appears twice", shown(name)).in(where_).at_row(header.line).of(shown(name));
     }
   }
   columns_ = std::move(header.fields);
@@ -145,8 +150,10 @@ Status CsvTable::set_columns(Row header) {
 
 Status CsvTable::add_row(Row row) {
   if (row.fields.size() != columns_.size()) {
-    return refused("{} row {}: {} values, the header has {} columns", where_, row.line, row.fields.size(),
-                   columns_.size());
+    return refused("{} values, the header has {} columns", row.fields.size(), columns_.size())
+        .in(where_)
+        .beyond(row.fields.size(), columns_.size())
+        .at_row(row.line);
   }
   rows_.push_back(std::move(row));
   return {};
@@ -158,7 +165,8 @@ Result<CsvTable> CsvTable::parse(std::string_view text, std::string where) {
   Scanner scanner(text, table.where_);
   Result<Row> header = scanner.next();
   if (!header) return tl::make_unexpected(header.error());
-  if (header->fields.empty()) return refused("{}: empty file, expected a header line with column names", table.where_);
+  if (header->fields.empty())
+    return refused("empty file, expected a header line with column names").in(table.where_).beyond(0, 1);
   if (const Status set = table.set_columns(std::move(*header)); !set) return tl::make_unexpected(set.error());
   while (true) {
     Result<Row> record = scanner.next();
@@ -174,7 +182,7 @@ Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const
   if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
   for (const Row& row : rows) {
     if (!std::all_of(row.fields.begin(), row.fields.end(), is_utf8)) {
-      return refused("{} row {}: not UTF-8 text", table.where_, row.line);
+      return refused("not UTF-8 text").in(table.where_).at_row(row.line);
     }
     if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
   }
@@ -191,8 +199,10 @@ Result<std::size_t> CsvTable::require(std::string_view column) const {
   if (const auto at = find(column)) return *at;
   const std::string names = shown(fmt::format("{}", fmt::join(columns_, ",")));
   const bool semicolons = columns_.size() == 1 && columns_[0].find(';') != std::string::npos;
-  return refused("{}: missing column {}; the header has: {}{}", where_, column, names,
-                 semicolons ? " (columns must be separated by ',')" : "");
+  return refused("missing column {}", column)
+      .in(where_)
+      .of(std::string(column))
+      .next(fmt::format("the header has: {}{}", names, semicolons ? " (columns must be separated by ',')" : ""));
 }
 
 Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::string>& columns) const {
@@ -206,26 +216,39 @@ Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::st
     }
   }
   if (found.empty() || missing.empty()) return found;
-  return refused("{}: missing column {}; {} come all together or not at all", where_, missing.front(),
-                 fmt::join(columns, ", "));
+  return refused("missing column {}", missing.front())
+      .in(where_)
+      .of(missing.front())
+      .next(fmt::format("{} come all together or not at all", fmt::join(columns, ", ")));
 }
 
 Result<double> CsvTable::number(std::size_t row, std::size_t column, double limit) const {
   std::string_view text = field(row, column);
-  if (text.empty()) return refuse(row, "{} is empty, expected a number", columns_[column]);
+  if (text.empty()) return refuse(row, "{} is empty, expected a number", columns_[column]).of(columns_[column]);
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc::result_out_of_range) {
-    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown(field(row, column)), limit);
+    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown(field(row, column)), limit)
+        .of(columns_[column])
+        .with_text(shown(field(row, column)))
+        .beyond(std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1), limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
-    return refuse(row, "{} is '{}', expected a number", columns_[column], shown(field(row, column)));
+    return refuse(row, "{} is '{}', expected a number", columns_[column], shown(field(row, column)))
+        .of(columns_[column])
+        .with_text(shown(field(row, column)));
   }
   if (!std::isfinite(value)) {
-    return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column));
+    return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column))
+        .of(columns_[column])
+        .with_text(field(row, column));
   }
-  if (std::abs(value) > limit) return refuse(row, "{} is {:g}, limit {:g}", columns_[column], value, limit);
+  if (std::abs(value) > limit) {
+    return refuse(row, "{} is {:g}, limit {:g}", columns_[column], value, limit)
+        .of(columns_[column])
+        .beyond(value, limit);
+  }
   return value;
 }
 
@@ -234,7 +257,9 @@ Result<int> CsvTable::integer(std::size_t row, std::size_t column, int lowest, i
   if (!value) return tl::make_unexpected(value.error());
   if (*value != std::floor(*value) || *value < lowest || *value > highest) {
     return refuse(row, "{} is {}, expected a whole number from {} to {}", columns_[column], shown(field(row, column)),
-                  lowest, highest);
+                  lowest, highest)
+        .of(columns_[column])
+        .beyond(*value, *value < lowest ? lowest : highest);
   }
   return static_cast<int>(*value);
 }
@@ -248,7 +273,9 @@ Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<st
   }
   if (std::abs(values.norm() - 1) > kQuaternionLimit) {
     return refuse(row, "quaternion {},{},{},{} has length {:.6g}, expected 1 (limit {:g})", columns_[wxyz[0]],
-                  columns_[wxyz[1]], columns_[wxyz[2]], columns_[wxyz[3]], values.norm(), kQuaternionLimit);
+                  columns_[wxyz[1]], columns_[wxyz[2]], columns_[wxyz[3]], values.norm(), kQuaternionLimit)
+        .of(columns_[wxyz[0]])
+        .beyond(values.norm(), 1);
   }
   values.normalize();
   return Eigen::Quaterniond(values(0), values(1), values(2), values(3)).toRotationMatrix();

@@ -44,10 +44,10 @@ class CsvTable {
   [[nodiscard]] Result<int> integer(std::size_t row, std::size_t column, int lowest, int highest) const;
   /// A unit quaternion from four columns w, x, y, z, as a rotation matrix; limit of its length's error 1e-3.
   [[nodiscard]] Result<Eigen::Matrix3d> rotation(std::size_t row, const std::vector<std::size_t>& wxyz) const;
-  /// `file row 12: `, then why.
+  /// With the file and the line of the row.
   template <typename... Args>
-  [[nodiscard]] tl::unexpected<Error> refuse(std::size_t row, fmt::format_string<Args...> text, Args&&... args) const {
-    return refused("{} row {}: {}", where_, line(row), fmt::format(text, std::forward<Args>(args)...));
+  [[nodiscard]] Failure refuse(std::size_t row, fmt::format_string<Args...> text, Args&&... args) const {
+    return refused(text, std::forward<Args>(args)...).in(where_).at_row(line(row));
   }
 
  private:

@@ -17,7 +17,7 @@ Result<JointList> parse_joint_csv(const std::string& text, const std::string& wh
   if (const Status has_joints = columns->require_joints(*table); !has_joints) {
     return tl::make_unexpected(has_joints.error());
   }
-  if (table->size() == 0) return refused("{}: no poses below the header, at least 1 is needed", where);
+  if (table->size() == 0) return refused("no poses below the header, at least 1 is needed").in(where).beyond(0, 1);
   JointList list{where, columns->joint_types(), {}};
   for (std::size_t row = 0; row < table->size(); ++row) {
     Result<PoseContext> context = columns->read(*table, row);
@@ -64,8 +64,8 @@ Result<JointList> check_against_cell(JointList list, const Cell& cell) {
     return tl::make_unexpected(joints.error());
   }
   for (CommandedPose& pose : list.poses) {
-    const Status checked = check_pose(pose.context, cell, fmt::format("{} row {}", list.where, pose.row));
-    if (!checked) return tl::make_unexpected(checked.error());
+    const Status checked = check_pose(pose.context, cell);
+    if (!checked) return Failure(checked.error()).in(list.where).at_row(pose.row);
   }
   return list;
 }

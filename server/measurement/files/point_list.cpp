@@ -48,15 +48,19 @@ class PointReader {
     NamedPoint point;
     point.row = table_.line(row);
     point.name = table_.field(row, name_);
-    if (point.name.empty()) return table_.refuse(row, "name is empty");
+    if (point.name.empty()) return table_.refuse(row, "name is empty").of("name");
     if (positional_ && is_number(point.name) && point.name.find('.') != std::string::npos) {
-      return table_.refuse(
-          row, "name is '{}', which looks like a coordinate; expected [[collection] group] target first", point.name);
+      return table_.refuse(row, "name is '{}', which looks like a coordinate", point.name)
+          .of("name")
+          .with_text(point.name)
+          .next("expected [[collection] group] target first");
     }
     const Result<Vector3> native = read_three(row, position_, coordinates_, kPositionLimit);
     if (!native) return tl::make_unexpected(native.error());
     if (coordinates_ != Coordinates::kCartesian && native->x() < 0) {
-      return table_.refuse(row, "r is {:g}, must not be below 0", native->x() / length_);
+      return table_.refuse(row, "r is {:g}, must not be below 0", native->x() / length_)
+          .of("r")
+          .beyond(native->x() / length_, 0);
     }
     point.p_W = cartesian(*native);
     if (const Status rotation = read_rotation(row, point); !rotation) return tl::make_unexpected(rotation.error());
@@ -110,7 +114,8 @@ class PointReader {
     if (sigma_ && !table_.field(row, *sigma_).empty()) {
       const Result<double> sigma = table_.number(row, *sigma_, kUncertaintyLimit / length_);
       if (!sigma) return tl::make_unexpected(sigma.error());
-      if (*sigma <= 0) return table_.refuse(row, "sigma is {:g}, must be above 0", *sigma);
+      if (*sigma <= 0)
+        return table_.refuse(row, "sigma is {:g}, must be above 0", *sigma).of("sigma").beyond(*sigma, 0);
       point.sigma = *sigma * length_;
     }
     if (uncertainties_.empty()) return {};
@@ -119,7 +124,9 @@ class PointReader {
     for (Eigen::Index k = 0; k < 3; ++k) {
       if ((*read)(k) >= 0) continue;
       const std::size_t column = uncertainties_[static_cast<std::size_t>(k)];
-      return table_.refuse(row, "{} is {}, must not be below 0", table_.columns()[column], table_.field(row, column));
+      return table_.refuse(row, "{} is {}, must not be below 0", table_.columns()[column], table_.field(row, column))
+          .of(table_.columns()[column])
+          .with_text(table_.field(row, column));
     }
     Vector3 along = *read;  // m, along the three directions of the coordinates
     if (coordinates_ == Coordinates::kCylindrical) along.y() *= native.x();
@@ -145,7 +152,11 @@ class PointReader {
 }  // namespace
 
 Result<PointList> parse_points(const std::string& text, const std::string& where, const PointFileOptions& options) {
-  if (!(options.coverage > 0)) return refused("{}: coverage factor {:g}, must be above 0", where, options.coverage);
+  if (!(options.coverage > 0))
+    return refused("coverage factor {:g}, must be above 0", options.coverage)
+        .in(where)
+        .of("coverage")
+        .beyond(options.coverage, 0);
   const Result<PointTable> parts = take_apart(text, where, options);
   if (!parts) return tl::make_unexpected(parts.error());
   PointReader reader(*parts, options.coverage);
@@ -156,7 +167,11 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
     Result<NamedPoint> point = reader.read(row);
     if (!point) return tl::make_unexpected(point.error());
     const auto [earlier, is_new] = row_of_name.emplace(point->name, point->row);
-    if (!is_new) return parts->table.refuse(row, "name '{}' is already that of row {}", point->name, earlier->second);
+    if (!is_new) {
+      return parts->table.refuse(row, "name '{}' is already that of row {}", point->name, earlier->second)
+          .of("name")
+          .with_text(point->name);
+    }
     list.points.push_back(std::move(*point));
   }
   return list;
@@ -171,10 +186,13 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
   for (const CommandedPose& pose : commanded.poses) {
     const auto [earlier, is_new] = pose_of_id.emplace(pose.pose_id, &pose);
     if (is_new) continue;
-    return refused("{} row {}: pose_id '{}' is already that of row {}", commanded.where, pose.row, pose.pose_id,
-                   earlier->second->row);
+    return refused("pose_id '{}' is already that of row {}", pose.pose_id, earlier->second->row)
+        .in(commanded.where)
+        .at_row(pose.row)
+        .of("pose_id")
+        .with_text(pose.pose_id);
   }
-  if (points.points.empty()) return refused("{}: no points, at least 1 is needed", points.where);
+  if (points.points.empty()) return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
   MeasurementBatch batch;
   batch.id = std::filesystem::path(points.where).stem().string();
   batch.where = points.where;
@@ -182,8 +200,11 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
   for (const NamedPoint& point : points.points) {
     const auto pose = pose_of_id.find(point.name);
     if (pose == pose_of_id.end()) {
-      return refused("{} row {}: point '{}' has no pose of that pose_id in {}", points.where, point.row, point.name,
-                     commanded.where);
+      return refused("point '{}' has no pose of that pose_id in {}", point.name, commanded.where)
+          .in(points.where)
+          .at_row(point.row)
+          .of("name")
+          .with_text(point.name);
     }
     Measurement measurement;
     measurement.pose_id = point.name;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/measurement/files/joint_list.h"
+#include "server/measurement/files/point_options.h"
 #include "server/measurement/measurement.h"
 
 /// Points and frames that a tracker's software exports: where things are, and not yet why.
@@ -21,19 +22,6 @@ struct NamedPoint {
 struct PointList {
   std::string where;  ///< the file as messages name it
   std::vector<NamedPoint> points;
-};
-
-enum class LengthUnit { kMillimetre, kMetre, kInch };
-enum class Coordinates { kCartesian, kCylindrical, kSpherical };
-/// What the three numbers behind the coordinates are.
-enum class BehindCoordinates { kUncertainties, kFixedXyz, kEulerZyx };
-
-/// What a file may leave unsaid. A file that says otherwise is refused.
-struct PointFileOptions {
-  std::optional<LengthUnit> unit;          ///< else what the file says, else mm
-  std::optional<Coordinates> coordinates;  ///< else what the file says, else cartesian
-  std::optional<BehindCoordinates> behind;
-  double coverage = 1;  ///< uncertainties in the file are this many standard deviations
 };
 
 /// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points", "Export Frames"), and

@@ -17,7 +17,7 @@ constexpr std::size_t kMostFields = 9;
 
 template <typename T>
 Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
-  if (known && *known != said) return refused("{}: two different statements of {}", where, what);
+  if (known && *known != said) return refused("two different statements of the {}", what).in(where).of(what);
   known = said;
   return {};
 }
@@ -26,13 +26,17 @@ Result<LengthUnit> length_unit(const std::string& word, const std::string& where
   if (word == "mm" || word.starts_with("millimet")) return LengthUnit::kMillimetre;
   if (word == "m" || word.starts_with("meter") || word.starts_with("metre")) return LengthUnit::kMetre;
   if (word == "in" || word.starts_with("inch")) return LengthUnit::kInch;
-  return refused("{} row {}: unit is '{}', expected mm, m or inch", where, line, word);
+  return refused("unit is '{}', expected mm, m or inch", word).in(where).at_row(line).of("unit").with_text(word);
 }
 
 Result<bool> is_radian(const std::string& word, const std::string& where, int line) {
   if (word.starts_with("deg")) return false;
   if (word.starts_with("rad")) return true;
-  return refused("{} row {}: angular unit is '{}', expected deg or rad", where, line, word);
+  return refused("angular unit is '{}', expected deg or rad", word)
+      .in(where)
+      .at_row(line)
+      .of("angular unit")
+      .with_text(word);
 }
 
 bool contains(const std::string& text, const char* pattern) { return std::regex_search(text, std::regex(pattern)); }
@@ -50,11 +54,11 @@ Status read_unit_statements(const std::string& comment, const std::string& where
     if ((*at)[1].matched) {
       const Result<bool> radians = is_radian((*at)[2], where, line);
       if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
     } else {
       const Result<LengthUnit> unit = length_unit((*at)[2], where, line);
       if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -68,12 +72,15 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
                            : contains(comment, "cartesian")          ? std::optional(Coordinates::kCartesian)
                                                                      : std::nullopt;
   if (coordinates) {
-    if (const Status s = state(statements.coordinates, *coordinates, where, "the coordinates"); !s) return s;
+    if (const Status s = state(statements.coordinates, *coordinates, where, "coordinates"); !s) return s;
   }
   const bool zyx = contains(comment, R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)");
   if (!zyx && contains(comment, R"(\beuler\b)")) {
-    return refused("{} row {}: Euler angles or parameters other than ZYX; expected Euler ZYX or fixed XYZ", where,
-                   line.number);
+    return refused("Euler angles or parameters other than ZYX")
+        .in(where)
+        .at_row(line.number)
+        .of("angles")
+        .next("expected Euler ZYX or fixed XYZ");
   }
   const auto behind = zyx ? std::optional(BehindCoordinates::kEulerZyx)
                       : contains(comment, R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)")
@@ -81,7 +88,7 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
                       : contains(comment, "\\buncertaint") ? std::optional(BehindCoordinates::kUncertainties)
                                                            : std::nullopt;
   if (!behind) return {};
-  return state(statements.behind, *behind, where, "what follows the coordinates");
+  return state(statements.behind, *behind, where, "columns behind the coordinates");
 }
 
 /// Our name of a column, for what other programs call it; empty for one that is passed over.
@@ -138,11 +145,11 @@ Status read_header_units(const Header& header, const std::string& where, int lin
     if (is_angle(header.columns[k])) {
       const Result<bool> radians = is_radian(header.units[k], where, line);
       if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "the angular unit"); !s) return s;
+      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
     } else {
       const Result<LengthUnit> unit = length_unit(header.units[k], where, line);
       if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "the unit"); !s) return s;
+      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -162,16 +169,20 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
   const std::size_t count = row.fields.size();
   if (count < kLeastFields || count > kMostFields) {
     return refused(
-        "{} row {}: {} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 uncertainties or "
-        "angles]",
-        where, row.line, count, kLeastFields, kMostFields);
+               "{} values, expected {} to {}: [[collection] group] target, 3 coordinates, [3 uncertainties or angles]",
+               count, kLeastFields, kMostFields)
+        .in(where)
+        .at_row(row.line)
+        .beyond(count, count < kLeastFields ? kLeastFields : kMostFields);
   }
   const bool more_behind = count > kLeastFields + 2;
   if (more_behind && !statements.behind) {
     return refused(
-        "{} row {}: 3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ or "
-        "Euler ZYX angles",
-        where, row.line);
+               "3 values behind the coordinates, and nothing says whether they are uncertainties, fixed XYZ or Euler "
+               "ZYX angles")
+        .in(where)
+        .at_row(row.line)
+        .of("columns behind the coordinates");
   }
   std::vector<std::string> columns = {"collection", "group", "name"};
   columns.erase(columns.begin(), columns.begin() + 2 - static_cast<std::ptrdiff_t>((count - kLeastFields) % 3));
@@ -210,7 +221,7 @@ CoordinateNames uncertainty_columns(Coordinates coordinates) {
 Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
   const std::vector<TextLine> lines = text_lines(text);
   const auto first = std::find_if(lines.begin(), lines.end(), [](const TextLine& line) { return !line.comment; });
-  if (first == lines.end()) return refused("{}: no points, at least 1 is needed", where);
+  if (first == lines.end()) return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
   const char separator = separator_of(first->text);
   PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
   std::vector<CsvTable::Row> rows;
@@ -232,7 +243,7 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
       return tl::make_unexpected(said.error());
     }
   }
-  if (rows.empty()) return refused("{}: no points below the header, at least 1 is needed", where);
+  if (rows.empty()) return refused("no points below the header, at least 1 is needed").in(where).beyond(0, 1);
   parts.positional = header.columns.empty();
   if (parts.positional) {
     for (CsvTable::Row& row : rows) drop_time_stamp(row.fields);
@@ -240,16 +251,17 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
     if (!columns) return tl::make_unexpected(columns.error());
     for (const CsvTable::Row& row : rows) {
       if (row.fields.size() == columns->size()) continue;
-      return refused("{} row {}: {} values, the rows before have {}", where, row.line, row.fields.size(),
-                     columns->size());
+      return refused("{} values, the rows before have {}", row.fields.size(), columns->size())
+          .in(where)
+          .at_row(row.line)
+          .beyond(row.fields.size(), columns->size());
     }
     header.columns = std::move(*columns);
     header_line = rows.front().line;
   } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
     return tl::make_unexpected(units.error());
   }
-  const Status coordinates =
-      state(parts.statements.coordinates, *coordinates_of(header.columns), where, "the coordinates");
+  const Status coordinates = state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates");
   if (!coordinates) return tl::make_unexpected(coordinates.error());
   Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows);
   if (!table) return tl::make_unexpected(table.error());

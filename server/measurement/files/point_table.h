@@ -5,7 +5,7 @@
 #include <string>
 
 #include "server/measurement/files/csv_table.h"
-#include "server/measurement/files/point_list.h"
+#include "server/measurement/files/point_options.h"
 
 /// The layout of a list of points, found out.
 namespace trammel {

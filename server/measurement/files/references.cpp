@@ -25,8 +25,11 @@ double rms(const Eigen::Matrix3Xd& vectors) {
 Status check_names(const PointList& references, const PointList& measured) {
   for (const NamedPoint& point : measured.points) {
     if (find_point(references, point.name) != nullptr) continue;
-    return refused("{} row {}: reflector '{}' is none of the references in {}", measured.where, point.row, point.name,
-                   references.where);
+    return refused("reflector '{}' is none of the references in {}", point.name, references.where)
+        .in(measured.where)
+        .at_row(point.row)
+        .of("name")
+        .with_text(point.name);
   }
   return {};
 }
@@ -37,7 +40,8 @@ Result<ReferenceCheck> check_references(const PointList& references, const Point
                                         const ReferenceOptions& options) {
   if (!(options.localise_above > 0) || !(options.repeat_above >= options.localise_above)) {
     return refused("references: limits {:g} mm and {:g} mm, expected 0 < localise <= repeat",
-                   to_mm(options.localise_above), to_mm(options.repeat_above));
+                   to_mm(options.localise_above), to_mm(options.repeat_above))
+        .beyond(to_mm(options.localise_above), to_mm(options.repeat_above));
   }
   if (const Status names = check_names(references, measured); !names) return tl::make_unexpected(names.error());
   ReferenceCheck check;
@@ -56,13 +60,15 @@ Result<ReferenceCheck> check_references(const PointList& references, const Point
     ++count;
   }
   if (count < kLeastReflectors) {
-    return refused("{}: {} of the reference reflectors in {}, at least {} are needed", measured.where, count,
-                   references.where, kLeastReflectors);
+    return refused("{} of the reference reflectors in {}, at least {} are needed", count, references.where,
+                   kLeastReflectors)
+        .in(measured.where)
+        .beyond(count, kLeastReflectors);
   }
   p_W.conservativeResize(3, count);
   p_V.conservativeResize(3, count);
   const Result<Pose> X_WV = fit_transform(p_W, p_V);
-  if (!X_WV) return refused("{}: {}", measured.where, sentence(X_WV.error()));
+  if (!X_WV) return Failure(X_WV.error()).as(ErrorCode::kRefused).in(measured.where);
   check.X_WV = *X_WV;
   const Eigen::Matrix3Xd remaining = ((X_WV->linear() * p_V).colwise() + X_WV->translation()) - p_W;
   Eigen::Index worst = 0;

@@ -59,8 +59,11 @@ Result<ScaledColumn> scaled(const CsvTable& table, std::size_t column, std::stri
     const bool fits =
         angle ? said == "deg" || said == "rad" || said == "mm" : said == "mm" || said == "m" || said == "in";
     if (!fits) {
-      return refused("{}: column {}: unit '{}', expected {}", table.where(), table.columns()[column], said,
-                     angle ? "deg or rad, of a rail mm" : "mm, m or in");
+      return refused("column {}: unit '{}', expected {}", table.columns()[column], said,
+                     angle ? "deg or rad, of a rail mm" : "mm, m or in")
+          .in(table.where())
+          .of(table.columns()[column])
+          .with_text(said);
     }
     unit = said;
   }
@@ -111,13 +114,16 @@ class NamedColumns {
       if (number == 0) continue;
       const auto [earlier, is_new] = column_of_joint.emplace(number, column);
       if (is_new) continue;
-      return refused("{}: two columns for joint {}: {} and {}", table_.where(), number,
-                     table_.columns()[earlier->second], table_.columns()[column]);
+      return refused("two columns for joint {}: {} and {}", number, table_.columns()[earlier->second],
+                     table_.columns()[column])
+          .in(table_.where())
+          .of(table_.columns()[column]);
     }
     for (const auto& [number, column] : column_of_joint) {
       if (number != found_.joints.size() + 1) {
-        return refused("{}: missing column J{} before {}", table_.where(), found_.joints.size() + 1,
-                       table_.columns()[column]);
+        return refused("missing column J{} before {}", found_.joints.size() + 1, table_.columns()[column])
+            .in(table_.where())
+            .of(fmt::format("J{}", found_.joints.size() + 1));
       }
       const Result<ScaledColumn> joint = scaled(table_, column, "deg");
       if (!joint) return tl::make_unexpected(joint.error());
@@ -133,20 +139,25 @@ class NamedColumns {
     std::vector<ScaledColumn> columns;
     for (const std::string& name : wanted) {
       if (std::count(names_.begin(), names_.end(), name) > 1) {
-        return refused("{}: column {} appears twice", table_.where(), name);
+        return refused("column {} appears twice", name).in(table_.where()).of(name);
       }
       const auto column = find_name(name);
       if (!column) continue;
       const Result<ScaledColumn> one = scaled(table_, *column, unit);
       if (!one) return tl::make_unexpected(one.error());
       if (one->angle != (unit == "deg")) {
-        return refused("{}: column {} is a length, expected deg or rad", table_.where(), table_.columns()[*column]);
+        return refused("column {} is a length, expected deg or rad", table_.columns()[*column])
+            .in(table_.where())
+            .of(table_.columns()[*column]);
       }
       columns.push_back(*one);
     }
     if (columns.size() == 1 || columns.size() == 2) {
-      return refused("{}: {} of the columns {}; they come all together or not at all", table_.where(), columns.size(),
-                     fmt::join(wanted, ", "));
+      return refused("{} of the columns {}; they come all together or not at all", columns.size(),
+                     fmt::join(wanted, ", "))
+          .in(table_.where())
+          .of(wanted[0])
+          .beyond(columns.size(), 3);
     }
     for (const ScaledColumn& column : columns) used_.push_back(column.column);
     found = std::move(columns);
@@ -170,8 +181,10 @@ class NamedColumns {
     }
     if (found_.quaternion.empty()) return {};
     if (found_.quaternion.size() != 4) {
-      return refused("{}: {} of the columns qw, qx, qy, qz; they come all together or not at all", table_.where(),
-                     found_.quaternion.size());
+      return refused("{} of the columns qw, qx, qy, qz; they come all together or not at all", found_.quaternion.size())
+          .in(table_.where())
+          .of("qw")
+          .beyond(found_.quaternion.size(), 4);
     }
     used_.insert(used_.end(), found_.quaternion.begin(), found_.quaternion.end());
     return set_orientation(Orientation::kQuaternion);
@@ -179,7 +192,10 @@ class NamedColumns {
 
   [[nodiscard]] Status set_orientation(Orientation kind) {
     if (found_.orientation != Orientation::kNone) {
-      return refused("{}: two orientations; expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz", table_.where());
+      return refused("two orientations")
+          .in(table_.where())
+          .of("orientation")
+          .next("expected one of A B C, W P R, Rx Ry Rz, qw qx qy qz");
     }
     found_.orientation = kind;
     return {};
@@ -225,18 +241,21 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
       if (separator != ',' && is_number(pointed)) field = pointed;
     }
   }
-  if (rows.empty()) return refused("{}: empty file, expected joints and measured positions", where);
+  if (rows.empty()) return refused("empty file, expected joints and measured positions").in(where);
   CsvTable::Row header = rows.front();
   const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), is_number);
   if (has_header) rows.erase(rows.begin());
-  if (rows.empty()) return refused("{}: no measurements below the header, at least 1 is needed", where);
+  if (rows.empty()) return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
   const bool named = std::any_of(header.fields.begin(), header.fields.end(),
                                  [](const std::string& field) { return joint_number(column_name(field).name) > 0; });
   if (!named) {
     header.fields = positional_names(header.fields.size());
     if (header.fields.empty()) {
-      return refused("{} row {}: {} columns and none named J1; without names expected 9, 12 or 18", where, header.line,
-                     rows.front().fields.size());
+      return refused("{} columns and none named J1; without names expected 9, 12 or 18", rows.front().fields.size())
+          .in(where)
+          .of("J1")
+          .with_value(rows.front().fields.size())
+          .at_row(header.line);
     }
   }
   return CsvTable::from_rows(where, header, rows).map([&](CsvTable table) {
@@ -342,7 +361,9 @@ Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::st
     if (!measurement) return tl::make_unexpected(measurement.error());
     const auto [earlier, is_new] = row_of_pose.emplace(measurement->pose_id, measurement->row);
     if (!is_new) {
-      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second);
+      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+          .of("pose_id")
+          .with_text(measurement->pose_id);
     }
     batch.measurements.push_back(std::move(*measurement));
   }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "server/base/units.h"
+#include "server/compensate/known_rows.h"
 
 namespace trammel {
 

@@ -6,7 +6,8 @@
 #include <map>
 #include <utility>
 
-#include "server/measurement/velocity.h"
+#include "server/compensate/known_rows.h"
+#include "server/measurement/split.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel {
@@ -62,17 +63,14 @@ std::vector<Indices> drawn_poses(const MeasurementBatch& batch, double share, st
     return std::all_of(pose.begin(), pose.end(),
                        [&](std::size_t i) { return batch.measurements[i].set == MeasurementSet::kValidation; });
   });
-  MeasurementBatch drawn_from;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    Measurement m;
-    m.row = static_cast<int>(k);
-    drawn_from.measurements.push_back(std::move(m));
-  }
   if (poses.empty()) return {};
+  MeasurementBatch drawn_from;
+  drawn_from.measurements.resize(poses.size());
   const double wanted = judges_of(poses.size(), share) / static_cast<double>(poses.size());
+  const std::vector<bool> is_drawn = rows_held_out(drawn_from, wanted, seed);
   std::vector<Indices> drawn;
-  for (const Measurement& m : split_batch(drawn_from, wanted, seed).validation.measurements) {
-    drawn.push_back(poses[static_cast<std::size_t>(m.row)]);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (is_drawn[k]) drawn.push_back(std::move(poses[k]));
   }
   return drawn;
 }
@@ -124,13 +122,6 @@ Pose located_base(const Eigen::Matrix3Xd& p_W, const Eigen::Matrix3Xd& p_B, cons
   return X_WB;
 }
 
-/// Rows of tools that the model knows.
-MeasurementBatch known_rows(const CompensatedModel& model, const MeasurementBatch& batch) {
-  MeasurementBatch known = batch;
-  std::erase_if(known.measurements, [&](const Measurement& m) { return !knows(model, m); });
-  return known;
-}
-
 Eigen::Matrix3Xd measured_W(const MeasurementBatch& batch) {
   Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(batch.measurements.size()));
   for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = batch.measurements[static_cast<std::size_t>(i)].p_W;
@@ -149,23 +140,24 @@ std::set<int> judging_rows(const MeasurementBatch& batch, double share, std::uin
   return rows;
 }
 
-MeasurementBatch held_out_by_service(MeasurementBatch batch, double share, std::uint64_t seed) {
-  for (const Indices& pose : drawn_poses(batch, share, seed)) {
-    for (const std::size_t i : pose) batch.measurements[i].set = MeasurementSet::kValidation;
-  }
-  for (Measurement& m : batch.measurements) {
-    if (m.set != MeasurementSet::kValidation) m.set = MeasurementSet::kTrain;
-  }
-  return batch;
+HoldOut held_out_by_service(double share, std::uint64_t seed) {
+  return [share, seed](const MeasurementBatch& batch) {
+    std::vector<bool> held_out;
+    for (const Measurement& m : batch.measurements) held_out.push_back(m.set == MeasurementSet::kValidation);
+    for (const Indices& pose : drawn_poses(batch, share, seed)) {
+      for (const std::size_t i : pose) held_out[i] = true;
+    }
+    return held_out;
+  };
 }
 
-JudgingSession judging_session(const MeasurementBatch& batch, double share, std::uint64_t seed) {
-  MeasurementBatch whole = batch;
-  fill_velocity(whole);
-  const std::set<int> judges = judging_rows(whole, share, seed);
-  JudgingSession session{batch.id, held_out_by_service(whole, share, seed), whole};
-  std::erase_if(session.training.measurements, [](const Measurement& m) { return m.set != MeasurementSet::kTrain; });
-  std::erase_if(session.judges.measurements, [&](const Measurement& m) { return !judges.contains(m.row); });
+JudgingSession judging_session(const CheckedBatch& batch) {
+  JudgingSession session{batch.id(), batch.training(), batch.held_out()};
+  std::set<int> by_submitter;
+  for (const Measurement& m : batch.rows().measurements) {
+    if (m.set == MeasurementSet::kValidation) by_submitter.insert(m.row);
+  }
+  std::erase_if(session.judges.measurements, [&](const Measurement& m) { return by_submitter.contains(m.row); });
   return session;
 }
 
@@ -179,21 +171,15 @@ void judge_once(std::vector<JudgingSession>& sessions) {
   }
 }
 
-MeasurementBatch without_older_judges(MeasurementBatch batch, const std::vector<JudgingSession>& sessions) {
+CheckedBatch without_older_judges(const CheckedBatch& batch, const std::vector<JudgingSession>& sessions) {
   Rows judges;
   for (const JudgingSession& session : sessions) {
-    if (session.batch_id == batch.id) break;
+    if (session.batch_id == batch.id()) break;
     judges.add(session.judges);
   }
-  for (Measurement& m : batch.measurements) {
-    if (judges.has(m)) m.set = MeasurementSet::kValidation;
-  }
-  return batch;
-}
-
-bool knows(const CompensatedModel& model, const Measurement& m) {
-  return resolve_tool(model.cell(), m.context.tool) && resolve_payload(model.cell(), m.context.payload) &&
-         model.check_trained_with(m.context.tool, m.context.payload);
+  std::vector<bool> copies;
+  for (const Measurement& m : batch.rows().measurements) copies.push_back(judges.has(m));
+  return batch.holding_out(copies);
 }
 
 LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession& session, JudgedLevel level) {

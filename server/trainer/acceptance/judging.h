@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/measurement/checked_batch.h"
 
 /// By which rows the models of a cell are judged, and what a model leaves of them.
 namespace trammel {
@@ -16,9 +17,8 @@ namespace trammel {
 /// learned from. Reproducible: same rows, share and seed, same judges.
 [[nodiscard]] std::set<int> judging_rows(const MeasurementBatch& batch, double share, std::uint64_t seed);
 
-/// `batch` with a set for every row: kValidation where it judges, is a copy of one that does, or is held out by its
-/// submitter; else kTrain.
-[[nodiscard]] MeasurementBatch held_out_by_service(MeasurementBatch batch, double share, std::uint64_t seed);
+/// Holds out each row that judges, each copy of one that does, and what its submitter holds out (`set`).
+[[nodiscard]] HoldOut held_out_by_service(double share, std::uint64_t seed);
 
 /// One stored batch as it judges. A tracker is set up anew each time, so a session has a base of its own.
 struct JudgingSession {
@@ -26,15 +26,14 @@ struct JudgingSession {
   MeasurementBatch training;  ///< tells each model where the base of this session stands
   MeasurementBatch judges;    ///< that no model was trained on
 };
-/// `batch` is checked against the cell and held_out_by_service() is not applied to it yet.
-[[nodiscard]] JudgingSession judging_session(const MeasurementBatch& batch, double share, std::uint64_t seed);
+/// `batch` was checked with held_out_by_service().
+[[nodiscard]] JudgingSession judging_session(const CheckedBatch& batch);
 
 /// Leaves a row that an older batch has as well, because it was sent again under another id or in part, to judge there
 /// alone. `sessions`: oldest first.
 void judge_once(std::vector<JudgingSession>& sessions);
 /// `batch` with its copies of judges of the sessions before its own held out: nothing is learned from them.
-[[nodiscard]] MeasurementBatch without_older_judges(MeasurementBatch batch,
-                                                    const std::vector<JudgingSession>& sessions);
+[[nodiscard]] CheckedBatch without_older_judges(const CheckedBatch& batch, const std::vector<JudgingSession>& sessions);
 
 /// Measured - predicted of the judges of one session, in B, with the base where the session's training rows put it for
 /// this very model: 3 x N. A column is not a number where the model does not know the tool or payload; of rotations
@@ -48,9 +47,6 @@ struct LocatedErrors {
 enum class JudgedLevel { kNominal, kCompensated };
 [[nodiscard]] LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession& session,
                                            JudgedLevel level = JudgedLevel::kCompensated);
-
-/// Whether the model knows this tool with this payload, and both are still in its cell.
-[[nodiscard]] bool knows(const CompensatedModel& model, const Measurement& m);
 
 /// The share of the joint ranges [q_min, q_max] (rad) that poses spread over, of the joint where it is least: the
 /// middle 80 % of the poses over 80 % of the range, so that a single pose far out widens nothing. Joints whose range is

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/trainer/pipeline/extend.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/trainer/pipeline/lasting_sources.h"
+#include "server/trainer/pipeline/leftover.h"
 
 namespace trammel {
 
@@ -19,21 +19,20 @@ constexpr int kMostRounds = 5;         // of taking off the bias and finding the
 constexpr double kSettledTurn = 1e-9;  // rad
 constexpr double kBeyondChance = 3;    // standard deviations of chi^2
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 /// A frame that the cell knows, and that is not named, must be the model's.
 Status check_same_frame(const Cell& cell, const std::string& what, const std::optional<Pose>& said, const Pose& kept,
                         const std::string& source) {
   if (!said) return {};
   const Vector6 difference = pose_difference(*said, kept);
   if (difference.cwiseAbs().maxCoeff() <= kSameFrame) return {};
-  return refused(
-      "cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from: name {} among what is refitted, "
-      "or "
-      "leave it in the cell file as the model has it",
-      cell.name, what, to_mm(difference.head<3>().norm()), to_deg(difference.tail<3>().norm()), source);
+  const double shift_mm = to_mm(difference.head<3>().norm());
+  const double turn_deg = to_deg(difference.tail<3>().norm());
+  const bool shifted = shift_mm > to_mm(kSameFrame);
+  return refused("cell {}: {} is {:.3f} mm and {:.4f} deg from that of the model to start from", cell.name, what,
+                 shift_mm, turn_deg)
+      .of(fmt::format("{}: {}", source, shifted ? "xyz_mm" : "q_wxyz"))
+      .with_value(shifted ? shift_mm : turn_deg)
+      .next(fmt::format("name {} among what is refitted, or leave it in the cell file as the model has it", source));
 }
 
 std::vector<std::string> names_of(const CompensatedModel& model) {
@@ -48,7 +47,7 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
                             const std::vector<std::string>& only) {
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
-    return refused("batch {}: the model to start from is of another robot than cell {}", batch.id, cell.name);
+    return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);
   }
   if (!corrects(only, causes::Part::kBase)) {
     if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
@@ -64,10 +63,12 @@ Status check_may_start_from(const CompensatedModel& from, const Cell& cell, cons
     const bool of_model = std::any_of(from.parts().trained_with.begin(), from.parts().trained_with.end(),
                                       [&](const auto& known) { return known.first == tool; });
     if (of_model || cell.tools.at(tool) || corrects(only, causes::Part::kTool)) continue;
-    return refused(
-        "batch {} row {}: where tool '{}' sits is known to neither cell {} nor the model to start from: name "
-        "tool among what is refitted",
-        batch.id, m.row, tool, cell.name);
+    return refused("where tool '{}' sits is known to neither cell {} nor the model to start from", tool, cell.name)
+        .in("batch " + batch.id)
+        .at_row(m.row)
+        .of("tool_id")
+        .with_text(tool)
+        .next("name tool among what is refitted");
   }
   return {};
 }
@@ -161,68 +162,84 @@ Status take_over(CompensatedModel::Parts& parts, const CompensatedModel& from, c
   return {};
 }
 
-void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const MeasurementBatch& batch,
-            const MeasurementBatch& trained, const std::vector<std::string>& only) {
+/// `own`: the model has now sources that began during this batch, and is of it.
+void record(CompensatedModel::Parts& parts, const CompensatedModel& from, const CheckedBatch& batch,
+            const MeasurementBatch& trained, const std::vector<std::string>& only, bool own) {
   ModelProvenance& provenance = parts.provenance;
   provenance.level.clear();
   for (const ErrorSourcePtr& source : parts.physics.sources)
     provenance.level += (provenance.level.empty() ? "" : ",") + source->name();
   const auto poses = static_cast<int>(trained.measurements.size());
-  provenance.refits.push_back({from.provenance().id, only, batch.id, batch_hash(batch), poses});
+  provenance.refits.push_back({from.provenance().id, only, batch.id(), batch.hash(), poses});
+  if (!own) return;
+  provenance.batch_id = batch.id();
+  provenance.batch_hash = batch.hash();
+  provenance.training_poses = poses;
+}
+
+/// The poses as the sources meet them: as of another batch than the model's where they are, and no better known than
+/// what the model leaves unexplained.
+MeasurementBatch as_met(const CompensatedModel& from, const Cell& cell, MeasurementBatch poses, bool own) {
+  for (Measurement& m : poses.measurements) {
+    m.context.served = !own;
+    m.sigma = std::hypot(m.sigma.value_or(cell.tracker.sigma), from.bias() ? 0.0 : from.parts().discrepancy);
+  }
+  return poses;
+}
+
+/// Refits, and where the model has a bias takes it off and refits until the base no longer turns. Fills `parts`.
+Result<Refit> refit_beside_bias(CompensatedModel::Parts& parts, const CompensatedModel& from,
+                                const std::shared_ptr<const Cell>& cell, const MeasurementBatch& poses,
+                                const std::vector<std::string>& only) {
+  const CalibrationResult known = known_of(from.parts());
+  MeasurementBatch met = poses;
+  std::optional<BiasAt> bias;
+  Matrix3 R_WA = Matrix3::Identity();
+  for (int round = 0;; ++round) {
+    Result<Refit> found = refit(known, cell, met, only);
+    if (!found) return found;
+    const Matrix3 R_WA_now = served_base(found->result.model).linear();
+    const bool settled = bias && rotation_log(R_WA_now * R_WA.transpose()).norm() < kSettledTurn;
+    const bool last = !from.bias() || settled || round == kMostRounds;
+    if (last || !bias) {
+      if (const Status taken = take_over(parts, from, *found, met); !taken) return tl::make_unexpected(taken.error());
+    }
+    if (last) return found;
+    if (!bias) {
+      Result<BiasAt> learned = bias_at(parts, poses);
+      if (!learned) return tl::make_unexpected(learned.error());
+      bias = std::move(*learned);
+    }
+    R_WA = R_WA_now;
+    met = without_bias(poses, *bias, R_WA);
+  }
 }
 
 }  // namespace
 
 Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
-                          const MeasurementBatch& batch, const MeasurementBatch& trained,
+                          const CheckedBatch& batch, const MeasurementBatch& trained,
                           const std::vector<std::string>& only) {
   if (const Status fits = check_may_start_from(from, *cell, trained, only); !fits)
     return tl::make_unexpected(fits.error());
-  Refitted result;
-  result.poses = trained;
   const bool of_this_batch = lasting_sources(only) != only;
   const std::vector<std::string> sources = names_of(from);
-  const bool is_its_own = batch_hash(batch) == from.provenance().batch_hash;
+  const bool is_its_own = batch.hash() == from.provenance().batch_hash;
   if (of_this_batch && !is_its_own && lasting_sources(sources) != sources) {
     return refused(
-        "batch {}: the model to start from has sources that began during batch {}: none that began during this one can "
-        "be added",
-        batch.id, from.provenance().batch_id);
+               "the model to start from has sources that began during batch {}: none that began during this one can be "
+               "added",
+               from.provenance().batch_id)
+        .in("batch " + batch.id());
   }
-  const bool own = of_this_batch || is_its_own;
-  for (Measurement& m : result.poses.measurements) {
-    m.context.served = !own;
-    m.sigma = std::hypot(m.sigma.value_or(cell->tracker.sigma), from.bias() ? 0.0 : from.parts().discrepancy);
-  }
-  MeasurementBatch met = result.poses;
-  const CalibrationResult known = known_of(from.parts());
-  Result<Refit> found = refit(known, cell, met, only);
+  Refitted result;
+  result.poses = as_met(from, *cell, trained, of_this_batch || is_its_own);
+  Result<Refit> found = refit_beside_bias(result.parts, from, cell, result.poses, only);
   if (!found) return tl::make_unexpected(found.error());
-  if (const Status taken = take_over(result.parts, from, *found, met); !taken)
-    return tl::make_unexpected(taken.error());
-  if (from.bias()) {
-    const Result<BiasAt> bias = bias_at(result.parts, result.poses);
-    if (!bias) return tl::make_unexpected(bias.error());
-    for (int round = 0; round < kMostRounds; ++round) {
-      const Matrix3 R_WA = served_base(found->result.model).linear();
-      met = without_bias(result.poses, *bias, R_WA);
-      found = refit(known, cell, met, only);
-      if (!found) return tl::make_unexpected(found.error());
-      const Matrix3 R_WA_now = served_base(found->result.model).linear();
-      if (rotation_log(R_WA_now * R_WA.transpose()).norm() < kSettledTurn) break;
-    }
-    if (const Status taken = take_over(result.parts, from, *found, met); !taken)
-      return tl::make_unexpected(taken.error());
-  }
-  record(result.parts, from, batch, trained, only);
-  if (of_this_batch) {
-    result.parts.provenance.batch_id = batch.id;
-    result.parts.provenance.batch_hash = batch_hash(batch);
-    result.parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
-  }
+  record(result.parts, from, batch, trained, only, of_this_batch);
   for (std::size_t i = 0; i < trained.measurements.size(); ++i)
     result.poses.measurements[i].sigma = trained.measurements[i].sigma;
-  result.found = found->result;
+  result.found = std::move(found->result);
   result.found.covariance.setZero();
   result.found.covariance(found->anew, found->anew) = found->given_rest;
   return result;

@@ -6,6 +6,7 @@
 #include "server/calibrate/frames/frames.h"
 #include "server/compensate/paired_gain.h"
 #include "server/measurement/repeats.h"
+#include "server/trainer/pipeline/given_up.h"
 
 namespace trammel {
 
@@ -45,8 +46,7 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
     Eigen::Matrix3Xd left;
     for (std::size_t k = 0; k < supported.sources.size(); ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(supported.sources.size());
-      if (progress && !progress((asked + share) / static_cast<double>(found.size())))
-        return failure(ErrorCode::kBusy, "training given up on request");
+      if (progress && !progress((asked + share) / static_cast<double>(found.size()))) return given_up();
       std::vector<std::string> others = supported.sources;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
       const auto without = left_by(cell, joined(own, others), merged, judges);

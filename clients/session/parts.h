@@ -1,0 +1,72 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <utility>
+
+#include "clients/session/session_types.h"
+#include "server/base/result.h"
+
+/// Long calls, sent in parts.
+namespace trammel::client {
+
+/// How many items the next part has: as many as were answered in the wanted time, by what the parts before took. Begins
+/// with few and grows at most eightfold from one part to the next.
+class PartSize {
+ public:
+  using Seconds = std::chrono::duration<double>;
+
+  PartSize(Seconds wanted, std::size_t most) : wanted_(wanted), most_(most) {}
+
+  [[nodiscard]] std::size_t next() const { return next_; }
+  void took(std::size_t items, Seconds time) {
+    const double rate = static_cast<double>(items) / std::max(time.count(), 1e-9);  // items a second
+    const double fits = std::min(rate * wanted_.count(), static_cast<double>(kGrowth * next_));
+    next_ = std::clamp(static_cast<std::size_t>(fits), std::size_t{1}, most_);
+  }
+
+ private:
+  static constexpr std::size_t kFirst = 16;
+  static constexpr std::size_t kGrowth = 8;
+
+  const Seconds wanted_;
+  const std::size_t most_;
+  std::size_t next_ = std::min(kFirst, most_);
+};
+
+/// Asks for the items [first, first + count).
+template <typename Item>
+using AskPart = std::function<Result<Answer<Item>>(std::size_t first, std::size_t count)>;
+
+/// The answers to `items` items, all from one model: where it changes between two parts everything is asked again of
+/// the new one. kBusy: it changed again and again. `progress` may be empty; `now` is the clock.
+template <typename Item>
+[[nodiscard]] Result<Answer<Item>> ask_in_parts(std::size_t items, const std::string& cell, PartSize size,
+                                                const AskPart<Item>& ask, const std::function<void(double)>& progress,
+                                                const std::function<PartSize::Seconds()>& now) {
+  constexpr int kAttempts = 5;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    Answer<Item> answer;
+    bool one_model = true;
+    std::size_t done = 0;
+    do {
+      if (progress) progress(items == 0 ? 0 : static_cast<double>(done) / static_cast<double>(items));
+      const std::size_t count = std::min(size.next(), items - done);
+      const PartSize::Seconds begun = now();
+      auto part = ask(done, count);
+      if (!part && (done == 0 || part.error().code == ErrorCode::kUnreachable)) return part;
+      if (!part) return Failure(part.error()).in(fmt::format("after the first {}", done));
+      size.took(count, now() - begun);
+      one_model = done == 0 || (part->model.hash == answer.model.hash && part->model.version == answer.model.version);
+      if (done == 0) answer.model = part->model;
+      std::move(part->items.begin(), part->items.end(), std::back_inserter(answer.items));
+      done += count;
+    } while (one_model && done < items);
+    if (one_model) return answer;
+  }
+  return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", cell, kAttempts);
+}
+
+}  // namespace trammel::client

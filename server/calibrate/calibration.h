@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "server/calibrate/identify/identifiability.h"
+#include "server/error_sources/physical_model.h"
+#include "server/measurement/measurement.h"
+
+/// What a calibration is asked, and what it found.
+namespace trammel {
+
+/// Joints that lead to the positions leave less than the larger of these after identification: m rms, and share of how
+/// far the positions spread. A nominal robot is off by a few mm.
+inline constexpr double kNoModelError = 0.025;
+inline constexpr double kNoModelShare = 0.05;
+
+/// A model to start from, and the measurements to explain. An unknown base and unknown tools are found first.
+struct CalibrationProblem {
+  PhysicalModel model;
+  MeasurementBatch batch;  ///< checked against the cell
+};
+
+struct CalibrateOptions {
+  int max_iterations = 100;
+  std::vector<bool> held;  ///< a flag for each parameter that stays as it is; empty: none
+  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
+};
+
+/// A pose whose residual is far above its sigma.
+struct SuspectPose {
+  std::string pose_id;
+  int row = 0;          ///< in its file
+  double distance = 0;  ///< m, of the position
+  double sigmas = 0;    ///< the distance over the expected standard deviation of one axis
+};
+
+struct IdentifiedParameter {
+  Parameter parameter;
+  double value = 0;         ///< SI
+  double stddev = 0;        ///< SI, of the posterior
+  bool identified = false;  ///< whether less than half of the prior standard deviation is left
+};
+
+struct CalibrationResult {
+  PhysicalModel model;  ///< with identified values
+  std::vector<IdentifiedParameter> parameters;
+  Eigen::MatrixXd covariance;  ///< P x P, SI
+  /// P x P, in [-1, 1].
+  [[nodiscard]] Eigen::MatrixXd correlation() const;
+  int rank = 0;  ///< directions with singular value >= 1
+  std::vector<UnidentifiableCombination> unidentifiable;
+  double condition_number = 0;      ///< of the identified directions, prior units
+  double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
+  double rms = 0;                   ///< m, Euclidean residual of the training positions
+  double discrepancy = 0;           ///< m per axis: what the model leaves beyond the measurement's sigma
+  double discrepancy_rotation = 0;  ///< rad per axis
+  /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
+  double observability_index = 0;
+  std::vector<SuspectPose> suspects;  ///< farthest first
+  std::vector<double> cost_record;    ///< half the weighted sum of squares, of all iterations in their order
+  bool converged = false;
+  int iterations = 0;
+  std::string message;  ///< of the solver
+};
+
+}  // namespace trammel

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/robot/chain.h"
+
+/// A target, and how it is commanded so that the tool lands on it.
+namespace trammel {
+
+enum class CorrectionStatus { kOk, kOutOfDomain, kJointLimit, kUnreachable, kSingular, kNotConverged, kRefused };
+/// As it is written in files and on the wire: `ok`, `out_of_domain`, ...
+[[nodiscard]] std::string_view to_string(CorrectionStatus status);
+
+/// A wanted pose of the tool, or the joints that a program commands.
+struct Target {
+  Pose X_BT = Pose::Identity();
+  std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
+  std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
+  bool joint_target = false;        ///< X_BT is not set: the nominal pose at `seed` is wanted
+};
+
+/// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
+/// Expected errors are root mean squares of the true distance from the target, without the instrument's noise; NaN
+/// where no joints bring the tool there.
+struct Correction {
+  CorrectionStatus status = CorrectionStatus::kRefused;
+  Pose X_BT_wanted = Pose::Identity();
+  Pose X_BT_commanded = Pose::Identity();  ///< what to command so that the tool lands on the pose that was wanted
+  JointVector q;                           ///< the controller's joints for it (nominal inverse kinematics), rad
+  double error_before = kNothingToSay;     ///< m, to expect without correction
+  double error_after = kNothingToSay;      ///< m, to expect with it; the same where the target is not corrected
+  double stddev = kNothingToSay;           ///< m, of the true position: root mean square of the three axes
+  double left = 0;                         ///< m, what the iteration left over; part of error_after
+  int iterations = 0;
+  std::string message;  ///< why not ok
+
+  static constexpr double kNothingToSay = std::numeric_limits<double>::quiet_NaN();
+};
+
+struct CorrectOptions {
+  double tolerance = 1e-7;  ///< m: a smaller step is the last
+  int max_iterations = 10;
+};
+
+}  // namespace trammel

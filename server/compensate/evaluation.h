@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+
+#include "server/robot/pose.h"
+
+/// How far predictions are from what was measured.
+namespace trammel {
+
+/// Figures of the position errors |measured - predicted| of some poses, m.
+struct ErrorFigures {
+  double rms = 0, mean = 0, p997 = 0, max = 0;
+  Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
+};
+/// For the errors in the columns of `e_B` (3 x N, m, not empty).
+[[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
+
+/// Orientation errors of the poses with a measured orientation: rms of the rotation angle, rad.
+struct OrientationFigures {
+  int poses = 0;
+  double nominal = 0, calibrated = 0, compensated = 0;
+  std::optional<double>
+      coverage_95;  ///< share of coordinates inside their 95 % interval; of models that learned orientations
+};
+
+/// The three levels of one model on the same poses.
+struct Evaluation {
+  int poses = 0;
+  ErrorFigures nominal, calibrated, compensated;
+  double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
+  int in_domain = 0;
+  /// Mean over the coordinates of -log N(error; 0, stddev²), compensated, nat, positions in m; in mm it is 6.9 more
+  /// (nlpd_in_mm()). Smaller is better: it rewards small errors and honest standard deviations. Empty where a standard
+  /// deviation is 0, and in models from before it was kept.
+  std::optional<double> nlpd;
+  std::optional<OrientationFigures> orientation;  ///< where orientations were measured
+  /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models from before it was
+  /// kept.
+  std::optional<double> bias_gain_z;
+};
+[[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
+
+/// Mean over the coordinates of -log N(error; 0, stddev²), nat; empty where a stddev is 0.
+[[nodiscard]] std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev);
+/// Share of coordinates inside their 95 % interval.
+[[nodiscard]] double coverage_95(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev);
+
+}  // namespace trammel

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+#include <vector>
+
+#include "server/robot/pose.h"
+
+/// Numbers, matrices and poses as a model file holds them. What reads them throws exceptions of nlohmann;
+/// deserialize() (model_file.h) turns them into a refusal.
+namespace trammel::model_file {
+
+using Json = nlohmann::json;
+
+/// `{"rows", "columns", "values"}`, row after row.
+[[nodiscard]] Json matrix_json(const Eigen::Ref<const Eigen::MatrixXd>& m);
+/// 3 x 4: rotation and translation, m.
+[[nodiscard]] Json pose_json(const Pose& X);
+
+/// Ends the reading: `what` was expected or is wrong.
+[[noreturn]] void wrong(const char* what, const Json& json);
+
+/// A number, finite.
+[[nodiscard]] double number_from(const Json& json);
+[[nodiscard]] double number_from(const Json& json, const char* key);
+
+/// Within what `Whole` can hold.
+template <typename Whole>
+[[nodiscard]] Whole whole_from(const Json& json) {
+  if (json.is_number_unsigned()) {
+    if (json.get<std::uint64_t>() <= static_cast<std::uint64_t>(std::numeric_limits<Whole>::max()))
+      return json.get<Whole>();
+  } else if (json.is_number_integer() && std::is_signed_v<Whole>) {
+    if (json.get<std::int64_t>() >= static_cast<std::int64_t>(std::numeric_limits<Whole>::min()))
+      return json.get<Whole>();
+  }
+  wrong("expected a whole number within its range", json);
+}
+template <typename Whole>
+[[nodiscard]] Whole whole_from(const Json& json, const char* key) {
+  return whole_from<Whole>(json.at(key));
+}
+
+/// How many of something there are: whole and not below 0.
+[[nodiscard]] int count_from(const Json& json, const char* key);
+[[nodiscard]] const Json& list_from(const Json& json);
+[[nodiscard]] std::vector<double> numbers_from(const Json& json);
+[[nodiscard]] bool truth_from(const Json& json);
+[[nodiscard]] Eigen::MatrixXd matrix_from(const Json& json);
+/// One column.
+[[nodiscard]] Eigen::VectorXd vector_from(const Json& json);
+[[nodiscard]] Vector3 vector3_from(const Json& json);
+[[nodiscard]] Pose pose_from(const Json& json);
+
+}  // namespace trammel::model_file

@@ -1,0 +1,196 @@
+#include "server/compensate/file/write_parts.h"
+
+#include "server/base/hash.h"
+#include "server/compensate/file/json_values.h"
+#include "server/compensate/file/keys.h"
+
+namespace trammel::model_file {
+
+namespace {
+
+Json json_of(const ErrorFigures& f) {
+  return {{"rms_m", f.rms},
+          {"mean_m", f.mean},
+          {"p997_m", f.p997},
+          {"max_m", f.max},
+          {"axis_mean_m", matrix_json(f.axis_mean)},
+          {"axis_stddev_m", matrix_json(f.axis_stddev)}};
+}
+
+Json json_of(const OrientationFigures& o) {
+  Json json = {{"poses", o.poses},
+               {"nominal_rad", o.nominal},
+               {"calibrated_rad", o.calibrated},
+               {"compensated_rad", o.compensated}};
+  if (o.coverage_95) json["coverage_95"] = *o.coverage_95;
+  return json;
+}
+
+Json json_of(const Evaluation& e) {
+  Json json = {{"poses", e.poses},
+               {"nominal", json_of(e.nominal)},
+               {"calibrated", json_of(e.calibrated)},
+               {"compensated", json_of(e.compensated)},
+               {"coverage_95", e.coverage_95},
+               {"in_domain", e.in_domain}};
+  if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
+  if (e.bias_gain_z) json["bias_gain_z"] = *e.bias_gain_z;
+  if (e.orientation) json["orientation"] = json_of(*e.orientation);
+  return json;
+}
+
+Json json_of(const BiasState& bias) {
+  Json json = {{"kernel", bias.kernel},
+               {"q", matrix_json(bias.q)},
+               {"residual_B", matrix_json(bias.residual_B)},
+               {"sigma", matrix_json(bias.sigma)},
+               {"offset", matrix_json(bias.offset)},
+               {"hyperparameters", matrix_json(bias.hyperparameters)}};
+  if (bias.block_hyperparameters.size() > 0) json["block_hyperparameters"] = matrix_json(bias.block_hyperparameters);
+  return json;
+}
+
+/// One observation of a bias with blocks: all but its joints, and only what was recorded.
+Json json_of(const PoseContext& context) {
+  Json json = {{"tool", context.tool}, {"payload", context.payload}, {"index", context.index}};
+  if (context.time) json["time_s"] = *context.time;
+  if (context.temperature) json["temperature_c"] = *context.temperature;
+  if (context.velocity) json["velocity"] = matrix_json(*context.velocity);
+  if (!context.direction.empty()) json["direction"] = context.direction;
+  return json;
+}
+
+Json json_of(const BiasCandidate& c) {
+  Json json = {{"kernel", c.kernel},
+               {"leave_one_out_rms_m", c.leave_one_out_rms},
+               {"leave_one_out_nlpd_of_m", c.leave_one_out_nlpd},
+               {"time_block_rms_m", c.time_block_rms},
+               {"joint_block_rms_m", c.joint_block_rms},
+               {"gain_m2", c.gain},
+               {"gain_stddev_m2", c.gain_stddev},
+               {"verdict", c.verdict}};
+  if (c.skipped) json["skipped"] = true;
+  return json;
+}
+
+Json json_of(const RefitRecord& refit) {
+  return {{"model", refit.model},
+          {"sources", refit.sources},
+          {"batch_id", refit.batch_id},
+          {"batch_hash", refit.batch_hash},
+          {"poses", refit.poses}};
+}
+
+Json json_of(const IdentifiedParameter& p) {
+  return {{"name", p.parameter.name}, {"value", p.value}, {"stddev", p.stddev}, {"identified", p.identified}};
+}
+
+Json json_of(const UnidentifiableCombination& u) {
+  return {{"singular_value", u.singular_value}, {"parameters", u.parameters}, {"sentence", u.sentence}};
+}
+
+Json json_of(const SuspectPose& pose) {
+  return {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_m", pose.distance}, {"sigmas", pose.sigmas}};
+}
+
+template <typename Thing>
+Json list_of(const std::vector<Thing>& things) {
+  Json list = Json::array();
+  for (const Thing& thing : things) list.push_back(json_of(thing));
+  return list;
+}
+
+Json json_of(const BiasChoice& choice) {
+  return {{"kernel", choice.kernel}, {"sentence", choice.sentence}, {"candidates", list_of(choice.candidates)}};
+}
+
+/// Frames, sources and values.
+Json json_of(const PhysicalModel& physics) {
+  Json tools = Json::object();
+  for (const auto& [name, X_FT] : physics.tools) tools[name] = pose_json(X_FT);
+  Json sources = Json::array();
+  for (const ErrorSourcePtr& source : physics.sources) sources.push_back(source->name());
+  return {{"X_WB", pose_json(physics.X_WB)},
+          {"tools", std::move(tools)},
+          {"error_sources", std::move(sources)},
+          {"values", matrix_json(physics.values)}};
+}
+
+Json json_of(const ModelParts::BiasOrigin& origin) {
+  Json json = json_of(origin.physics);
+  json["covariance"] = matrix_json(origin.covariance);
+  return json;
+}
+
+Json json_of(const ModelProvenance& provenance) {
+  Json json = {{"level", provenance.level},
+               {"batch_id", provenance.batch_id},
+               {"batch_hash", provenance.batch_hash},
+               {"training_poses", provenance.training_poses},
+               {"seed", provenance.seed}};
+  if (!provenance.refits.empty()) json["refits"] = list_of(provenance.refits);
+  return json;
+}
+
+/// What the calibration found.
+void add_calibration(const ModelParts& parts, Json& content) {
+  content["covariance"] = matrix_json(parts.covariance);
+  content["parameters"] = list_of(parts.parameters);
+  content["unidentifiable"] = list_of(parts.unidentifiable);
+  content["rank"] = parts.rank;
+  content["condition_number"] = parts.condition_number;
+  content["observability_index"] = parts.observability_index;
+  content["suspects"] = list_of(parts.suspects);
+  content["cost_record"] = parts.cost_record;
+  content["discrepancy_m"] = parts.discrepancy;
+}
+
+/// Where the training poses lie.
+void add_domain(const ModelParts& parts, Json& content) {
+  content["q_min"] = matrix_json(parts.q_min);
+  content["q_max"] = matrix_json(parts.q_max);
+  content["prior_share_limit"] = parts.prior_share_limit;
+  content["trained_with"] = parts.trained_with;
+  if (parts.extrapolation_slope.size() > 0) content["extrapolation_slope"] = matrix_json(parts.extrapolation_slope);
+  if (parts.temperature_mean) {
+    content["temperature_c"] = {{"mean", *parts.temperature_mean}, {"stddev", parts.temperature_stddev}};
+  }
+}
+
+void add_bias(const ModelParts& parts, Json& content) {
+  if (parts.bias_choice) content["bias_choice"] = json_of(*parts.bias_choice);
+  if (!parts.bias) return;
+  content["bias"] = json_of(*parts.bias);
+  if (!parts.bias_contexts.empty()) {
+    content["bias"]["poses"] = list_of(parts.bias_contexts);
+    content["bias"]["fades"] = kFades;
+  }
+  if (parts.rotation_bias) content["rotation_bias"] = json_of(*parts.rotation_bias);
+  if (parts.oriented_poses > 0) content["oriented_poses"] = parts.oriented_poses;
+  if (parts.bias_origin) content["bias_origin"] = json_of(*parts.bias_origin);
+}
+
+}  // namespace
+
+Json content_of(const ModelParts& parts) {
+  Json content = json_of(parts.physics);
+  content["cell_yaml"] = parts.physics.cell->cell_yaml;
+  content["robot_yaml"] = parts.physics.cell->robot_yaml;
+  add_calibration(parts, content);
+  add_domain(parts, content);
+  add_bias(parts, content);
+  content["training"] = json_of(parts.training);
+  if (parts.validation) content["validation"] = json_of(*parts.validation);
+  content["provenance"] = json_of(parts.provenance);
+  return content;
+}
+
+Json stamp_of(const ModelProvenance& provenance) {
+  Json stamp = {{"trained_at", provenance.trained_at}, {"program_version", provenance.program_version}};
+  if (provenance.measured_at) stamp["measured_at"] = *provenance.measured_at;
+  return stamp;
+}
+
+std::string content_hash(const ModelParts& parts) { return sha256_hex(content_of(parts).dump()); }
+
+}  // namespace trammel::model_file

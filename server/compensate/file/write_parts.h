@@ -1,0 +1,20 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "server/compensate/model_parts.h"
+
+namespace trammel::model_file {
+
+/// The `content` of a model file (MODEL_FILE.md): everything that decides what the model answers and where it comes
+/// from, except the moment it was made.
+[[nodiscard]] nlohmann::json content_of(const ModelParts& parts);
+
+/// The `stamp`: when the model was made, and by which program.
+[[nodiscard]] nlohmann::json stamp_of(const ModelProvenance& provenance);
+
+/// SHA-256 of the content, in hexadecimal digits.
+[[nodiscard]] std::string content_hash(const ModelParts& parts);
+
+}  // namespace trammel::model_file

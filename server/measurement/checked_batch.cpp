@@ -1,0 +1,147 @@
+#include "server/measurement/checked_batch.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "server/base/check.h"
+#include "server/measurement/pose_check.h"
+#include "server/measurement/pose_columns.h"
+#include "server/measurement/split.h"
+#include "server/measurement/spread_check.h"
+#include "server/measurement/velocity.h"
+
+namespace trammel {
+
+namespace {
+
+std::string name_of(const MeasurementBatch& batch) { return batch.where.empty() ? "batch " + batch.id : batch.where; }
+
+/// Counts times from the first one that was recorded.
+void rebase_times(std::vector<Measurement>& measurements) {
+  const auto timed = std::find_if(measurements.begin(), measurements.end(),
+                                  [](const Measurement& m) { return m.context.time.has_value(); });
+  const double origin = timed == measurements.end() ? 0 : *timed->context.time;
+  for (Measurement& m : measurements) {
+    if (m.context.time) *m.context.time -= origin;
+  }
+}
+
+Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string& where) {
+  for (Measurement& measurement : batch.measurements) {
+    if (measurement.context.q.size() != cell.robot.size()) {
+      return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
+          .in(where)
+          .at_row(measurement.row)
+          .beyond(measurement.context.q.size(), cell.robot.size());
+    }
+    const Status pose = check_pose(measurement.context, cell);
+    if (!pose) return Failure(pose.error()).in(where).at_row(measurement.row);
+  }
+  return {};
+}
+
+bool earlier(const Measurement& a, const Measurement& b) { return *a.context.time < *b.context.time; }
+
+void mark(MeasurementBatch& batch, MeasurementSet set) {
+  for (Measurement& m : batch.measurements) m.set = set;
+}
+
+/// Appends `next` in time.
+void append(MeasurementBatch& all, const MeasurementBatch& next) {
+  for (Measurement m : next.measurements) {
+    m.pose_id = next.id + "/" + m.pose_id;
+    m.context.index = static_cast<int>(all.measurements.size());
+    m.extra.clear();
+    all.measurements.push_back(std::move(m));
+  }
+  all.joint_types = next.joint_types;
+  all.measured_at = std::max(all.measured_at, next.measured_at);
+  all.id += (all.id.empty() ? "" : "+") + next.id;
+  all.source_text += next.source_text;
+}
+
+}  // namespace
+
+HoldOut drawn(double share, std::uint64_t seed) {
+  return [share, seed](const MeasurementBatch& batch) { return rows_held_out(batch, share, seed); };
+}
+
+CheckedBatch::CheckedBatch(MeasurementBatch rows, std::vector<bool> is_held_out, std::string hash) {
+  BatchSplit split = split_rows(rows, is_held_out);
+  mark(split.train, MeasurementSet::kTrain);
+  mark(split.validation, MeasurementSet::kValidation);
+  content_ = std::make_shared<const Content>(Content{
+      std::move(rows), std::move(split.train), std::move(split.validation), std::move(is_held_out), std::move(hash)});
+}
+
+CheckedBatch CheckedBatch::holding_out(const std::vector<bool>& flags) const {
+  TRAMMEL_CHECK(flags.size() == size());
+  std::vector<bool> both = content_->is_held_out;
+  for (std::size_t i = 0; i < both.size(); ++i) both[i] = both[i] || flags[i];
+  return both == content_->is_held_out ? *this : CheckedBatch(rows(), std::move(both), hash());
+}
+
+bool CheckedBatch::is_in_order_of_time() const {
+  const auto& poses = rows().measurements;
+  if (!std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.time.has_value(); })) {
+    return true;
+  }
+  return std::is_sorted(poses.begin(), poses.end(), earlier);
+}
+
+CheckedBatch CheckedBatch::in_order_of_time() const {
+  if (is_in_order_of_time()) return *this;
+  const auto& before = rows().measurements;
+  std::vector<std::size_t> order(before.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return earlier(before[a], before[b]); });
+  MeasurementBatch sorted = rows();
+  std::vector<bool> is_held_out(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    sorted.measurements[i] = before[order[i]];
+    sorted.measurements[i].context.index = static_cast<int>(i);
+    is_held_out[i] = content_->is_held_out[order[i]];
+  }
+  fill_velocity(sorted);
+  return {std::move(sorted), std::move(is_held_out), hash()};
+}
+
+Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out) {
+  const std::string where = name_of(batch);
+  if (batch.measurements.empty()) return refused("no measurements, at least 1 is needed").in(where).beyond(0, 1);
+  // Of a batch that was never a file, too, parts are known by the text of the whole.
+  if (batch.source_text.empty()) batch.source_text = to_csv(batch);
+  std::string hash = batch_hash(batch);
+  if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
+  if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
+    return tl::make_unexpected(columns.error());
+  }
+  rebase_times(batch.measurements);
+  if (const Status poses = check_poses(batch, cell, where); !poses) return tl::make_unexpected(poses.error());
+  if (const Status spread = check_spread(batch, cell, where); !spread) return tl::make_unexpected(spread.error());
+  fill_velocity(batch);
+  std::vector<bool> is_held_out = hold_out(batch);
+  return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));
+}
+
+Result<CheckedBatch> joined(const std::vector<CheckedBatch>& batches, const Cell& cell) {
+  TRAMMEL_CHECK(!batches.empty());
+  if (batches.size() == 1) return batches.front();
+  MeasurementBatch all;
+  std::vector<bool> is_held_out;
+  for (const CheckedBatch& batch : batches) {
+    append(all, batch.rows());
+    const std::vector<bool>& flags = batch.content_->is_held_out;
+    is_held_out.insert(is_held_out.end(), flags.begin(), flags.end());
+  }
+  if (const Status spread = check_spread(all, cell, name_of(all)); !spread) {
+    return tl::make_unexpected(spread.error());
+  }
+  fill_velocity(all);
+  std::string hash = batch_hash(all);
+  return CheckedBatch(std::move(all), std::move(is_held_out), std::move(hash));
+}
+
+}  // namespace trammel

@@ -1,0 +1,113 @@
+#include <utility>
+
+#include "server/base/hash.h"
+#include "server/store/connection.h"
+#include "server/store/job_rows.h"
+#include "server/store/store.h"
+
+// Batches: their text as it came, and which of them no training takes.
+
+namespace trammel {
+namespace {
+
+constexpr const char* kRecordColumns =
+    "SELECT id, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? ";
+
+/// Of a row of kRecordColumns: all but the text.
+StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
+  return {cell,
+          row.getColumn(0).getString(),
+          "",
+          row.getColumn(1).getString(),
+          row.getColumn(2).getString(),
+          row.getColumn(3).getInt64(),
+          row.getColumn(4).getInt(),
+          row.getColumn(5).getInt64(),
+          row.getColumn(6).getString()};
+}
+
+Result<StoredBatch> read_record(SQLite::Database& database, const std::string& cell, const std::string& id) {
+  auto row = prepare(database, (std::string(kRecordColumns) + "AND id = ?").c_str(), cell, id);
+  if (!row.executeStep())
+    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
+  return record_of(cell, row);
+}
+
+}  // namespace
+
+Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Result<StoredJob> {
+    auto present =
+        prepare(database, "SELECT request_id, hash, job FROM batches WHERE cell = ? AND id = ?", batch.cell, batch.id);
+    if (present.executeStep()) {
+      const bool same_content = present.getColumn(1).getString() == batch.hash;
+      const std::int64_t made = present.getColumn(2).getInt64();
+      if (same_content && present.getColumn(0).getString() == batch.request_id) return read_job(database, made);
+      return failure(ErrorCode::kConflict, "cell {} already has a batch {} with {} content (job {})", batch.cell,
+                     batch.id, same_content ? "the same" : "other", made)
+          .of("batch")
+          .with_text(batch.id);
+    }
+    const std::int64_t id = insert_job(database, job);
+    change(database,
+           "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
+           "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+           batch.cell, batch.id, batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses, id);
+    insert_job_batches(database, id, batch.cell, {batch.id});
+    return read_job(database, id);
+  });
+}
+
+Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    const int changes =
+        change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
+    if (changes == 1) return {};
+    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+  });
+}
+
+Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {
+  auto batch = connection_->exclusively([&](SQLite::Database& database) -> Result<StoredBatch> {
+    auto record = read_record(database, cell, id);
+    if (!record) return record;
+    auto row = prepare(database, "SELECT csv FROM batches WHERE cell = ? AND id = ?", cell, id);
+    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    record->csv = row.getColumn(0).getString();
+    return record;
+  });
+  // Without the lock: hashing a large text takes a while.
+  if (batch && sha256_hex(batch->csv) != batch->hash) {
+    return failure(ErrorCode::kInternal, "batch {} of cell {} is not what was accepted: its hash should be {}", id,
+                   cell, batch->hash)
+        .in(connection_->path);
+  }
+  return batch;
+}
+
+Result<StoredBatch> Store::batch_record(const std::string& cell, const std::string& id) const {
+  return connection_->exclusively([&](SQLite::Database& database) { return read_record(database, cell, id); });
+}
+
+Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredBatch>> {
+    auto rows = prepare(database, (std::string(kRecordColumns) + "ORDER BY number").c_str(), cell);
+    std::vector<StoredBatch> batches;
+    while (rows.executeStep()) batches.push_back(record_of(cell, rows));
+    return batches;
+  });
+}
+
+Result<std::set<std::string>> Store::batches_learned_from(const std::string& cell) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::set<std::string>> {
+    auto rows = prepare(database,
+                        "SELECT DISTINCT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
+                        "WHERE jobs.cell = ? AND jobs.state = 'done' AND jobs.model_version > 0",
+                        cell);
+    std::set<std::string> ids;
+    while (rows.executeStep()) ids.insert(rows.getColumn(0).getString());
+    return ids;
+  });
+}
+
+}  // namespace trammel

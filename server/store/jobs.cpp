@@ -1,0 +1,253 @@
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "server/base/unix_time.h"
+#include "server/store/connection.h"
+#include "server/store/job_rows.h"
+#include "server/store/store.h"
+
+// Jobs and what diagnoses found.
+
+namespace trammel {
+namespace {
+
+constexpr int kPagesKept = 20;  // of diagnoses; their findings are kept for ever
+
+constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
+                                                                         {JobState::kRunning, "running"},
+                                                                         {JobState::kDone, "done"},
+                                                                         {JobState::kFailed, "failed"}}};
+
+const char* to_text(JobState state) {
+  for (const auto& [value, text] : kJobStates) {
+    if (value == state) return text;
+  }
+  return "";
+}
+
+JobState job_state_of(std::string_view text) {
+  for (const auto& [value, name] : kJobStates) {
+    if (text == name) return value;
+  }
+  return JobState::kFailed;  // the schema's CHECK lets no other text in
+}
+
+/// Of the change of one unfinished job.
+Status changed_one(int changes, std::int64_t id) {
+  if (changes == 1) return {};
+  return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);
+}
+
+std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job) {
+  auto rows = prepare(database, "SELECT batch FROM job_batches WHERE job = ? ORDER BY position", job);
+  std::vector<std::string> ids;
+  while (rows.executeStep()) ids.push_back(rows.getColumn(0).getString());
+  return ids;
+}
+
+constexpr const char* kJobColumns =
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at "
+    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id ";
+
+StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
+  StoredJob job;
+  job.id = row.getColumn(0).getInt64();
+  job.cell = row.getColumn(1).getString();
+  job.level = row.getColumn(2).getString();
+  job.bias = row.getColumn(3).getString();
+  job.state = job_state_of(row.getColumn(4).getString());
+  job.message = row.getColumn(5).getString();
+  job.created_at = row.getColumn(6).getInt64();
+  job.model_version = row.getColumn(7).getInt();
+  job.attempts = row.getColumn(8).getInt();
+  job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
+  job.started_at = optional_integer(row, 10);
+  job.finished_at = optional_integer(row, 11);
+  job.batch_ids = batches_of(database, job.id);
+  return job;
+}
+
+std::vector<StoredJob> jobs_of(SQLite::Database& database, SQLite::Statement rows) {
+  std::vector<StoredJob> jobs;
+  while (rows.executeStep()) jobs.push_back(job_of(database, rows));
+  return jobs;
+}
+
+void record_start(SQLite::Database& database, std::int64_t job) {
+  change(database,
+         "INSERT INTO job_times (job, started_at) VALUES (?, ?) "
+         "ON CONFLICT (job) DO UPDATE SET started_at = excluded.started_at",
+         job, unix_now());
+}
+
+void record_end(SQLite::Database& database, std::int64_t job) {
+  change(database,
+         "INSERT INTO job_times (job, finished_at) VALUES (?, ?) "
+         "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
+         job, unix_now());
+}
+
+}  // namespace
+
+std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
+  change(database,
+         "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
+         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at,
+         job.kind == JobKind::kDiagnose ? "diagnose" : "train");
+  return database.getLastInsertRowid();
+}
+
+void insert_job_batches(SQLite::Database& database, std::int64_t job, const std::string& cell,
+                        const std::vector<std::string>& batch_ids) {
+  int position = 0;
+  for (const std::string& id : batch_ids) {
+    change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES (?, ?, ?, ?)", job, position++, cell,
+           id);
+  }
+}
+
+Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
+  auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = ?").c_str(), id);
+  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
+  return job_of(database, row);
+}
+
+Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
+               const std::string& message) {
+  return changed_one(change(database,
+                            "UPDATE jobs SET state = 'done', model_version = ?1, message = ?2 "
+                            "WHERE id = ?3 AND (?4 = '' OR cell = ?4) AND state IN ('queued', 'running')",
+                            model_version, message, id, cell),
+                     id)
+      .map([&] { record_end(database, id); });
+}
+
+namespace {
+
+Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
+  for (const std::string& id : job.batch_ids) {
+    if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
+    }
+  }
+  const std::int64_t id = insert_job(database, job);
+  insert_job_batches(database, id, job.cell, job.batch_ids);
+  return read_job(database, id);
+}
+
+}  // namespace
+
+Result<StoredJob> Store::add_job(const StoredJob& job, bool release) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    Result<StoredJob> queued = insert_job_over(database, job);
+    if (!queued || !release) return queued;
+    for (const std::string& id : job.batch_ids)
+      change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
+    return queued;
+  });
+}
+
+Result<bool> Store::may_release(std::int64_t job) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM job_releases WHERE job = ?)");
+    query.bind(1, job);
+    query.executeStep();
+    return query.getColumn(0).getInt() != 0;
+  });
+}
+
+Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    Result<StoredJob> queued = insert_job_over(database, job);
+    if (queued) {
+      change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
+             diagnosis.apply ? 1 : 0);
+    }
+    return queued;
+  });
+}
+
+Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredDiagnosis> {
+    auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
+    if (!row.executeStep())
+      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
+    return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
+                           row.getColumn(3).getString()};
+  });
+}
+
+Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    const int changes =
+        change(database, "UPDATE diagnoses SET findings = ?, page = ? WHERE job = ?", findings, page, job);
+    change(database,
+           "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN "
+           "(SELECT job FROM diagnoses WHERE page <> '' ORDER BY job DESC LIMIT ?)",
+           kPagesKept);
+    return changed_one(changes, job);
+  });
+}
+
+Result<StoredJob> Store::job(std::int64_t id) const {
+  return connection_->exclusively([&](SQLite::Database& database) { return read_job(database, id); });
+}
+
+Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
+    return jobs_of(
+        database,
+        prepare(database, (std::string(kJobColumns) + "WHERE state IN ('queued', 'running') ORDER BY id").c_str()));
+  });
+}
+
+Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int finished) const {
+  const std::string wanted = std::string(kJobColumns) +
+                             "WHERE (?1 = '' OR cell = ?1) AND (state IN ('queued', 'running') "
+                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'done' "
+                             "ORDER BY id DESC LIMIT ?2) "
+                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'failed' "
+                             "ORDER BY id DESC LIMIT ?2)) ORDER BY id";
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
+    return jobs_of(database, prepare(database, wanted.c_str(), cell, finished));
+  });
+}
+
+Status Store::set_job_running(std::int64_t id) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    return changed_one(change(database,
+                              "UPDATE jobs SET state = 'running', attempts = attempts + 1 "
+                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              id),
+                       id)
+        .map([&] { record_start(database, id); });
+  });
+}
+
+Status Store::set_job_queued(std::int64_t id) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    return changed_one(change(database,
+                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - 1, 0) "
+                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              id),
+                       id);
+  });
+}
+
+Status Store::set_job_failed(std::int64_t id, const std::string& message) {
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    return changed_one(change(database,
+                              "UPDATE jobs SET state = 'failed', message = ? "
+                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              message, id),
+                       id)
+        .map([&] { record_end(database, id); });
+  });
+}
+
+Status Store::set_job_done(std::int64_t id, const std::string& message) {
+  return connection_->in_transaction([&](SQLite::Database& database) { return end_job(database, id, "", 0, message); });
+}
+
+}  // namespace trammel

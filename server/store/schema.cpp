@@ -1,0 +1,157 @@
+#include "server/store/schema.h"
+
+#include "server/store/file_header.h"
+
+namespace trammel {
+namespace {
+
+constexpr const char* kSchema = R"sql(
+CREATE TABLE jobs (
+  id            INTEGER PRIMARY KEY AUTOINCREMENT,
+  cell          TEXT    NOT NULL,
+  level         TEXT    NOT NULL,
+  bias          TEXT    NOT NULL,
+  state         TEXT    NOT NULL CHECK (state IN ('queued', 'running', 'done', 'failed')),
+  message       TEXT    NOT NULL,
+  created_at    INTEGER NOT NULL,
+  model_version INTEGER NOT NULL DEFAULT 0,
+  attempts      INTEGER NOT NULL DEFAULT 0
+);
+CREATE INDEX jobs_unfinished ON jobs (id) WHERE state IN ('queued', 'running');
+
+CREATE TABLE batches (
+  number      INTEGER PRIMARY KEY AUTOINCREMENT,
+  cell        TEXT    NOT NULL,
+  id          TEXT    NOT NULL,
+  csv         TEXT    NOT NULL,
+  hash        TEXT    NOT NULL,
+  request_id  TEXT    NOT NULL,
+  accepted_at INTEGER NOT NULL,
+  poses       INTEGER NOT NULL,
+  job         INTEGER NOT NULL REFERENCES jobs (id),
+  UNIQUE (cell, id)
+);
+
+CREATE TABLE job_batches (
+  job      INTEGER NOT NULL REFERENCES jobs (id),
+  position INTEGER NOT NULL,
+  cell     TEXT    NOT NULL,
+  batch    TEXT    NOT NULL,
+  PRIMARY KEY (job, position),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
+) WITHOUT ROWID;
+
+CREATE TABLE models (
+  cell           TEXT    NOT NULL,
+  version        INTEGER NOT NULL,
+  id             TEXT    NOT NULL,
+  hash           TEXT    NOT NULL,
+  level          TEXT    NOT NULL,
+  batch_id       TEXT    NOT NULL,
+  created_at     INTEGER NOT NULL,
+  training_poses INTEGER NOT NULL,
+  validation_rms REAL    NOT NULL,
+  content        TEXT    NOT NULL,
+  PRIMARY KEY (cell, version)
+);
+
+-- What was in force, newest last, never changed afterwards. `back` is where a rollback from here leads.
+CREATE TABLE activations (
+  number       INTEGER PRIMARY KEY AUTOINCREMENT,
+  cell         TEXT    NOT NULL,
+  version      INTEGER NOT NULL,
+  back         INTEGER REFERENCES activations (number),
+  activated_at INTEGER NOT NULL,
+  FOREIGN KEY (cell, version) REFERENCES models (cell, version)
+);
+CREATE INDEX activations_by_cell ON activations (cell, number);
+)sql";
+
+/// What version 2 added to version 1.
+constexpr const char* kSchemaAdded = R"sql(
+ALTER TABLE jobs ADD COLUMN kind TEXT NOT NULL DEFAULT 'train' CHECK (kind IN ('train', 'diagnose'));
+ALTER TABLE batches ADD COLUMN quarantine TEXT NOT NULL DEFAULT '';
+
+CREATE TABLE diagnoses (
+  job      INTEGER PRIMARY KEY REFERENCES jobs (id),
+  csv      TEXT    NOT NULL,
+  apply    INTEGER NOT NULL,
+  findings TEXT    NOT NULL DEFAULT '',
+  page     TEXT    NOT NULL DEFAULT ''
+);
+)sql";
+
+/// Beside the tables of the schema, so that programs that do not know them can still open the file: when jobs began and
+/// ended, when models were trained and the newest of their measurements taken (Unix time, s; NULL = not recorded);
+/// which batches in quarantine a job may train from, and releases if its model goes in force.
+constexpr const char* kTimes = R"sql(
+CREATE TABLE IF NOT EXISTS job_times (
+  job         INTEGER PRIMARY KEY REFERENCES jobs (id),
+  started_at  INTEGER,
+  finished_at INTEGER
+);
+CREATE TABLE IF NOT EXISTS job_releases (
+  job   INTEGER NOT NULL REFERENCES jobs (id),
+  cell  TEXT    NOT NULL,
+  batch TEXT    NOT NULL,
+  PRIMARY KEY (job, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS model_times (
+  cell        TEXT    NOT NULL,
+  version     INTEGER NOT NULL,
+  trained_at  INTEGER NOT NULL,
+  measured_at INTEGER,
+  PRIMARY KEY (cell, version),
+  FOREIGN KEY (cell, version) REFERENCES models (cell, version)
+) WITHOUT ROWID;
+INSERT INTO model_times (cell, version, trained_at)
+  SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models
+  WHERE NOT EXISTS (SELECT 1 FROM model_times t WHERE t.cell = models.cell AND t.version = models.version)
+    AND json_valid(content) AND json_type(content, '$.stamp.trained_at') = 'integer';
+)sql";
+
+/// Ours, or empty and to be ours; nothing is changed here.
+Status check_owner(SQLite::Database& database, const std::string& path) {
+  const int application = database.execAndGet("PRAGMA application_id").getInt();
+  const int schema = database.execAndGet("PRAGMA user_version").getInt();
+  const bool empty = database.execAndGet("SELECT COUNT(*) FROM sqlite_master").getInt() == 0;
+  if (empty && application == 0 && schema == 0) return {};
+  if (application != kApplicationId) {
+    return refused("a database of another program (application id {:#x}, not {:#x})", application, kApplicationId)
+        .in(path);
+  }
+  if (schema > kSchemaVersion) {
+    return refused("schema {} is newer than this program's, limit {}", schema, kSchemaVersion)
+        .in(path)
+        .of("schema")
+        .beyond(schema, kSchemaVersion)
+        .next("start a newer one");
+  }
+  const std::string damage = database.execAndGet("PRAGMA quick_check(1)").getString();
+  if (damage != "ok") return failure(ErrorCode::kInternal, "damaged: {}", damage).in(path);
+  return {};
+}
+
+}  // namespace
+
+Status prepare_file(SQLite::Database& database, const std::string& path) {
+  if (auto owner = check_owner(database, path); !owner) return owner;
+  const std::string mode = database.execAndGet("PRAGMA journal_mode = WAL").getString();
+  if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
+  database.exec("PRAGMA synchronous = FULL");
+  database.exec("PRAGMA foreign_keys = ON");
+  const int schema = database.execAndGet("PRAGMA user_version").getInt();
+  SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
+  if (schema == 0) database.exec(kSchema);
+  if (schema < kSchemaVersion) {
+    database.exec(kSchemaAdded);
+    database.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
+    database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
+  }
+  database.exec(kTimes);
+  transaction.commit();
+  return {};
+}
+
+}  // namespace trammel

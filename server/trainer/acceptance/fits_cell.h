@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// Refuses a model that the cell cannot be served with: of another robot (its kinematics count, names and priors do
+/// not), or trained with tools or payloads that are not what the cell says they are. `which` names it.
+[[nodiscard]] Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const std::string& which);
+
+}  // namespace trammel

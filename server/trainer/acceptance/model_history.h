@@ -1,0 +1,84 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/mutex.h"
+#include "server/registry/model_registry.h"
+#include "server/store/store.h"
+#include "server/trainer/acceptance/gate.h"
+#include "server/trainer/served_cells.h"
+
+namespace trammel {
+
+/// A model that a job made, and what it is judged by.
+struct Candidate {
+  const CompensatedModel& model;
+  StoredJob job;
+  Bar bar = Bar::kBetter;
+  std::vector<JudgingSession> sessions;  ///< oldest first
+  std::string remarks;                   ///< go with the outcome
+};
+
+/// What became of it.
+struct Kept {
+  int version = 0;
+  bool in_force = false;
+  std::string message;  ///< the figures it was judged by, the limit and why
+};
+
+/// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
+///
+/// Thread-safe, set_listener() excepted. One change of what is in force at a time, cell by cell: a cell never waits for
+/// another one. Models are judged before the lock of their cell is taken, so that nobody waits for that either.
+class ModelHistory {
+ public:
+  /// A model was stored (in_force: and put in force). Called in the order of the changes of its cell, while no other of
+  /// that cell can happen: it must not call back into what changes models.
+  using Listener = std::function<void(const ServedModel&, bool in_force)>;
+
+  /// `store` and `registry` outlive it.
+  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry, double accept_ratio);
+
+  void set_listener(Listener listener) { listener_ = std::move(listener); }
+  /// Publishes the version that the store has in force, if any. Refuses one that does not load or fit the cell.
+  [[nodiscard]] Status publish_from_store(const std::string& cell);
+
+  /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
+  [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
+  /// Puts a stored version in force and publishes it.
+  [[nodiscard]] Status activate(const std::string& cell, int version);
+  /// Back to the version in force before, or the last one before it that can be served; returns it.
+  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
+  /// same model is there already. Refuses one of another cell, robot or tool.
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
+
+  /// Stores the model, ends its job and, if judge() says so, puts it in force. What the job may release leaves
+  /// quarantine where the model goes in force, and where too few poses can judge it.
+  [[nodiscard]] Result<Kept> keep(const Candidate& candidate);
+
+ private:
+  [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
+  /// Of a model that the store has put in force; the cell's lock is held.
+  void put_in_force(ServedModel model);
+  /// Of the candidate against `present`; null: none in force.
+  [[nodiscard]] Result<GateVerdict> verdict(const Candidate& candidate, const ServedModel* present) const;
+  /// The last versions that served the cell before the one in force, as far as they load.
+  [[nodiscard]] Result<std::vector<ServedModel>> served_before(const std::string& cell) const;
+  /// The version marked in force, where it could not be loaded.
+  [[nodiscard]] Result<std::optional<StoredModel>> record_not_loaded(const std::string& cell) const;
+
+  const ServedCells cells_;
+  Store& store_;
+  ModelRegistry& registry_;
+  const double accept_ratio_;
+  Listener listener_;
+  std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
+};
+
+}  // namespace trammel

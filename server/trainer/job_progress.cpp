@@ -1,0 +1,53 @@
+#include "server/trainer/job_progress.h"
+
+namespace trammel {
+
+namespace {
+
+JobStage stage_of(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return JobStage::kQueued;
+    case JobState::kRunning:
+      return JobStage::kTraining;
+    case JobState::kDone:
+      return JobStage::kDone;
+    case JobState::kFailed:
+      return JobStage::kFailed;
+  }
+  return JobStage::kFailed;
+}
+
+}  // namespace
+
+JobProgress progress_of(const StoredJob& job) {
+  JobProgress progress;
+  progress.job = job.id;
+  progress.cell = job.cell;
+  progress.stage = stage_of(job.state);
+  progress.what = job.message;
+  progress.share = job.state == JobState::kDone ? 1 : 0;
+  progress.model_version = job.model_version;
+  return progress;
+}
+
+void ProgressBook::report(const JobProgress& progress) {
+  {
+    const MutexLock lock(mutex_);
+    const bool finished = progress.stage == JobStage::kDone || progress.stage == JobStage::kFailed;
+    if (finished) {
+      unfinished_.erase(progress.job);
+    } else {
+      unfinished_[progress.job] = progress;
+    }
+  }
+  if (listener_) listener_(progress);
+}
+
+std::optional<JobProgress> ProgressBook::find(std::int64_t job) const {
+  const MutexLock lock(mutex_);
+  const auto found = unfinished_.find(job);
+  return found == unfinished_.end() ? std::nullopt : std::optional(found->second);
+}
+
+}  // namespace trammel

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "server/base/mutex.h"
+#include "server/store/store.h"
+
+namespace trammel {
+
+enum class JobStage { kQueued, kTraining, kStoring, kDone, kFailed };
+
+/// What a watcher sees of one job.
+struct JobProgress {
+  std::int64_t job = 0;
+  std::string cell;
+  JobStage stage = JobStage::kQueued;
+  std::string what;       ///< `geometry, iteration 4`, or the outcome
+  double share = 0;       ///< [0, 1]
+  int model_version = 0;  ///< once done
+  bool in_force = false;
+};
+
+/// As the store has it; `in_force` is left false.
+[[nodiscard]] JobProgress progress_of(const StoredJob& job);
+
+/// How far the unfinished jobs are. Thread-safe, set_listener() excepted.
+class ProgressBook {
+ public:
+  /// Called by whichever thread changes the job, without a lock.
+  using Listener = std::function<void(const JobProgress&)>;
+
+  void set_listener(Listener listener) { listener_ = std::move(listener); }
+  /// Tells the listener; a job that is over is forgotten.
+  void report(const JobProgress& progress);
+  /// Empty where the job is over or unknown.
+  [[nodiscard]] std::optional<JobProgress> find(std::int64_t job) const;
+
+ private:
+  Listener listener_;
+  mutable Mutex mutex_;
+  std::map<std::int64_t, JobProgress> unfinished_ TRAMMEL_GUARDED_BY(mutex_);
+};
+
+}  // namespace trammel

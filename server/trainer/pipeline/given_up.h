@@ -1,0 +1,10 @@
+#pragma once
+
+#include "server/base/result.h"
+
+namespace trammel {
+
+/// Of a training whose progress was answered with false.
+[[nodiscard]] inline Failure given_up() { return failure(ErrorCode::kBusy, "training given up on request"); }
+
+}  // namespace trammel

@@ -1,0 +1,117 @@
+// What the README tells somebody new to type does what it says.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// The blocks of commands (lines that are indented by four blanks) below `heading` of the README.
+std::vector<std::vector<std::string>> commands_below(const std::string& heading) {
+  std::ifstream readme(fs::path(TRAMMEL_SOURCE_DIR) / "README.md");
+  std::vector<std::vector<std::string>> blocks;
+  bool here = false, in_block = false;
+  for (std::string line; std::getline(readme, line);) {
+    if (line.starts_with("## ")) here = line == "## " + heading;
+    const bool command = here && line.starts_with("    ");
+    if (command && !in_block) blocks.emplace_back();
+    if (command) blocks.back().push_back(line.substr(4));
+    in_block = command;
+  }
+  return blocks;
+}
+
+/// A clone whose release build is the build under test.
+fs::path built_clone(const test::TemporaryFolder& folder) {
+  const fs::path clone = folder.path() / "trammel";
+  fs::create_directories(clone / "build");
+  for (const char* shipped : {"config", "models"}) {
+    fs::create_directory_symlink(fs::path(TRAMMEL_SOURCE_DIR) / shipped, clone / shipped);
+  }
+  fs::create_directory_symlink(TRAMMEL_BINARY_DIR, clone / "build/release");
+  return clone;
+}
+
+TEST(Readme, TheFiveLinesRunAsTheyStandOnABuiltClone) {
+  const auto blocks = commands_below("Try it");
+  ASSERT_EQ(blocks.size(), 2U) << "how to build, and the five lines";
+  ASSERT_EQ(blocks[1].size(), 5U);
+  const test::TemporaryFolder folder;
+  const fs::path clone = built_clone(folder);
+  std::string script = "set -euo pipefail\ncd '" + clone.string() + "'\n";
+  for (const std::string& line : blocks[1]) script += line + "\n";
+  const test::Finished run = test::run({"/bin/bash", "-c", script}, std::chrono::minutes(4));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string corrected = text_of(clone / "build/corrected.csv");
+  std::istringstream lines(corrected);
+  int holes = 0;
+  for (std::string line; std::getline(lines, line);) holes += line.find(",ok,") != std::string::npos ? 1 : 0;
+  EXPECT_EQ(holes, 35) << corrected;
+}
+
+TEST(Readme, TheLinesThatBuildNameAScriptAndAPresetThatAreThere) {
+  const auto blocks = commands_below("Try it");
+  ASSERT_FALSE(blocks.empty());
+  const auto presets = nlohmann::json::parse(text_of(fs::path(TRAMMEL_SOURCE_DIR) / "CMakePresets.json"));
+  for (const std::string& line : blocks[0]) {
+    const std::string workflow = "cmake --workflow --preset ";
+    if (!line.starts_with(workflow)) {
+      EXPECT_TRUE(fs::exists(fs::path(TRAMMEL_SOURCE_DIR) / line)) << line;
+      continue;
+    }
+    const auto& known = presets.at("workflowPresets");
+    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const auto& preset) {
+      return preset.at("name") == line.substr(workflow.size());
+    })) << line;
+  }
+}
+
+/// Every file that a page of the project links to or names as a place to look.
+TEST(Readme, EveryLinkOfEveryPageLeadsToAFile) {
+  const fs::path root = TRAMMEL_SOURCE_DIR;
+  std::vector<fs::path> pages;
+  for (const fs::path& entry : {root, root / "server", root / "idl", root / "config", root / "models", root / "tests",
+                                root / "clients", root / "deploy"}) {
+    if (!fs::exists(entry)) continue;
+    if (entry == root) {
+      for (const auto& file : fs::directory_iterator(root)) {
+        if (file.path().extension() == ".md") pages.push_back(file.path());
+      }
+      continue;
+    }
+    for (const auto& file : fs::recursive_directory_iterator(entry)) {
+      if (file.path().extension() == ".md") pages.push_back(file.path());
+    }
+  }
+  ASSERT_GE(pages.size(), 10U);
+  for (const fs::path& page : pages) {
+    const std::string text = text_of(page);
+    for (auto at = text.find("]("); at != std::string::npos; at = text.find("](", at + 1)) {
+      std::string target = text.substr(at + 2, text.find(')', at) - at - 2);
+      target = target.substr(0, target.find('#'));
+      if (target.empty() || target.starts_with("http")) continue;
+      EXPECT_TRUE(fs::exists(page.parent_path() / target)) << page << ": " << target;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trammel
