@@ -23,7 +23,7 @@ TEST(DiagnoseText, TellsTheVerdictTheDoubtAndWhatToDo) {
 TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   diagnosis.findings[0].may_begin_at = {{"p7", 8, 120.0}, {"p8", 9, {}}};
-  const Cause payload = {"payload", -1, "", "", {}};
+  const Cause payload = {"payload"};
   diagnosis.not_separable = {{{payload, {"compliance", -1, "C2", "", {}}}, 1},
                              {{payload, {"compliance", -1, "C3", "", {}}}, 1}};
   diagnosis.could_not_have_seen.push_back({payload, 0.9, 1e-5, {}, "a second known payload"});

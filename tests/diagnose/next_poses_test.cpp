@@ -63,8 +63,8 @@ SearchResult in_doubt(const std::shared_ptr<const Cell>& cell) {
   found.all = test::demand(check_against_cell(test::demand(simulate(robot, narrow(*cell), {})), *cell)).rows();
   found.batch = found.all;
   Accepted one;
-  one.cause = {"encoder_eccentricity", 1, "", "", {}};
-  one.could_also_be = {{"tool", -1, "", "", {}}};
+  one.cause = {"encoder_eccentricity", 1};
+  one.could_also_be = {{"tool"}};
   found.accepted = {one};
   return found;
 }

@@ -13,9 +13,9 @@ Finding found(const Cause& cause, std::vector<Cause> could_also_be = {}) {
   return finding;
 }
 
-const Cause kDrift = {"tracker_drift", -1, "", "", {}};
-const Cause kWarm = {"thermal_growth", -1, "", "", {}};
-const Cause kBacklash = {"backlash", 1, "", "", {}};
+const Cause kDrift = {"tracker_drift"};
+const Cause kWarm = {"thermal_growth"};
+const Cause kBacklash = {"backlash", 1};
 const Cause kPose6 = {"outlier", -1, "", "6", {}};
 const Cause kPose9 = {"outlier", -1, "", "9", {}};
 
@@ -73,7 +73,7 @@ TEST(Wording, KnowsWhatWasLookedForByTheOrderOfThePoses) {
   const Unseen growth = {kWarm, 0, {}, {}, "temperatures"};
   EXPECT_TRUE(is_looked_for_by_order(growth, with_temperatures(false)));
   EXPECT_FALSE(is_looked_for_by_order(growth, with_temperatures(true))) << "recorded, but constant: not looked for";
-  EXPECT_FALSE(is_looked_for_by_order({{"payload", -1, "", "", {}}, 0, {}, {}, "a payload"}, with_temperatures(false)));
+  EXPECT_FALSE(is_looked_for_by_order({{"payload"}, 0, {}, {}, "a payload"}, with_temperatures(false)));
   EXPECT_FALSE(is_looked_for_by_order({kWarm, 0.5, 1e-5, {}, ""}, with_temperatures(false))) << "it could be seen";
 }
 

@@ -109,11 +109,10 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
   add_residuals(diagnosis, *cell);
   diagnosis.findings = made_up_findings(diagnosis);
   diagnosis.unexplained = {true, {"q4"}, 9e-6, 0.004};
-  diagnosis.not_separable = {{{{"tool", -1, "", "", {}}, {"geometry", -1, "d6", "", {}}}, 0.998}};
-  diagnosis.could_not_have_seen = {
-      {{"thermal_growth", -1, "", "", {}}, 0.12, 44e-6, 90e-6, "a wider range of temperature"},
-      {{"backlash", 1, "", "", {}}, 0, {}, {}, "both approach directions"},
-      {{"joint_slip", 3, "", "", {}}, 0.8, 12e-6, 16e-6, ""}};
+  diagnosis.not_separable = {{{{"tool"}, {"geometry", -1, "d6", "", {}}}, 0.998}};
+  diagnosis.could_not_have_seen = {{{"thermal_growth"}, 0.12, 44e-6, 90e-6, "a wider range of temperature"},
+                                   {{"backlash", 1}, 0, {}, {}, "both approach directions"},
+                                   {{"joint_slip", 3}, 0.8, 12e-6, 16e-6, ""}};
   diagnosis.suspects = {{"p28", 29, 310e-6, "single pose, cause not separable: repeat it and its neighbours"}};
   for (Eigen::Index i = 0; i < 10; ++i) {
     diagnosis.next_poses.q.push_back(diagnosis.batch.measurements[static_cast<std::size_t>(3 * i)].context.q);
@@ -133,8 +132,8 @@ inline Diagnosis made_up_diagnosis(const std::shared_ptr<const Cell>& cell) {
                          {"tool", diagnosis.after.rms},
                          {"noise of one measurement", 22e-6}};
   diagnosis.recovery = {
-      {{"gear_transmission", 2, "", "", {}}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .4, .9, 1)},
-      {{"backlash", 1, "", "", {}}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .1, .7, .95)}};
+      {{"gear_transmission", 2}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .4, .9, 1)},
+      {{"backlash", 1}, Eigen::Vector4d(5e-6, 10e-6, 20e-6, 40e-6), Eigen::Vector4d(0, .1, .7, .95)}};
   diagnosis.sources_before = {"base", "geometry", "compliance"};
   diagnosis.sources_after = {"base", "geometry", "compliance", "gear_transmission:3@48.5"};
   diagnosis.batch_hash = std::string(64, 'a');

@@ -120,9 +120,9 @@ TEST_F(DiagnosisPage, TitlesAPeriodogramByWhatWasFoundOfThatJoint) {
   // Joint 3's oscillation leaks into what is seen of joint 2.
   diagnosis_.periodograms[1].strength = diagnosis_.periodograms[2].strength;
   diagnosis_.findings.emplace_back().cause = {"gear_transmission", 2, "", "", 97.0};
-  diagnosis_.findings.emplace_back().cause = {"joint_map", 2, "", "", {}};
-  diagnosis_.findings.emplace_back().cause = {"encoder_eccentricity", 4, "", "", {}};
-  diagnosis_.findings.emplace_back().cause = {"backlash", 5, "", "", {}};
+  diagnosis_.findings.emplace_back().cause = {"joint_map", 2};
+  diagnosis_.findings.emplace_back().cause = {"encoder_eccentricity", 4};
+  diagnosis_.findings.emplace_back().cause = {"backlash", 5};
   const auto charts = diagnosis_charts(diagnosis_, *cell_);
   const auto title = [&](std::size_t k) { return charts.at("periodograms").at(k).at("title").get<std::string>(); };
   EXPECT_EQ(title(1), "joint 2: no oscillation found");
