@@ -1,5 +1,7 @@
 #include "server/compensate/paired_gain.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
