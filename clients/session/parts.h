@@ -26,6 +26,8 @@ class PartSize {
     const double fits = std::min(rate * wanted_.count(), static_cast<double>(kGrowth * next_));
     next_ = std::clamp(static_cast<std::size_t>(fits), std::size_t{1}, most_);
   }
+  /// No answer came in time to a part of so many items: its items take longer than those before.
+  void timed_out(std::size_t items) { next_ = std::max(std::size_t{1}, items / kGrowth); }
 
  private:
   static constexpr std::size_t kFirst = 16;
@@ -41,12 +43,14 @@ template <typename Item>
 using AskPart = std::function<Result<Answer<Item>>(std::size_t first, std::size_t count)>;
 
 /// The answers to `items` items, all from one model. If the model changes between two parts, all items are asked again.
-/// kBusy: it changed again and again. `progress` may be empty; `now` is the clock.
+/// A part that is not answered in time is asked again in smaller ones, a few times. kBusy: the model changed again and
+/// again. `progress` may be empty; `now` is the clock.
 template <typename Item>
 [[nodiscard]] Result<Answer<Item>> ask_in_parts(std::size_t items, const std::string& cell, PartSize size,
                                                 const AskPart<Item>& ask, const std::function<void(double)>& progress,
                                                 const std::function<PartSize::Seconds()>& now) {
   constexpr int kAttempts = 5;
+  int smaller_parts_left = 3;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     Answer<Item> answer;
     bool one_model = true;
@@ -56,7 +60,12 @@ template <typename Item>
       const std::size_t count = std::min(size.next(), items - done);
       const PartSize::Seconds begun = now();
       auto part = ask(done, count);
-      if (!part && (done == 0 || part.error().code == ErrorCode::kUnreachable)) return part;
+      const bool too_late = !part && part.error().code == ErrorCode::kUnreachable;
+      if (too_late && done > 0 && count > 1 && smaller_parts_left-- > 0) {
+        size.timed_out(count);
+        continue;
+      }
+      if (!part && (done == 0 || too_late)) return part;
       if (!part) return Failure(part.error()).in(fmt::format("after the first {}", done));
       size.took(count, now() - begun);
       one_model = done == 0 || (part->model.hash == answer.model.hash && part->model.version == answer.model.version);

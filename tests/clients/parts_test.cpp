@@ -85,6 +85,35 @@ TEST(Parts, ARefusalInTheMiddleSaysHowFarItCameAndHandsOutNothing) {
   EXPECT_NE(sentence(answer.error()).find("after the first"), std::string::npos) << sentence(answer.error());
 }
 
+TEST(Parts, AProgramWhoseLaterTargetsTakeFarLongerIsAnsweredAllTheSame) {
+  constexpr double kTimeout = 5;
+  Service service;
+  const auto answer = service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+    const std::size_t slow = first + count > 1200 ? first + count - std::max<std::size_t>(first, 1200) : 0;
+    const double takes = 0.0002 * static_cast<double>(count - slow) + 0.004 * static_cast<double>(slow);
+    service.per_item = Seconds(takes / static_cast<double>(count));
+    if (takes < kTimeout) return service.answer(first, count);
+    service.clock += Seconds(kTimeout);
+    return failure(ErrorCode::kUnreachable, "no answer in time");
+  });
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  ASSERT_EQ(answer->items.size(), 5000U);
+  for (int i = 0; i < 5000; ++i) EXPECT_EQ(answer->items[static_cast<std::size_t>(i)], 100000 + i);
+}
+
+TEST(Parts, AServiceThatIsGoneIsNotAskedForEver) {
+  Service service;
+  int asked = 0;
+  const auto answer = service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+    ++asked;
+    if (first == 0) return service.answer(first, count);
+    return failure(ErrorCode::kUnreachable, "no answer in time");
+  });
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::kUnreachable);
+  EXPECT_LE(asked, 5);
+}
+
 TEST(Parts, AnEmptyListIsAskedOnce) {
   Service service;
   ASSERT_TRUE(service.ask(0));
