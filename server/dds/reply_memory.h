@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
-#include <unordered_set>
 #include <utility>
 
 #include "server/base/mutex.h"
@@ -42,7 +41,8 @@ class ReplyMemory {
   std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
-/// The requests that are being answered now. A repeat that arrives meanwhile is recognised here. Thread-safe.
+/// The requests that are being answered, so that a repeat is not carried out beside them: it gets the same answer once
+/// more. Thread-safe.
 class UnderWay {
  public:
   /// One request while it is being answered.
@@ -55,8 +55,10 @@ class UnderWay {
     }
     Piece(const Piece&) = delete;
     Piece& operator=(const Piece&) = delete;
-    /// False: it is being answered already.
+    /// False: it is being answered already, and will be once more for this repeat.
     [[nodiscard]] bool is_first() const { return is_first_; }
+    /// Of the first: whether a repeat has come that has no answer yet; it counts as answered then. False is the end.
+    [[nodiscard]] bool has_repeat() { return all_.take_repeat(request_); }
 
    private:
     UnderWay& all_;
@@ -67,15 +69,25 @@ class UnderWay {
  private:
   [[nodiscard]] bool begin(const std::string& request) {
     const MutexLock lock(mutex_);
-    return requests_.insert(request).second;
+    const auto [entry, is_first] = repeats_.try_emplace(request, 0);
+    if (!is_first) ++entry->second;
+    return is_first;
+  }
+  [[nodiscard]] bool take_repeat(const std::string& request) {
+    const MutexLock lock(mutex_);
+    const auto entry = repeats_.find(request);
+    if (entry == repeats_.end()) return false;
+    if (entry->second-- > 0) return true;
+    repeats_.erase(entry);
+    return false;
   }
   void end(const std::string& request) {
     const MutexLock lock(mutex_);
-    requests_.erase(request);
+    repeats_.erase(request);
   }
 
   Mutex mutex_;
-  std::unordered_set<std::string> requests_ TRAMMEL_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, int> repeats_ TRAMMEL_GUARDED_BY(mutex_);  // by request
 };
 
 }  // namespace trammel

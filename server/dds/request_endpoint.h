@@ -179,8 +179,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     const std::string sent = wire::participant_of(writer) +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request.header().request_id());
-    const UnderWay::Piece piece_of_work(under_way_, sent);
-    if (!piece_of_work.is_first()) return;  // a repeat: its reply is on the way
+    UnderWay::Piece answering(under_way_, sent);
+    if (!answering.is_first()) return;
     std::optional<Reply> known = lately_.find(sent);
     Reply reply =
         known ? std::move(*known) : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
@@ -188,9 +188,10 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     ++core_.requests;
     if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
     const WorkUnderWay::Piece piece = core_.replying.begin();
-    if (!core_.channels.send(request.header().reply_partition().to_string(), reply_topic_, &reply, stop)) {
-      ++core_.unheard;
-    }
+    const std::string partition = request.header().reply_partition().to_string();
+    do {
+      if (!core_.channels.send(partition, reply_topic_, &reply, stop)) ++core_.unheard;
+    } while (answering.has_repeat());
   }
 
   ServiceCore& core_;

@@ -468,6 +468,22 @@ TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
   EXPECT_NE(reply_to(request, handlers_, memory, "server-a").job(), first.job());
 }
 
+TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {
+  UnderWay under_way;
+  {
+    UnderWay::Piece first(under_way, "a"), other(under_way, "b");
+    EXPECT_TRUE(first.is_first());
+    EXPECT_TRUE(other.is_first());
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(UnderWay::Piece(under_way, "a").is_first());
+    EXPECT_TRUE(first.has_repeat());
+    EXPECT_TRUE(first.has_repeat());
+    EXPECT_FALSE(other.has_repeat());
+    EXPECT_FALSE(first.has_repeat());
+    EXPECT_TRUE(UnderWay::Piece(under_way, "a").is_first()) << "it is answered: another one begins anew";
+  }
+  EXPECT_TRUE(UnderWay::Piece(under_way, "b").is_first());
+}
+
 TEST(ReplyMemory, ForgetsTheOldest) {
   ReplyMemory<int> memory(2);
   memory.remember("a", 1);
