@@ -218,7 +218,12 @@ TEST(HiddenStep, IsFoundWhereTheTimesSayButNotAppliedByARowWhenTheRowsAreInAnoth
 std::vector<Cause> doubts(const Cause& cause, double effect_rms, const std::vector<Cause>& found,
                           double unexplained_rms) {
   const Unexplained unexplained{unexplained_rms > 0, {"q2"}, unexplained_rms, 1e-6};
-  return cause_search::judge(cause, effect_rms, {}, {found, unexplained, {}, {}}).could_also_be;
+  MeasurementBatch recorded = test::measured(test::chapter_5_robot(test::cell_7()), 20, 1);
+  for (Measurement& m : recorded.measurements) {
+    m.context.time = m.context.index;
+    m.context.temperature = 20;
+  }
+  return cause_search::judge(cause, effect_rms, {}, {found, unexplained, {}, recorded}).could_also_be;
 }
 
 TEST(Doubt, IsCastOnASmallEffectBesideSomethingUnknownThatIsManyTimesLarger) {
