@@ -103,6 +103,20 @@ bool RawParticipant::meet(std::chrono::milliseconds limit) {
   return met;
 }
 
+bool RawParticipant::become_writer(std::uint32_t entity, std::chrono::milliseconds limit) const {
+  const PacketBytes list = endpoint(entity, "Topic", "Type").payload();
+  send_to(port_, packet().data({kPublicationsReader, kPublicationsId, 1, {}, list}).bytes());
+  PacketBytes own;
+  put_entity(own, entity);
+  return wait_for(
+      [&](const PacketBytes& message) {
+        return any_submessage(message, [&](unsigned char id, unsigned char, const PacketBytes& body) {
+          return id == 0x06 && body.size() > 8 && std::equal(own.begin(), own.end(), body.begin() + 4);
+        });
+      },
+      limit);
+}
+
 void RawParticipant::send(const PacketBytes& message) const {
   send_to(port_, message);
   if (data_port_ != 0) send_to(data_port_, message);

@@ -36,6 +36,8 @@ class RawParticipant {
   [[nodiscard]] ParameterList endpoint(std::uint32_t entity, const std::string& topic, const std::string& type) const;
   /// Announces itself until the other one's announcement comes, at most `limit`.
   [[nodiscard]] bool meet(std::chrono::milliseconds limit);
+  /// Becomes a writer of "Topic" of "Type" that a reader of the other one knows; after meet().
+  [[nodiscard]] bool become_writer(std::uint32_t entity, std::chrono::milliseconds limit) const;
   /// Sends a message to where announcements go, and to where data goes if that is known.
   void send(const PacketBytes& message) const;
   void send_data(const PacketBytes& message) const;

@@ -46,7 +46,7 @@ ParameterList& ParameterList::locator(std::uint16_t id, std::uint16_t port) {
   put32(bytes, 1);
   put32(bytes, port);
   bytes.resize(bytes.size() + 12);
-  put_bytes(bytes, {127, 0, 0, 1});
+  put32(bytes, 0x0100007f);
   return add(id, bytes);
 }
 PacketBytes ParameterList::bytes() const {
@@ -55,13 +55,17 @@ PacketBytes ParameterList::bytes() const {
   return bytes;
 }
 PacketBytes ParameterList::payload() const {
-  PacketBytes bytes = {0, 3, 0, 0};
+  PacketBytes bytes;
+  put32(bytes, 0x00000300);
   put_bytes(bytes, this->bytes());
   return bytes;
 }
 
-Packet::Packet(const Prefix& from) : bytes_{'R', 'T', 'P', 'S', 2, 3, 1, 15} {
-  bytes_.insert(bytes_.end(), from.begin(), from.end());
+Packet::Packet(const Prefix& from) {
+  bytes_.reserve(512);
+  for (const char byte : {'R', 'T', 'P', 'S'}) bytes_.push_back(static_cast<unsigned char>(byte));
+  for (const int byte : {2, 3, 1, 15}) bytes_.push_back(static_cast<unsigned char>(byte));
+  for (const unsigned char byte : from) bytes_.push_back(byte);
 }
 Packet& Packet::submessage(unsigned char id, unsigned char flags, const PacketBytes& body) {
   bytes_.push_back(id);
