@@ -61,7 +61,11 @@ void kill_one_after_another(const KillLoad& load, int killed) {
   for (int begun = 0; begun < load.kills || !living.empty();) {
     while (begun < load.kills && living.size() < static_cast<std::size_t>(load.at_once)) {
       const auto life = std::chrono::milliseconds(30 + random() % 570);
-      living.push_back({fork_child([&] { call_for_ever(load.server); }), Clock::now() + life});
+      living.push_back({fork_child([&] {
+                          ::close(killed);
+                          call_for_ever(load.server);
+                        }),
+                        Clock::now() + life});
       ++begun;
     }
     const auto first = std::min_element(living.begin(), living.end(),
@@ -111,7 +115,10 @@ KillOutcome kill_clients(const KillLoad& load) {
   KillOutcome outcome;
   int ends[2];
   if (::pipe(ends) != 0) return outcome;
-  const pid_t idle = fork_child([&] { be_idle(load.server, load.idle); });
+  const pid_t idle = fork_child([&] {
+    ::close(ends[1]);  // whose end is the end of the killing
+    be_idle(load.server, load.idle);
+  });
   const pid_t killer = fork_child([&] { kill_one_after_another(load, ends[1]); });
   ::close(ends[1]);
   Honest honest;
