@@ -65,24 +65,28 @@ class Trainer {
   /// and what the model in force has besides. Refuses batches that stay in quarantine.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
-                                             Quarantine quarantine = Quarantine::kStays);
+                                             Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});
   /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of the model in force
   /// (of the cell, where there is none) do not explain. With `apply` trains the causes found beside them and puts the
   /// model in force only if it is better on the rows held out beyond chance. Returns the job; its findings are
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
-                                              const std::string& csv, bool apply);
+                                              const std::string& csv, bool apply, const ChangeId& id = {});
   /// Of a job whose diagnosis is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
-  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
-  [[nodiscard]] Status activate(const std::string& cell, int version) { return history_.activate(cell, version); }
-  [[nodiscard]] Result<int> rollback(const std::string& cell) { return history_.rollback(cell); }
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) {
-    return history_.import_model(cell, text);
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {}) {
+    return history_.activate(cell, version, request);
+  }
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
+    return history_.rollback(cell, request);
+  }
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
+    return history_.import_model(cell, text, id);
   }
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
@@ -102,6 +106,8 @@ class Trainer {
 
  private:
   [[nodiscard]] Status check_room() const;
+  /// The job that was queued under this id before; empty: none.
+  [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
   void enqueue(const StoredJob& job, std::optional<CheckedBatch> batch);
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
