@@ -46,9 +46,26 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const StoredModel
   }
   const double rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
   if (record.validation_rms == 0 || rms <= accept_ratio * record.validation_rms) return otherwise;
-  return {false, fmt::format("not in force: held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its "
-                             "own, which is marked in force but cannot be loaded; activate it if it is wanted",
-                             to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version)};
+  const std::string why = fmt::format(
+      "held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its own, which is marked in force but "
+      "cannot "
+      "be loaded",
+      to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version);
+  const double limit = accept_ratio * record.validation_rms;
+  return {false, "not in force: " + why + "; activate it if it is wanted", false, why, {{}, rms, limit}};
+}
+
+JobOutcome outcome_of(const GateVerdict& verdict) {
+  JobOutcome outcome;
+  outcome.verdict = verdict.put_in_force ? JobVerdict::kInForce
+                    : verdict.undecided  ? JobVerdict::kUndecided
+                                         : JobVerdict::kNotBetter;
+  outcome.before = verdict.figures.before;
+  outcome.after = verdict.figures.after;
+  outcome.limit = verdict.figures.limit;
+  outcome.why = verdict.why;
+  if (!verdict.put_in_force) outcome.next = "activate it if it is wanted";
+  return outcome;
 }
 
 }  // namespace
@@ -145,8 +162,9 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate) {
       message += fmt::format("; what was in quarantine of {} stays there", fmt::join(candidate.job.batch_ids, ", "));
     const MutexLock lock(changes_of(cell));
     if (registry_.in_force(cell) != present) continue;
+    JobOutcome outcome = outcome_of(*verdict);
     const auto version =
-        store_.add_model(cell, candidate.model, candidate.job.id, verdict->put_in_force, message, released);
+        store_.add_model(cell, candidate.model, candidate.job.id, verdict->put_in_force, message, released, outcome);
     if (!version) return tl::make_unexpected(version.error());
     ServedModel served{cell, *version, candidate.model};
     if (verdict->put_in_force) {
@@ -154,7 +172,7 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate) {
     } else if (listener_) {
       listener_(served, false);
     }
-    return Kept{*version, verdict->put_in_force, std::move(message)};
+    return Kept{*version, verdict->put_in_force, std::move(message), std::move(outcome)};
   }
 }
 

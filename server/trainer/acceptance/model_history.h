@@ -29,6 +29,7 @@ struct Kept {
   int version = 0;
   bool in_force = false;
   std::string message;  ///< the figures it was judged by, the limit and why
+  JobOutcome outcome;   ///< the same as data
 };
 
 /// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
