@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/base/unix_time.h"
+#include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
@@ -177,15 +178,27 @@ Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& j
   return read_job(database, id);
 }
 
+/// Queues the job that `insert` makes, or returns the one that was queued under this id before.
+template <typename Insert>
+Result<StoredJob> queue_once(SQLite::Database& database, const ChangeId& change_id, const Insert& insert) {
+  const auto queued = once(database, change_id, [&] {
+    return insert().map([](const StoredJob& made) { return ChangeOutcome{0, made.id}; });
+  });
+  if (!queued) return tl::make_unexpected(queued.error());
+  return read_job(database, queued->job);
+}
+
 }  // namespace
 
-Result<StoredJob> Store::add_job(const StoredJob& job, bool release) {
+Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    Result<StoredJob> queued = insert_job_over(database, job);
-    if (!queued || !release) return queued;
-    for (const std::string& id : job.batch_ids)
-      change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
-    return queued;
+    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+      Result<StoredJob> queued = insert_job_over(database, job);
+      if (!queued || !release) return queued;
+      for (const std::string& id : job.batch_ids)
+        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
+      return queued;
+    });
   });
 }
 
@@ -198,14 +211,17 @@ Result<bool> Store::may_release(std::int64_t job) const {
   });
 }
 
-Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis) {
+Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
+                                       const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    Result<StoredJob> queued = insert_job_over(database, job);
-    if (queued) {
-      change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
-             diagnosis.apply ? 1 : 0);
-    }
-    return queued;
+    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+      Result<StoredJob> queued = insert_job_over(database, job);
+      if (queued) {
+        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
+               diagnosis.apply ? 1 : 0);
+      }
+      return queued;
+    });
   });
 }
 

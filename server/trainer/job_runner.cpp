@@ -118,7 +118,7 @@ Status JobRunner::attempt_training(const StoredJob& job, JobBatches& batches, co
   if (!sessions) return tl::make_unexpected(sessions.error());
   const std::string seen = looked_at->empty() ? "" : "the batch: " + *looked_at;
   return keep(
-      {successor->model, job, Bar::kBetter, std::move(*sessions), joined_by_semicolons({seen, successor->note})});
+      {successor->model, job, Bar::kBetter, std::move(*sessions), joined_by_semicolons({seen, successor->note})}, stop);
 }
 
 Status JobRunner::attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply, const StopRequests& stop) {
@@ -165,7 +165,8 @@ Status JobRunner::apply(const StoredJob& job, JobBatches& batches, const Checked
   Judges judges = judges_of(diagnosis, std::move(own_judges));
   own_judges = std::move(judges.batch);
   return keep({extended->model, job, Bar::kBetterBeyondChance, std::move(found->sessions),
-               judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)})});
+               judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)})},
+              stop);
 }
 
 Result<std::string> JobRunner::hold_against_model_in_force(const StoredJob& job, JobBatches& batches) {
@@ -217,9 +218,9 @@ TrainOptions JobRunner::train_options(const StoredJob& job, const StopRequests& 
   return options;
 }
 
-Status JobRunner::keep(Candidate candidate) {
+Status JobRunner::keep(Candidate candidate, const StopRequests& stop) {
   candidate.remarks += joined_by_semicolons(warnings_of(candidate.model, candidate.model.parts().validation));
-  const auto kept = history_.keep(candidate);
+  const auto kept = history_.keep(candidate, stop.service);
   if (!kept) return tl::make_unexpected(kept.error());
   JobProgress progress = progress_at(candidate.job, JobStage::kDone);
   progress.what = kept->message;

@@ -56,7 +56,7 @@ class JobRunner {
   /// besides.
   [[nodiscard]] TrainOptions train_options(const StoredJob& job, const StopRequests& stop);
   /// Stores the candidate's model, in force if it is better, and reports the end of its job.
-  [[nodiscard]] Status keep(Candidate candidate);
+  [[nodiscard]] Status keep(Candidate candidate, const StopRequests& stop);
   void report_storing(const StoredJob& job);
   /// Ends a job that makes no model.
   [[nodiscard]] Status finish(const StoredJob& job, const std::string& message, const JobOutcome& outcome);

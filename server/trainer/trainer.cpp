@@ -149,7 +149,7 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 }
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
-                                       const std::string& csv, bool apply) {
+                                       const std::string& csv, bool apply, const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
@@ -173,8 +173,11 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     }
   }
   const MutexLock lock(submit_mutex_);
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
   if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""});
+  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
   enqueue(*accepted, true);
   return accepted->id;
@@ -194,7 +197,8 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
 }
 
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
-                                      const std::string& level, const std::string& bias, Quarantine quarantine) {
+                                      const std::string& level, const std::string& bias, Quarantine quarantine,
+                                      const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
@@ -215,8 +219,11 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
   if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_job(job, release);
+  const auto accepted = store_.add_job(job, release, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
   enqueue(*accepted, true);
   return accepted->id;
@@ -265,9 +272,9 @@ Status Trainer::cancel(std::int64_t id) {
   return {};
 }
 
-Status Trainer::release(const std::string& cell_name, const std::string& batch_id) {
+Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
   if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
-  return store_.set_quarantine(cell_name, batch_id, "");
+  return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
@@ -314,6 +321,11 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
 }
 
 int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }
+
+Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) const {
+  return store_.outcome_of(id).map(
+      [](const std::optional<ChangeOutcome>& made) { return made ? std::optional(made->job) : std::nullopt; });
+}
 
 Status Trainer::check_room(const std::string& cell) const {
   const std::size_t waiting = queue_.asked_for(cell);

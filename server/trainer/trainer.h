@@ -66,13 +66,13 @@ class Trainer {
   /// asked for wait for this cell as may, everything (kBusy).
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
-                                             Quarantine quarantine = Quarantine::kStays);
+                                             Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});
   /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of the model in force
   /// (of the cell, where there is none) do not explain. With `apply` trains the causes found beside them and puts the
   /// model in force only if it is better on the rows held out beyond chance. Returns the job; its findings are
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
-                                              const std::string& csv, bool apply);
+                                              const std::string& csv, bool apply, const ChangeId& id = {});
   /// Of a job whose diagnosis is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
@@ -81,14 +81,18 @@ class Trainer {
   /// that is over (kConflict).
   [[nodiscard]] Status cancel(std::int64_t job);
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
-  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
-  [[nodiscard]] Status activate(const std::string& cell, int version) { return history_.activate(cell, version); }
-  [[nodiscard]] Result<int> rollback(const std::string& cell) { return history_.rollback(cell); }
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) {
-    return history_.import_model(cell, text);
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {}) {
+    return history_.activate(cell, version, request);
+  }
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
+    return history_.rollback(cell, request);
+  }
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
+    return history_.import_model(cell, text, id);
   }
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
@@ -109,6 +113,8 @@ class Trainer {
  private:
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
+  /// The job that was queued under this id before; empty: none.
+  [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
   void enqueue(const StoredJob& job, bool asked_for);
   /// Whether somebody asked for the job; else it came with its batch.
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
