@@ -98,7 +98,8 @@ int next_version(SQLite::Database& database, const std::string& cell) {
 }  // namespace
 
 Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id) {
+                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id,
+                             const JobOutcome& outcome) {
   const std::string content = serialize(model);
   const ModelProvenance& from = model.provenance();
   const auto& validation = model.parts().validation;
@@ -111,7 +112,7 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
            validation ? validation->compensated.rms : 0.0, content);
     insert_model_times(database, cell, version, from);
     if (job != 0) {
-      if (auto ended = end_job(database, job, cell, version, message); !ended)
+      if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
     if (put_in_force || release) release_batches_of(database, cell, version);

@@ -47,9 +47,26 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const StoredModel
   }
   const double rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
   if (record.validation_rms == 0 || rms <= accept_ratio * record.validation_rms) return otherwise;
-  return {false, fmt::format("not in force: held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its "
-                             "own, which is marked in force but cannot be loaded; activate it if it is wanted",
-                             to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version)};
+  const std::string why = fmt::format(
+      "held-out rms {:.4f} mm, limit {} x {:.4f} mm that version {} had on its own, which is marked in force but "
+      "cannot "
+      "be loaded",
+      to_mm(rms), accept_ratio, to_mm(record.validation_rms), record.version);
+  const double limit = accept_ratio * record.validation_rms;
+  return {false, "not in force: " + why + "; activate it if it is wanted", false, why, {{}, rms, limit}};
+}
+
+JobOutcome outcome_of(const GateVerdict& verdict) {
+  JobOutcome outcome;
+  outcome.verdict = verdict.put_in_force ? JobVerdict::kInForce
+                    : verdict.undecided  ? JobVerdict::kUndecided
+                                         : JobVerdict::kNotBetter;
+  outcome.before = verdict.figures.before;
+  outcome.after = verdict.figures.after;
+  outcome.limit = verdict.figures.limit;
+  outcome.why = verdict.why;
+  if (!verdict.put_in_force) outcome.next = "activate it if it is wanted";
+  return outcome;
 }
 
 }  // namespace
@@ -181,7 +198,7 @@ Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate, co
   std::string message = verdict->message + candidate.remarks;
   if (*may_release && !released)
     message += fmt::format("; what was in quarantine of {} stays there", fmt::join(candidate.job.batch_ids, ", "));
-  return Judged{verdict->put_in_force, released, std::move(message)};
+  return Judged{verdict->put_in_force, released, std::move(message), outcome_of(*verdict)};
 }
 
 Result<Kept> ModelHistory::keep(const Candidate& candidate, const std::stop_token& stop) {
@@ -203,8 +220,8 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const std::stop_toke
 
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
   const std::string& cell = candidate.job.cell;
-  const auto version =
-      store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message, judged.release);
+  const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
+                                        judged.release, {}, judged.outcome);
   if (!version) return tl::make_unexpected(version.error());
   ServedModel served{cell, *version, candidate.model};
   if (judged.put_in_force) {
@@ -212,7 +229,7 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
   } else if (listener_) {
     listener_(served, false);
   }
-  return Kept{*version, judged.put_in_force, std::move(judged.message)};
+  return Kept{*version, judged.put_in_force, std::move(judged.message), std::move(judged.outcome)};
 }
 
 void ModelHistory::put_in_force(ServedModel model) {

@@ -31,6 +31,7 @@ struct Kept {
   int version = 0;
   bool in_force = false;
   std::string message;  ///< the figures it was judged by, the limit and why
+  JobOutcome outcome;   ///< the same as data
 };
 
 /// A change of what is in force, as somebody asks for it.
@@ -93,6 +94,7 @@ class ModelHistory {
   struct Judged {
     bool put_in_force = false, release = false;
     std::string message;
+    JobOutcome outcome;
   };
   [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const ServedModel* present) const;
   /// The cell's lock is held.
