@@ -2,6 +2,7 @@
 
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
@@ -84,6 +85,10 @@ void insert_model_times(SQLite::Database& database, const std::string& cell, int
   row.exec();
 }
 
+Result<int> version_of(const Result<ChangeOutcome>& outcome) {
+  return outcome.map([](const ChangeOutcome& made) { return made.version; });
+}
+
 int next_version(SQLite::Database& database, const std::string& cell) {
   auto row = prepare(database, "SELECT COALESCE(MAX(version), 0) + 1 FROM models WHERE cell = ?", cell);
   row.executeStep();
@@ -93,11 +98,12 @@ int next_version(SQLite::Database& database, const std::string& cell) {
 }  // namespace
 
 Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                             bool put_in_force, const std::string& message, bool release) {
+                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id,
+                             const JobOutcome& outcome) {
   const std::string content = serialize(model);
   const ModelProvenance& from = model.provenance();
   const auto& validation = model.parts().validation;
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+  const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const int version = next_version(database, cell);
     change(database,
            "INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
@@ -106,17 +112,19 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
            validation ? validation->compensated.rms : 0.0, content);
     insert_model_times(database, cell, version, from);
     if (job != 0) {
-      if (auto ended = end_job(database, job, cell, version, message); !ended)
+      if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
     if (put_in_force || release) release_batches_of(database, cell, version);
     if (put_in_force) activate_on_top(database, cell, version);
-    return version;
-  });
+    return ChangeOutcome{version};
+  };
+  return version_of(connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return insert(database); }); }));
 }
 
-Status Store::activate(const std::string& cell, int version) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+Status Store::activate(const std::string& cell, int version, const ChangeId& change_id) {
+  const auto activate_in = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
           .of("version")
@@ -124,8 +132,11 @@ Status Store::activate(const std::string& cell, int version) {
     }
     release_batches_of(database, cell, version);
     activate_on_top(database, cell, version);
-    return {};
-  });
+    return ChangeOutcome{version};
+  };
+  const auto activated = connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return activate_in(database); }); });
+  return activated.map([](const ChangeOutcome&) {});
 }
 
 Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const {
@@ -138,8 +149,8 @@ Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const
   });
 }
 
-Result<int> Store::rollback(const std::string& cell, int steps) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& change_id) {
+  const auto go_back = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const auto before = activations_before(database, cell);
     if (!before) return tl::make_unexpected(before.error());
     if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
@@ -149,8 +160,10 @@ Result<int> Store::rollback(const std::string& cell, int steps) {
     }
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     insert_activation(database, cell, wanted.version, wanted.back);
-    return wanted.version;
-  });
+    return ChangeOutcome{wanted.version};
+  };
+  return version_of(connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return go_back(database); }); }));
 }
 
 Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {

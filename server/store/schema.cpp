@@ -82,14 +82,26 @@ CREATE TABLE diagnoses (
 )sql";
 
 /// Extra tables beside those of the schema version, so that older programs can still open the file. They hold when jobs
-/// began and ended, when models were trained, and when their newest measurement was taken (Unix time, s; NULL = not
-/// recorded). They also hold the batches in quarantine that a job may train from; these are released if its model is
-/// put in force.
+/// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
+/// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
+/// released if its model is put in force. And the changes that clients asked for under an id, with what came of them.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
   started_at  INTEGER,
   finished_at INTEGER
+);
+CREATE TABLE IF NOT EXISTS job_outcomes (
+  job         INTEGER PRIMARY KEY REFERENCES jobs (id),
+  verdict     TEXT    NOT NULL,
+  before_m    REAL,
+  after_m     REAL,
+  limit_m     REAL,
+  code        TEXT    NOT NULL,
+  why         TEXT    NOT NULL,
+  next_step   TEXT    NOT NULL,
+  peak_bytes  INTEGER,
+  processor_s REAL
 );
 CREATE TABLE IF NOT EXISTS job_releases (
   job   INTEGER NOT NULL REFERENCES jobs (id),
@@ -106,6 +118,14 @@ CREATE TABLE IF NOT EXISTS model_times (
   PRIMARY KEY (cell, version),
   FOREIGN KEY (cell, version) REFERENCES models (cell, version)
 ) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS changes (
+  number  INTEGER PRIMARY KEY AUTOINCREMENT,
+  id      TEXT    NOT NULL UNIQUE,
+  asked   TEXT    NOT NULL,
+  version INTEGER NOT NULL,
+  job     INTEGER NOT NULL,
+  made_at INTEGER NOT NULL
+);
 INSERT INTO model_times (cell, version, trained_at)
   SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models
   WHERE NOT EXISTS (SELECT 1 FROM model_times t WHERE t.cell = models.cell AND t.version = models.version)
