@@ -151,7 +151,9 @@ std::string answers_of(const test::Daemon& daemon) {
   if (!session) return session.error().message;
   const auto models = (*session)->models("cell-7");
   const auto jobs = (*session)->jobs("");
-  const auto error = (*session)->predict_error({.cell = "cell-7"}, {{0.1, 0.2, 0.3, 0.4, 0.5, 0.6}});
+  client::CallContext context;
+  context.cell = "cell-7";
+  const auto error = (*session)->predict_error(context, {{0.1, 0.2, 0.3, 0.4, 0.5, 0.6}});
   return fmt::format("{} models, {} jobs, {}", models ? static_cast<int>(models->size()) : -1,
                      jobs ? static_cast<int>(jobs->size()) : -1, error ? "a model" : error.error().message);
 }

@@ -89,7 +89,7 @@ void MutatedPackets::wait_until_read() {
           return id == 0x06 && body.size() > 8 && body[6] == 0x03 && body[7] == 0xc2;
         });
       },
-      std::chrono::milliseconds(100)));
+      std::chrono::milliseconds(20)));
 }
 
 void MutatedPackets::send(std::size_t packets) {
