@@ -78,7 +78,8 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
 }
 
 void read_dds(const YamlMap& map, DdsOptions& dds) {
-  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients"});
+  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients",
+            "client_requests", "client_mb", "queued_requests", "queued_mb", "cell_share"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
@@ -87,6 +88,11 @@ void read_dds(const YamlMap& map, DdsOptions& dds) {
   map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
   map.attempt([&] { dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64); });
   map.attempt([&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
+  map.attempt([&] { dds.client_requests = integer_within(map, "client_requests", dds.client_requests, 1, 10000); });
+  map.attempt([&] { dds.client_mb = integer_within(map, "client_mb", dds.client_mb, 40, 65536); });
+  map.attempt([&] { dds.queued_requests = integer_within(map, "queued_requests", dds.queued_requests, 1, 1000000); });
+  map.attempt([&] { dds.queued_mb = integer_within(map, "queued_mb", dds.queued_mb, 80, 65536); });
+  map.attempt([&] { dds.cell_share = number_within(map, "cell_share", dds.cell_share, 0.5, 1); });
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
