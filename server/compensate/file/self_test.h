@@ -9,9 +9,9 @@
 namespace trammel::model_file {
 
 /// How far a prediction may be from the stated one: another processor adds and multiplies in another order, and another
-/// release may compute the same in another way. Of a length kSelfTestShare of it and kSelfTestMetres together.
-constexpr double kSelfTestShare = 1e-6;
-constexpr double kSelfTestMetres = 1e-9;
+/// release may compute the same in another way. kSelfTestShare of error and standard deviation, and kSelfTestMetres.
+constexpr double kSelfTestShare = 1e-8;
+constexpr double kSelfTestMetres = 1e-11;
 
 /// The `self_test` of a model file (MODEL_FILE.md): what the model predicts at a few joints of its range and one beside
 /// it.
