@@ -187,6 +187,7 @@ Status serve(const ServerConfig& config) {
   ModelRegistry registry;
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
+  service.set_packet_listener([](const std::string& dropped) { spdlog::warn("{}", dropped); });
   trainer.set_listeners(
       [&service](const JobProgress& progress) {
         log_progress(progress);
