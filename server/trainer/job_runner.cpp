@@ -57,27 +57,49 @@ JobRunner::JobRunner(const ServedCells& cells, Store& store, const ModelRegistry
     : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
 
 void JobRunner::run(const QueuedJob& job, const std::stop_token& stop) {
-  const Status outcome = [&]() -> Status {
-    try {
-      return attempt(job, stop);
-    } catch (const std::exception& error) {  // out of memory, for one: this training ends, the service goes on
-      return failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
-    }
-  }();
-  if (outcome) return;
+  for (;;) {
+    const std::uint64_t failed_writes = store_.state().failed_writes;
+    const Status outcome = guarded_attempt(job, stop);
+    if (outcome) return;
+    const bool by_the_disk = store_.state().failed_writes != failed_writes;
+    if (!by_the_disk || stop.stop_requested()) return end(job, outcome.error(), stop);
+    JobProgress waiting = progress_of_stored(job.id);
+    waiting.stage = JobStage::kQueued;
+    waiting.what = "waits for the disk: " + sentence(outcome.error());
+    book_.report(waiting);
+    if (!store_.wait_until_writable(stop)) return end(job, outcome.error(), stop);
+    // Not the job's fault: the attempt does not count. Should the store refuse, the next one waits again.
+    static_cast<void>(store_.set_job_queued(job.id));
+  }
+}
+
+Status JobRunner::guarded_attempt(const QueuedJob& job, const std::stop_token& stop) {
+  try {
+    return attempt(job, stop);
+  } catch (const std::exception& error) {  // out of memory, for one: this training ends, the service goes on
+    return failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
+  }
+}
+
+JobProgress JobRunner::progress_of_stored(std::int64_t job) const {
+  if (const auto stored = store_.job(job)) return progress_of(*stored);
   JobProgress progress;
-  progress.job = job.id;
-  if (const auto stored = store_.job(job.id)) progress = progress_of(*stored);
+  progress.job = job;
+  return progress;
+}
+
+void JobRunner::end(const QueuedJob& job, const Error& why, const std::stop_token& stop) {
+  JobProgress progress = progress_of_stored(job.id);
   if (stop.stop_requested()) {
     // Should the store refuse, the job counts as interrupted and is taken up all the same.
     static_cast<void>(store_.set_job_queued(job.id));
     progress.stage = JobStage::kQueued;
     return book_.report(progress);
   }
-  const Status failed = store_.set_job_failed(job.id, sentence(outcome.error()));
+  const Status failed = store_.set_job_failed(job.id, sentence(why));
   if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
   progress.stage = JobStage::kFailed;
-  progress.what = sentence(outcome.error());
+  progress.what = sentence(why);
   book_.report(progress);
 }
 

@@ -35,11 +35,16 @@ class JobRunner {
   JobRunner(const ServedCells& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
             ProgressBook& book, const TrainerOptions& options);
 
-  /// Ends the job, or puts it back where `stop` was requested.
+  /// Ends the job, or puts it back where `stop` was requested. A job that cannot be stored because of the disk is not
+  /// over: it waits until the disk can be written, and begins anew.
   void run(const QueuedJob& job, const std::stop_token& stop);
 
  private:
   [[nodiscard]] Status attempt(const QueuedJob& queued, const std::stop_token& stop);
+  [[nodiscard]] Status guarded_attempt(const QueuedJob& job, const std::stop_token& stop);
+  [[nodiscard]] JobProgress progress_of_stored(std::int64_t job) const;
+  /// Of a job that did not succeed.
+  void end(const QueuedJob& job, const Error& why, const std::stop_token& stop);
   [[nodiscard]] Status attempt_training(const StoredJob& job, JobBatches& batches, const std::stop_token& stop);
   [[nodiscard]] Status attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply,
                                          const std::stop_token& stop);
