@@ -12,14 +12,18 @@
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
-#include "server/trainer/job_batches.h"
+#include "server/trainer/acceptance/judging.h"
+#include "server/trainer/compute/job_batches.h"
+#include "server/trainer/job_sources.h"
 
 namespace trammel {
 namespace {
 
-constexpr int kMaxAttempts = 3;           // of one job that takes the process down
-constexpr std::size_t kMaxBatchId = 128;  // bytes
-constexpr int kJobsListed = 20;           // of those done and of those failed, the last ones
+constexpr std::size_t kMaxBatchId = 128;   // bytes
+constexpr std::size_t kMaxLevel = 16384;   // bytes
+constexpr std::size_t kMaxSources = 500;   // as in a cell file
+constexpr std::size_t kMaxBatches = 1000;  // of one training
+constexpr int kJobsListed = 20;            // of those done and of those failed, the last ones
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
@@ -30,11 +34,18 @@ Status check_batch_id(const std::string& id) {
   return {};
 }
 
+Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
+  if (asked <= most) return {};
+  return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
+}
+
 /// Level and bias of a training that is asked for; empty: as usual.
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
+    if (Status fits = check_most("level", level.size(), kMaxLevel, "bytes"); !fits) return fits;
     const auto specs = parse_level(level);
     if (!specs) return tl::make_unexpected(specs.error());
+    if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
     for (const std::string& spec : *specs) {
       if (auto source = make_error_source(spec, cell); !source) return tl::make_unexpected(source.error());
     }
@@ -49,7 +60,7 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       store_(store),
       registry_(registry),
       options_(options),
-      history_(cells_, store, registry, options.accept_ratio),
+      history_(cells_, store, registry),
       runner_(cells_, store, registry, history_, book_, options) {}
 
 Trainer::~Trainer() { stop(); }
@@ -108,7 +119,8 @@ Result<std::vector<std::string>> Trainer::start() {
   worker_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "trainer");
     while (const auto taken = queue_.take(stop)) {
-      runner_.run(taken->job.id, {stop, taken->cancelled});
+      const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
+      if (end == JobRunner::End::kAgain) queue_.push(taken->job);
       queue_.put_down();
     }
   });
@@ -130,7 +142,8 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   job.cell = cell_name;
   job.batch_ids = {batch_id};
   job.created_at = unix_now();
-  const auto batch = received_batch(csv, batch_id, job.created_at, **cell, held_out_to_judge(options_));
+  const auto batch = received_batch({batch_id, csv, job.created_at}, **cell,
+                                    held_out_by_service(options_.validation_share, options_.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   const int poses = static_cast<int>(batch->size());
   if (poses > options_.max_poses) {
@@ -164,7 +177,8 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
     if (!stored) return tl::make_unexpected(stored.error());
     job.batch_ids = {*stored};
   } else {
-    const auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
+    const auto batch = received_batch({"", csv, job.created_at}, **cell,
+                                      held_out_of_diagnosis(options_.validation_share, options_.seed, apply));
     if (!batch) return tl::make_unexpected(batch.error());
     if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
@@ -202,6 +216,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
+  if (const Status fits = check_most("batches", batch_ids.size(), kMaxBatches, "batches in one training"); !fits)
+    return tl::make_unexpected(fits.error());
   const bool release = quarantine == Quarantine::kReleased;
   if (release && batch_ids.empty())
     return refused("to release a batch takes its id").of("batch").next("say which one is good");

@@ -63,7 +63,8 @@ class Trainer {
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
   /// and what the model in force has besides. Refuses batches that stay in quarantine and, where as many jobs that were
-  /// asked for wait for this cell as may, everything (kBusy).
+  /// asked for wait for this cell as may, everything (kBusy). Refuses, with the limit, what no training may ask for:
+  /// more than max_poses, 1000 batches, 500 error sources, a bias of more than 32 kernels.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
                                              Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});

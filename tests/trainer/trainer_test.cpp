@@ -299,6 +299,25 @@ TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }
 
+TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor) {
+  submit("a");
+  std::string kernel = "se", sources = "M1";
+  for (int i = 0; i < 200; ++i) kernel += " + se";
+  for (int i = 0; i < 600; ++i) sources += ",gear_transmission:3";
+  const auto refused_with = [this](const std::vector<std::string>& batches, const std::string& level,
+                                   const std::string& bias) {
+    const auto job = trainer_->retrain("cell-7", batches, level, bias);
+    EXPECT_EQ(job ? ErrorCode::kInternal : job.error().code, ErrorCode::kTooLarge);
+    return job ? 0 : job.error().limit.value_or(0);
+  };
+  EXPECT_EQ(refused_with({"a"}, "", kernel), 32);
+  EXPECT_EQ(refused_with({"a"}, "", std::string(100'000, '(')), 1000);
+  EXPECT_EQ(refused_with({"a"}, sources, ""), 500);
+  EXPECT_EQ(refused_with({"a"}, std::string(1'000'000, 'x'), ""), 16384);
+  EXPECT_EQ(refused_with(std::vector<std::string>(1001, "a"), "", ""), 1000);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+}
+
 TEST_F(TrainerTest, RetrainsFromTheNewestBatchWhenNoneIsNamed) {
   submit("older");
   submit("newer", {.seed = 2});
