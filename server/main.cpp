@@ -174,7 +174,7 @@ Status serve(const ServerConfig& config) {
   StopSignals signals;  // before any thread starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
-  ModelRegistry registry;
+  ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
   trainer.set_listeners(
@@ -186,6 +186,10 @@ Status serve(const ServerConfig& config) {
         if (!in_force) return;
         spdlog::info("{}: version {} ({}) is in force", model.cell, model.version, model.model.provenance().id);
         service.publish_model(model.cell);
+      },
+      [](const std::string& trouble, bool over) {
+        if (over) return spdlog::info("over: {}", trouble);
+        spdlog::warn("{}", trouble);
       });
 
   const auto notices = trainer.take_up();

@@ -26,7 +26,9 @@ class BiasModel {
   /// with blocks also more than 4000 observations and missing features. kBusy when `progress` gives up.
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
   /// The model of a state. It predicts bit for bit as before on processors that run the same build of numerics.h; the
-  /// last bits differ between AVX2 and AVX-512. Refuses what fit() refuses, and hyperparameters of the wrong shape.
+  /// last bits differ between AVX2 and AVX-512. Keeps what predicting takes: with(), without() and left_out_error_B()
+  /// may take longer than of a model that was fitted. Refuses what fit() refuses, and hyperparameters of the wrong
+  /// shape.
   [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
   /// With more observations, the hyperparameters as they are. Takes N² operations for each where the kernel has no

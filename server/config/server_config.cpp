@@ -153,7 +153,7 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
+  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -162,6 +162,11 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] { config.dds.server_id = server_id(map, "server"); });
   map.attempt([&] { file.cell_files = cell_files_of(map, folder); });
   map.attempt([&] { config.store = store_of(map, folder); });
+  map.attempt([&] {
+    const auto otherwise = static_cast<int>(config.models_in_memory >> 20);
+    config.models_in_memory =
+        static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
+  });
   map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), config.dds);
   });

@@ -19,9 +19,9 @@
 #include <stdexcept>
 
 #include "server/trainer/trainer.h"
-#include "tests/store/faulty_disk.h"
 #include "tests/support/computing_child.h"
 #include "tests/support/demand.h"
+#include "tests/support/faulty_disk.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <new>
 #include <thread>
 
@@ -545,7 +546,7 @@ TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   EXPECT_EQ(in_force(), 2);
 }
 
-TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbackStepsPastIt) {
+TEST_F(TrainerTest, WhereNoModelCanBeLoadedTheRecordOfTheOneInForceJudges) {
   start();
   train("first");
   for (const int version : {2, 3}) {
@@ -553,7 +554,9 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
     ASSERT_TRUE(trainer_->activate("cell-7", version));
   }
   SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
-      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version > 1");
+      .exec("UPDATE models SET content = replace(content, '10', '11')");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
   restart();
   ASSERT_TRUE(trainer_->start());
   ASSERT_EQ(in_force(), 0);
@@ -562,6 +565,22 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
   EXPECT_NE(worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
             std::string::npos)
       << worse.what;
+}
+
+TEST_F(TrainerTest, ARollbackStepsPastWhatCannotBeLoaded) {
+  start();
+  train("first");
+  for (const int version : {2, 3}) {
+    train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
+    ASSERT_TRUE(trainer_->activate("cell-7", version));
+  }
+  SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version = 2");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  ASSERT_EQ(in_force(), 3);
   EXPECT_EQ(trainer_->rollback("cell-7").value(), 1);
   EXPECT_EQ(in_force(), 1);
   EXPECT_EQ(*store_->version_in_force("cell-7"), 1);

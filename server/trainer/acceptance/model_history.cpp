@@ -32,17 +32,65 @@ JobOutcome outcome_of(const GateVerdict& verdict) {
 ModelHistory::ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry)
     : cells_(cells), store_(store), registry_(registry) {
   for (const auto& [name, cell] : cells_) changing_[name];
+  registry_.set_source({[this](const std::string& cell) { return load_in_force(cell); },
+                        [this](const std::string& cell, int version) {
+                          return load_for_service(cell, version).map([&](CompensatedModel model) {
+                            return ServedModel{cell, version, std::move(model)};
+                          });
+                        },
+                        [this](const ServedModelPtr& model) {
+                          if (listener_) listener_(*model, true);
+                        }});
 }
 
-Status ModelHistory::publish_from_store(const std::string& cell) {
-  const auto version = store_.version_in_force(cell);
-  if (!version) return tl::make_unexpected(version.error());
-  if (!*version) return {};
-  auto model = load_for_service(cell, **version);
-  if (!model) return tl::make_unexpected(model.error());
-  const MutexLock lock(changes_of(cell));
-  put_in_force({cell, **version, std::move(*model)});
-  return {};
+ModelHistory::~ModelHistory() { registry_.set_source({}); }
+
+Status ModelHistory::announce_from_store(const std::string& cell) {
+  const Status taken_back = store_.take_back_from_copy(cell);
+  const std::vector<int> versions = store_.versions_to_serve(cell);
+  if (!versions.empty()) registry_.announce(cell, versions.front());
+  return taken_back;
+}
+
+Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
+  std::optional<Error> why_not;
+  for (const int version : store_.versions_to_serve(cell)) {
+    auto model = store_.model(cell, version);
+    if (!model) {
+      if (!why_not) why_not = model.error();
+      continue;
+    }
+    const auto fits = check_fits_cell(*model, *cells_.at(cell), fmt::format("version {} of cell {}", version, cell));
+    if (!fits) {
+      set_trouble(cell, sentence(fits.error()));
+      return tl::make_unexpected(fits.error());
+    }
+    // A version that lost its copy gets a new one; where the store cannot give it, it was made from its copy.
+    static_cast<void>(store_.copy_model_in_force(cell));
+    set_trouble(cell, why_not ? fmt::format("cell {}: version {} is served instead of a newer one: {}", cell, version,
+                                            sentence(*why_not))
+                              : "");
+    return ServedModel{cell, version, std::move(*model)};
+  }
+  if (!why_not) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
+  set_trouble(cell, fmt::format("cell {} is not served: {}", cell, sentence(*why_not)));
+  return tl::make_unexpected(*why_not);
+}
+
+std::vector<std::string> ModelHistory::troubles() const {
+  const MutexLock lock(troubles_mutex_);
+  std::vector<std::string> all;
+  for (const auto& [cell, trouble] : troubles_) all.push_back(trouble);
+  return all;
+}
+
+void ModelHistory::set_trouble(const std::string& cell, const std::string& trouble) {
+  const MutexLock lock(troubles_mutex_);
+  if (trouble.empty()) {
+    troubles_.erase(cell);
+  } else {
+    troubles_[cell] = trouble;
+  }
 }
 
 Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell, int version) const {
@@ -55,8 +103,7 @@ Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell,
 
 Status ModelHistory::check_expected(const std::string& cell, const ChangeRequest& request) const {
   if (!request.expected) return {};
-  const auto served = registry_.in_force(cell);
-  const int version = served ? served->version : 0;
+  const int version = registry_.version_in_force(cell);
   if (version == *request.expected) return {};
   return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version,
                  *request.expected)
@@ -70,7 +117,7 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   const auto made = store_.outcome_of(request.id);
   if (!made) return tl::make_unexpected(made.error());
   if (*made) return {};
-  auto model = load_for_service(cell, version);
+  auto model = registry_.version(cell, version);
   if (!model) return tl::make_unexpected(model.error());
   const MutexLock lock(changes_of(cell));
   const auto made_meanwhile = store_.outcome_of(request.id);
@@ -78,8 +125,7 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   if (*made_meanwhile) return {};
   if (auto as_expected = check_expected(cell, request); !as_expected) return as_expected;
   if (auto activated = store_.activate(cell, version, request.id); !activated) return activated;
-  const auto served = registry_.in_force(cell);
-  if (!served || served->version != version) put_in_force({cell, version, std::move(*model)});
+  if (registry_.version_in_force(cell) != version) put_in_force(std::move(*model));
   return {};
 }
 
@@ -91,11 +137,11 @@ Result<ModelHistory::WayBack> ModelHistory::way_back(const std::string& cell) co
   return WayBack{now->value_or(0), std::move(*before)};
 }
 
-Result<std::pair<int, CompensatedModel>> ModelHistory::load_first(const std::string& cell,
-                                                                  const std::vector<int>& before) const {
+Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::string& cell,
+                                                                const std::vector<int>& before) const {
   std::optional<Error> why_not;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    auto model = load_for_service(cell, before[i]);
+    auto model = registry_.version(cell, before[i]);
     if (model) return std::pair(static_cast<int>(i) + 1, std::move(*model));
     if (!why_not) why_not = model.error();
   }
@@ -118,7 +164,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest&
     if (auto as_expected = check_expected(cell, request); !as_expected) return tl::make_unexpected(as_expected.error());
     const auto restored = store_.rollback(cell, found->first, request.id);
     if (!restored) return restored;
-    put_in_force({cell, *restored, std::move(found->second)});
+    put_in_force(std::move(found->second));
     return restored;
   }
   return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");
@@ -171,10 +217,11 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
+    const int version = present ? present->version : 0;
     auto found = judged(candidate, judging, present.get());
     if (!found) return tl::make_unexpected(found.error());
     const MutexLock lock(changes_of(cell));
-    if (registry_.in_force(cell) == present) return store(candidate, std::move(*found));
+    if (registry_.version_in_force(cell) == version) return store(candidate, std::move(*found));
   }
   const MutexLock lock(changes_of(cell));
   auto found = judged(candidate, judging, registry_.in_force(cell).get());
@@ -187,19 +234,19 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
   const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
                                         judged.release, {}, judged.outcome);
   if (!version) return tl::make_unexpected(version.error());
-  ServedModel served{cell, *version, candidate.model};
+  auto served = registry_.reclaimed({cell, *version, candidate.model});
   if (judged.put_in_force) {
     put_in_force(std::move(served));
   } else if (listener_) {
-    listener_(served, false);
+    listener_(*served, false);
   }
   return Kept{*version, judged.put_in_force, std::move(judged.message), std::move(judged.outcome)};
 }
 
-void ModelHistory::put_in_force(ServedModel model) {
-  const auto served = std::make_shared<const ServedModel>(std::move(model));
-  registry_.publish(served);
-  if (listener_) listener_(*served, true);
+void ModelHistory::put_in_force(ServedModelPtr model) {
+  set_trouble(model->cell, "");
+  registry_.publish(model);
+  if (listener_) listener_(*model, true);
 }
 
 Result<Opponents> ModelHistory::opponents(const std::string& cell, const ServedModel* present) const {

@@ -54,12 +54,19 @@ class ModelHistory {
   /// that cell can happen: it must not call back into what changes models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
-  /// `store` and `registry` outlive it.
+  /// `store` and `registry` outlive it. It is where the registry's models come from.
   ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry);
+  ~ModelHistory();
+  ModelHistory(const ModelHistory&) = delete;
+  ModelHistory& operator=(const ModelHistory&) = delete;
 
   void set_listener(Listener listener) { listener_ = std::move(listener); }
-  /// Publishes the version that the store has in force, if any. Refuses one that does not load or fit the cell.
-  [[nodiscard]] Status publish_from_store(const std::string& cell);
+  /// Announces the version that the store has in force, if any: it is loaded when it is asked for. Where it cannot be
+  /// loaded, the last one that served before it is, and troubles() says so. One that does not fit the cell is not
+  /// served, and nothing in its place.
+  [[nodiscard]] Status announce_from_store(const std::string& cell);
+  /// Cells that are not served with the model they should be served with, one sentence each.
+  [[nodiscard]] std::vector<std::string> troubles() const;
 
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
@@ -81,7 +88,11 @@ class ModelHistory {
  private:
   [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
   /// Of a model that the store has put in force; the cell's lock is held.
-  void put_in_force(ServedModel model);
+  void put_in_force(ServedModelPtr model);
+  /// What the cell is to be served with.
+  [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
+  /// Empty: there is none any more.
+  void set_trouble(const std::string& cell, const std::string& trouble);
   /// The cell's lock is held, or what it guards is looked at again when it is.
   [[nodiscard]] Status check_expected(const std::string& cell, const ChangeRequest& request) const;
   /// Where a rollback leads.
@@ -92,8 +103,8 @@ class ModelHistory {
   };
   [[nodiscard]] Result<WayBack> way_back(const std::string& cell) const;
   /// The first of `before` that can be served: how many steps back it is, and the model.
-  [[nodiscard]] Result<std::pair<int, CompensatedModel>> load_first(const std::string& cell,
-                                                                    const std::vector<int>& before) const;
+  [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(const std::string& cell,
+                                                                  const std::vector<int>& before) const;
   /// What is to be said and stored of a candidate that was judged.
   struct Judged {
     bool put_in_force = false, release = false;
@@ -116,6 +127,8 @@ class ModelHistory {
   ModelRegistry& registry_;
   Listener listener_;
   std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
+  mutable Mutex troubles_mutex_;           // taken last
+  std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
 };
 
 }  // namespace trammel
