@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "server/dds/watchdog.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
+#include "server/trainer/compute/compute_main.h"
 #include "server/trainer/trainer.h"
 
 namespace trammel {
@@ -86,7 +88,11 @@ Status start_log(const LogOptions& options) {
 void log_progress(const JobProgress& progress) {
   switch (progress.stage) {
     case JobStage::kQueued:
-      spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+      if (progress.what.empty()) {
+        spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+      } else {
+        spdlog::warn("{}: job {} is queued: {}", progress.cell, progress.job, progress.what);
+      }
       break;
     case JobStage::kTraining:
       spdlog::debug("{}: job {}: {}, {:.0f} %", progress.cell, progress.job, progress.what, 100 * progress.share);
@@ -204,6 +210,7 @@ Status serve(const ServerConfig& config) {
 int run(const Arguments& arguments) {
   ServerReading server = read_server(arguments.config);
   ServerConfig& config = server.config;
+  config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
   if (arguments.store) config.store = *arguments.store;
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
@@ -220,6 +227,8 @@ int run(const Arguments& arguments) {
 }  // namespace trammel
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == trammel::kComputeWord)
+    return trammel::compute_main({argv + 2, argv + argc});
   CLI::App app("Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or SIGINT.",
                "trammeld");
   app.footer(

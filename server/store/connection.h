@@ -106,4 +106,9 @@ int change(SQLite::Database& database, const char* sql, const Values&... values)
   return row.getColumn(column).getInt64();
 }
 
+[[nodiscard]] inline std::optional<double> optional_number(SQLite::Statement& row, int column) {
+  if (row.isColumnNull(column)) return std::nullopt;
+  return row.getColumn(column).getDouble();
+}
+
 }  // namespace trammel

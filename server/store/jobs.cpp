@@ -48,8 +48,25 @@ std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at "
-    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id ";
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at, "
+    "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s "
+    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON job_outcomes.job = jobs.id ";
+
+/// The outcome in a row of kJobColumns.
+JobOutcome outcome_of(SQLite::Statement& row) {
+  JobOutcome outcome;
+  if (row.isColumnNull(12)) return outcome;
+  outcome.verdict = job_verdict_of(row.getColumn(12).getString()).value_or(JobVerdict::kOpen);
+  outcome.before = optional_number(row, 13);
+  outcome.after = optional_number(row, 14);
+  outcome.limit = optional_number(row, 15);
+  outcome.code = error_code_of(row.getColumn(16).getString());
+  outcome.why = row.getColumn(17).getString();
+  outcome.next = row.getColumn(18).getString();
+  outcome.peak_memory = optional_integer(row, 19);
+  outcome.processor_time = optional_number(row, 20);
+  return outcome;
+}
 
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
@@ -65,6 +82,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
+  job.outcome = outcome_of(row);
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -82,11 +100,34 @@ void record_start(SQLite::Database& database, std::int64_t job) {
          job, unix_now());
 }
 
-void record_end(SQLite::Database& database, std::int64_t job) {
+template <typename Value>
+void bind_if(SQLite::Statement& row, int column, const std::optional<Value>& value) {
+  if (value) row.bind(column, *value);  // unbound is NULL
+}
+
+void record_outcome(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
+  SQLite::Statement row(database,
+                        "INSERT OR REPLACE INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
+                        "next_step, peak_bytes, processor_s) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  row.bind(1, job);
+  row.bind(2, to_text(outcome.verdict));
+  bind_if(row, 3, outcome.before);
+  bind_if(row, 4, outcome.after);
+  bind_if(row, 5, outcome.limit);
+  row.bind(6, outcome.code ? to_text(*outcome.code) : "");
+  row.bind(7, outcome.why);
+  row.bind(8, outcome.next);
+  bind_if(row, 9, outcome.peak_memory);
+  bind_if(row, 10, outcome.processor_time);
+  row.exec();
+}
+
+void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
          "INSERT INTO job_times (job, finished_at) VALUES (?, ?) "
          "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
          job, unix_now());
+  record_outcome(database, job, outcome);
 }
 
 }  // namespace
@@ -115,13 +156,13 @@ Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
 }
 
 Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
-               const std::string& message) {
+               const std::string& message, const JobOutcome& outcome) {
   return changed_one(change(database,
                             "UPDATE jobs SET state = 'done', model_version = ?1, message = ?2 "
                             "WHERE id = ?3 AND (?4 = '' OR cell = ?4) AND state IN ('queued', 'running')",
                             model_version, message, id, cell),
                      id)
-      .map([&] { record_end(database, id); });
+      .map([&] { record_end(database, id, outcome); });
 }
 
 namespace {
@@ -257,29 +298,30 @@ Status Store::set_job_running(std::int64_t id) {
   });
 }
 
-Status Store::set_job_queued(std::int64_t id) {
+Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
-                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - 1, 0) "
+                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - ?, 0) "
                               "WHERE id = ? AND state IN ('queued', 'running')",
-                              id),
+                              attempt_counts ? 0 : 1, id),
                        id);
   });
 }
 
-Status Store::set_job_failed(std::int64_t id, const std::string& message) {
+Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
                        id)
-        .map([&] { record_end(database, id); });
+        .map([&] { record_end(database, id, outcome); });
   });
 }
 
-Status Store::set_job_done(std::int64_t id, const std::string& message) {
-  return connection_->in_transaction([&](SQLite::Database& database) { return end_job(database, id, "", 0, message); });
+Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
+  return connection_->in_transaction(
+      [&](SQLite::Database& database) { return end_job(database, id, "", 0, message, outcome); });
 }
 
 }  // namespace trammel

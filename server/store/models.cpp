@@ -123,13 +123,14 @@ int next_version(SQLite::Database& database, const std::string& cell) {
 }  // namespace
 
 Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id) {
+                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id,
+                             const JobOutcome& outcome) {
   const std::string content = serialize(model);
   const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const int version = next_version(database, cell);
     insert_model(database, cell, version, model, content);
     if (job != 0) {
-      if (auto ended = end_job(database, job, cell, version, message); !ended)
+      if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
     if (put_in_force || release) release_batches_of(database, cell, version);
@@ -217,9 +218,8 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
   });
 }
 
-Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
-  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
-  const auto content = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
+Result<std::string> Store::model_text(const std::string& cell, int version) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
     if (!row.executeStep())
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
@@ -227,6 +227,11 @@ Result<CompensatedModel> Store::model(const std::string& cell, int version) cons
           .with_value(version);
     return row.getColumn(0).getString();
   });
+}
+
+Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
+  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
+  const auto content = model_text(cell, version);
   auto stored = content ? deserialize(*content, where) : Result<CompensatedModel>(tl::make_unexpected(content.error()));
   if (stored) return stored;
   for (const ServedCopies::Copy& copy : connection_->copies->of(cell)) {

@@ -86,14 +86,27 @@ CREATE TABLE diagnoses (
 )sql";
 
 /// Extra tables beside those of the schema version, so that older programs can still open the file. They hold when jobs
-/// began and ended, when models were trained, and when their newest measurement was taken (Unix time, s; NULL = not
-/// recorded). They also hold the batches in quarantine that a job may train from; these are released if its model is
-/// put in force. And the changes that clients asked for under an id, with what came of them; and the store's identity.
+/// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
+/// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
+/// released if its model is put in force. And the changes that clients asked for under an id, with what came of them;
+/// and the store's identity.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
   started_at  INTEGER,
   finished_at INTEGER
+);
+CREATE TABLE IF NOT EXISTS job_outcomes (
+  job         INTEGER PRIMARY KEY REFERENCES jobs (id),
+  verdict     TEXT    NOT NULL,
+  before_m    REAL,
+  after_m     REAL,
+  limit_m     REAL,
+  code        TEXT    NOT NULL,
+  why         TEXT    NOT NULL,
+  next_step   TEXT    NOT NULL,
+  peak_bytes  INTEGER,
+  processor_s REAL
 );
 CREATE TABLE IF NOT EXISTS job_releases (
   job   INTEGER NOT NULL REFERENCES jobs (id),

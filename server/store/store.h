@@ -10,6 +10,7 @@
 
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
+#include "server/store/job_outcome.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
 /// synchronous=FULL).
@@ -46,6 +47,7 @@ struct StoredJob {
   JobKind kind = JobKind::kTrain;
   std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
+  JobOutcome outcome = {};                       ///< the same as `message`, as data
 };
 
 /// The request of a diagnosis and its findings.
@@ -156,19 +158,19 @@ class Store {
   /// `finished` failed.
   [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
   /// These refuse (kNotFound) a job that is done or failed already. Setting it running counts an attempt; setting it
-  /// queued takes the attempt back.
+  /// queued takes the attempt back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
-  [[nodiscard]] Status set_job_queued(std::int64_t id);
-  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message);
+  [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
+  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
   /// For a job that makes no model.
-  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message);
+  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
 
-  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and, if asked, puts the
-  /// model in force, all in one transaction. If the model is put in force, or if `release` is set, the batches that the
-  /// job may release leave quarantine. Returns the version.
+  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and `outcome` and, if
+  /// asked, puts the model in force, all in one transaction. If the model is put in force, or if `release` is set, the
+  /// batches that the job may release leave quarantine. Returns the version.
   [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
                                       bool put_in_force, const std::string& message, bool release = false,
-                                      const ChangeId& change_id = {});
+                                      const ChangeId& change_id = {}, const JobOutcome& outcome = {});
   /// Puts a stored version in force. Changes nothing if it is in force already. Refuses (kNotFound) an unknown one.
   ///
   /// How rollback works: an activation remembers the one that it replaced. A rollback restores that one with its own
@@ -183,6 +185,8 @@ class Store {
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
+  /// The same as it is stored, not checked.
+  [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
   /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what

@@ -13,16 +13,20 @@
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
-#include "server/trainer/job_batches.h"
+#include "server/trainer/acceptance/judging.h"
+#include "server/trainer/compute/job_batches.h"
+#include "server/trainer/job_sources.h"
 
 namespace trammel {
 namespace {
 
-constexpr int kMaxAttempts = 3;                     // of one job that takes the process down
 constexpr std::size_t kMaxBatchId = 128;            // bytes
+constexpr std::size_t kMaxLevel = 16384;            // bytes
+constexpr std::size_t kMaxSources = 500;            // as in a cell file
+constexpr std::size_t kMaxBatches = 1000;           // of one training
+constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
-constexpr int kJobsListed = 20;  // of those done and of those failed, the last ones
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
@@ -33,11 +37,18 @@ Status check_batch_id(const std::string& id) {
   return {};
 }
 
+Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
+  if (asked <= most) return {};
+  return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
+}
+
 /// Level and bias of a training that is asked for; empty: as usual.
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
+    if (Status fits = check_most("level", level.size(), kMaxLevel, "bytes"); !fits) return fits;
     const auto specs = parse_level(level);
     if (!specs) return tl::make_unexpected(specs.error());
+    if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
     for (const std::string& spec : *specs) {
       if (auto source = make_error_source(spec, cell); !source) return tl::make_unexpected(source.error());
     }
@@ -52,9 +63,8 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       store_(store),
       registry_(registry),
       options_(options),
-      history_(cells_, store, registry, options.accept_ratio),
-      runner_(cells_, store, registry, history_, book_, options),
-      queue_(std::make_unique<BoundedQueue<QueuedJob>>(static_cast<std::size_t>(options.queue_capacity))) {}
+      history_(cells_, store, registry),
+      runner_(cells_, store, registry, history_, book_, options) {}
 
 Trainer::~Trainer() { stop(); }
 
@@ -85,13 +95,11 @@ Result<std::vector<std::string>> Trainer::take_up() {
       notices.push_back(sentence(wanted.error()));
       continue;
     }
+    if (!*wanted) continue;
+    queue_.push({job.id, job.cell, was_asked_for(job).value_or(true)});
     job.state = JobState::kQueued;
-    if (*wanted) jobs.push_back(std::move(job));
+    jobs.push_back(std::move(job));
   }
-  // Accepted is accepted: those of before may be more than the queue takes now.
-  queue_ = std::make_unique<BoundedQueue<QueuedJob>>(
-      std::max(static_cast<std::size_t>(options_.queue_capacity), jobs.size()));
-  for (const StoredJob& job : jobs) TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id}));
   taken_up_ = std::move(jobs);
   return notices;
 }
@@ -103,7 +111,8 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
   }
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
-  if (auto failed = store_.set_job_failed(job.id, why); !failed) return tl::make_unexpected(failed.error());
+  const JobOutcome outcome = failed_outcome(failure(ErrorCode::kInternal, "{}", why).value(), JobVerdict::kBroken);
+  if (auto failed = store_.set_job_failed(job.id, why, outcome); !failed) return tl::make_unexpected(failed.error());
   notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
   return false;
 }
@@ -120,7 +129,11 @@ Result<std::vector<std::string>> Trainer::start() {
   taken_up_.reset();
   worker_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "trainer");
-    while (const auto job = queue_->pop(stop)) runner_.run(*job, stop);
+    while (const auto taken = queue_.take(stop)) {
+      const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
+      if (end == JobRunner::End::kAgain) queue_.push(taken->job);
+      queue_.put_down();
+    }
   });
   keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
   reclaimer_ = std::jthread([this](const std::stop_token& stop) {
@@ -181,7 +194,8 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   job.cell = cell_name;
   job.batch_ids = {batch_id};
   job.created_at = unix_now();
-  const auto batch = received_batch(csv, batch_id, job.created_at, **cell, held_out_to_judge(options_));
+  const auto batch = received_batch({batch_id, csv, job.created_at}, **cell,
+                                    held_out_by_service(options_.validation_share, options_.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   const int poses = static_cast<int>(batch->size());
   if (poses > options_.max_poses) {
@@ -193,12 +207,9 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
-  if (!repeated) {
-    if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  }
   const auto accepted = store_.add_batch(stored, job);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  if (!repeated) enqueue(*accepted, *batch);
+  if (!repeated) enqueue(*accepted, false);
   return accepted->id;
 }
 
@@ -213,29 +224,28 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
   job.kind = JobKind::kDiagnose;
   job.cell = cell_name;
   job.created_at = unix_now();
-  std::optional<CheckedBatch> sent;
   if (csv.empty()) {
     const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
     if (!stored) return tl::make_unexpected(stored.error());
     job.batch_ids = {*stored};
   } else {
-    auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
+    const auto batch = received_batch({"", csv, job.created_at}, **cell,
+                                      held_out_of_diagnosis(options_.validation_share, options_.seed, apply));
     if (!batch) return tl::make_unexpected(batch.error());
     if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
           .of("poses")
           .beyond(poses, options_.max_poses);
     }
-    sent = std::move(*batch);
   }
   const MutexLock lock(submit_mutex_);
   const auto before = queued_before(id);
   if (!before) return tl::make_unexpected(before.error());
   if (*before) return **before;
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::move(sent));
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -258,6 +268,8 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
+  if (const Status fits = check_most("batches", batch_ids.size(), kMaxBatches, "batches in one training"); !fits)
+    return tl::make_unexpected(fits.error());
   const bool release = quarantine == Quarantine::kReleased;
   if (release && batch_ids.empty())
     return refused("to release a batch takes its id").of("batch").next("say which one is good");
@@ -278,10 +290,10 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   const auto before = queued_before(id);
   if (!before) return tl::make_unexpected(before.error());
   if (*before) return **before;
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_job(job, release, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::nullopt);
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -300,6 +312,32 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
   return failure(ErrorCode::kTooLarge, "the batches have {} poses together, limit {}", poses, options_.max_poses)
       .of("poses")
       .beyond(poses, options_.max_poses);
+}
+
+Status Trainer::cancel(std::int64_t id) {
+  const auto job = store_.job(id);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto asked_for = was_asked_for(*job);
+  if (!asked_for) return tl::make_unexpected(asked_for.error());
+  switch (queue_.cancel(id)) {
+    case JobQueue::Cancelled::kStopping:
+      return {};
+    case JobQueue::Cancelled::kUnknown:
+      return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id);
+    case JobQueue::Cancelled::kRemoved:
+      break;
+  }
+  const JobOutcome outcome = cancelled_outcome();
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome); !ended) {
+    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+    return ended;
+  }
+  JobProgress progress = progress_of(*job);
+  progress.stage = JobStage::kFailed;
+  progress.what = outcome.why;
+  progress.outcome = outcome;
+  book_.report(progress);
+  return {};
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
@@ -350,24 +388,33 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
   return jobs;
 }
 
-int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
+int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }
 
 Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) const {
   return store_.outcome_of(id).map(
       [](const std::optional<ChangeOutcome>& made) { return made ? std::optional(made->job) : std::nullopt; });
 }
 
-Status Trainer::check_room() const {
-  if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}", queue_->size(), options_.queue_capacity)
+Status Trainer::check_room(const std::string& cell) const {
+  const std::size_t waiting = queue_.asked_for(cell);
+  if (waiting < static_cast<std::size_t>(options_.queue_capacity)) return {};
+  return failure(ErrorCode::kBusy, "{} jobs that were asked for wait for cell {}, limit {}", waiting, cell,
+                 options_.queue_capacity)
       .of("queue")
-      .beyond(queue_->size(), options_.queue_capacity)
+      .beyond(waiting, options_.queue_capacity)
       .next("try again later");
 }
 
-void Trainer::enqueue(const StoredJob& job, std::optional<CheckedBatch> batch) {
+void Trainer::enqueue(const StoredJob& job, bool asked_for) {
   book_.report(progress_of(job));  // before the push: the worker's reports come after it
-  TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id, std::move(batch)}));
+  queue_.push({job.id, job.cell, asked_for});
+}
+
+Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
+  if (job.kind == JobKind::kDiagnose || job.batch_ids.size() != 1) return true;
+  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
+    return batch.job != job.id;
+  });
 }
 
 }  // namespace trammel

@@ -8,12 +8,12 @@
 #include <thread>
 #include <vector>
 
-#include "server/base/bounded_queue.h"
 #include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
 #include "server/trainer/job_progress.h"
+#include "server/trainer/job_queue.h"
 #include "server/trainer/job_runner.h"
 #include "server/trainer/served_cells.h"
 #include "server/trainer/trainer_options.h"
@@ -59,8 +59,8 @@ class Trainer {
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
   /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
   /// Returns the job id; the same request again returns the same. Refuses what the batch reader and the cell refuse, an
-  /// unknown cell (kNotFound), an id that the cell already has (kConflict), too many poses (kTooLarge) and, while the
-  /// queue is full, everything new (kBusy).
+  /// unknown cell (kNotFound), an id that the cell already has (kConflict) and too many poses (kTooLarge). However many
+  /// jobs wait, a batch is taken.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
   /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by
@@ -68,7 +68,9 @@ class Trainer {
   /// better.
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
-  /// and what the model in force has besides. Refuses batches that stay in quarantine.
+  /// and what the model in force has besides. Refuses batches that stay in quarantine and, where as many jobs that were
+  /// asked for wait for this cell as may, everything (kBusy). Refuses, with the limit, what no training may ask for:
+  /// more than max_poses, 1000 batches, 500 error sources, a bias of more than 32 kernels.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
                                              Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});
@@ -80,6 +82,11 @@ class Trainer {
                                               const std::string& csv, bool apply, const ChangeId& id = {});
   /// Of a job whose diagnosis is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
+  /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
+  /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
+  /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
+  /// that is over (kConflict).
+  [[nodiscard]] Status cancel(std::int64_t job);
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
@@ -115,10 +122,13 @@ class Trainer {
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
   void tell_troubles(std::vector<std::string>& told);
-  [[nodiscard]] Status check_room() const;
+  /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
+  [[nodiscard]] Status check_room(const std::string& cell) const;
   /// The job that was queued under this id before; empty: none.
   [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
-  void enqueue(const StoredJob& job, std::optional<CheckedBatch> batch);
+  void enqueue(const StoredJob& job, bool asked_for);
+  /// Whether somebody asked for the job; else it came with its batch.
+  [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
   /// Whether the stored batches may be trained from together.
@@ -137,9 +147,9 @@ class Trainer {
   TroubleListener trouble_listener_;
   ProgressBook book_;
   JobRunner runner_;
-  std::unique_ptr<BoundedQueue<QueuedJob>> queue_;
+  JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
-  Mutex submit_mutex_;  // one at a time between the look at the queue's room and the push: who may push
+  Mutex submit_mutex_;  // one at a time between the look at what is there and the push: who may push
   std::jthread worker_, keeper_, reclaimer_;
 };
 

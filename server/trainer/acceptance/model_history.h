@@ -13,6 +13,7 @@
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/gate.h"
+#include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/served_cells.h"
 
 namespace trammel {
@@ -21,16 +22,20 @@ namespace trammel {
 struct Candidate {
   const CompensatedModel& model;
   StoredJob job;
-  Bar bar = Bar::kBetter;
-  std::vector<JudgingSession> sessions;  ///< oldest first
-  std::string remarks;                   ///< go with the outcome
+  std::string remarks = {};                      ///< go with the outcome
+  std::optional<std::int64_t> peak_memory = {};  ///< bytes, see JobOutcome
+  std::optional<double> processor_time = {};     ///< s
 };
+
+/// Holds the candidate against others, wherever that is computed.
+using Judging = std::function<Result<GateVerdict>(const Opponents& opponents)>;
 
 /// What became of it.
 struct Kept {
   int version = 0;
   bool in_force = false;
   std::string message;  ///< the figures it was judged by, the limit and why
+  JobOutcome outcome;   ///< the same as data
 };
 
 /// A change of what is in force, as somebody asks for it.
@@ -50,7 +55,7 @@ class ModelHistory {
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
   /// `store` and `registry` outlive it. It is where the registry's models come from.
-  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry, double accept_ratio);
+  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry);
   ~ModelHistory();
   ModelHistory(const ModelHistory&) = delete;
   ModelHistory& operator=(const ModelHistory&) = delete;
@@ -74,11 +79,11 @@ class ModelHistory {
   /// same model is there already. Refuses one of another cell, robot or tool.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
 
-  /// Stores the model, ends its job and, if judge() says so, puts it in force. What the job may release leaves
+  /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may release leaves
   /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
   /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
   /// `stop` was requested.
-  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const std::stop_token& stop = {});
+  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop = {});
 
  private:
   [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
@@ -104,21 +109,22 @@ class ModelHistory {
   struct Judged {
     bool put_in_force = false, release = false;
     std::string message;
+    JobOutcome outcome;
   };
-  [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const ServedModel* present) const;
+  [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const Judging& judging,
+                                      const ServedModel* present) const;
   /// The cell's lock is held.
   [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged);
-  /// Of the candidate against `present`; null: none in force.
-  [[nodiscard]] Result<GateVerdict> verdict(const Candidate& candidate, const ServedModel* present) const;
-  /// The last versions that served the cell before the one in force, as far as they load.
-  [[nodiscard]] Result<std::vector<ServedModel>> served_before(const std::string& cell) const;
+  /// What a candidate of the cell is held against; `present` null: none in force.
+  [[nodiscard]] Result<Opponents> opponents(const std::string& cell, const ServedModel* present) const;
+  /// The last versions that served the cell before the one in force, as far as they can be read.
+  [[nodiscard]] Result<std::vector<ModelText>> served_before(const std::string& cell) const;
   /// The version marked in force, where it could not be loaded.
-  [[nodiscard]] Result<std::optional<StoredModel>> record_not_loaded(const std::string& cell) const;
+  [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(const std::string& cell) const;
 
   const ServedCells cells_;
   Store& store_;
   ModelRegistry& registry_;
-  const double accept_ratio_;
   Listener listener_;
   std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
   mutable Mutex troubles_mutex_;           // taken last
