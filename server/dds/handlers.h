@@ -6,6 +6,7 @@
 
 #include "idl/valid.h"
 #include "server/base/mutex.h"
+#include "server/dds/portioned_answer.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -47,6 +48,12 @@ class Handlers {
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
+  using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
+  using Corrections = std::unique_ptr<PortionedAnswer<wire::CorrectTargetReply>>;
+  /// Checks the whole request and takes the model.
+  [[nodiscard]] Result<Predictions> begin(const wire::PredictErrorRequest& request);
+  [[nodiscard]] Result<Corrections> begin(const wire::CorrectTargetRequest& request);
+  /// All of begin(), computed here and now.
   [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
   [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);
   /// Accepted means stored: see Trainer::submit.
@@ -72,6 +79,14 @@ class Handlers {
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
 };
+
+/// Computes all of an answer in one thread.
+template <typename Reply>
+[[nodiscard]] Result<Reply> computed(Result<std::unique_ptr<PortionedAnswer<Reply>>> begun) {
+  if (!begun) return tl::make_unexpected(begun.error());
+  (*begun)->compute(0, (*begun)->items());
+  return (*begun)->take();
+}
 
 /// Whether the request changes something. A repeat of such a request must not be carried out again.
 [[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);

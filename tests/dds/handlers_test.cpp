@@ -8,7 +8,7 @@
 
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
-#include "server/dds/request_endpoint.h"
+#include "tests/dds/answered.h"
 #include "tests/dds/backend.h"
 #include "tests/support/refusal.h"
 
@@ -434,12 +434,12 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
 }
 
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
-  ReplyMemory<wire::PredictErrorReply> memory(4);
+  test::Answered<wire::PredictError> calls(handlers_, "server-a");
   auto request = predict_request();
   request.header().contract_version(wire::CONTRACT_VERSION);
   request.header().request_id().sequence_number(77);
   request.header().request_id().writer_guid()[3] = 9;
-  const auto reply = reply_to(request, handlers_, memory, "server-a");
+  const auto reply = calls.reply_to(request);
   EXPECT_EQ(reply.header().result(), wire::RESULT_NOT_FOUND);
   EXPECT_EQ(reply.header().related_request_id().sequence_number(), 77);
   EXPECT_EQ(reply.header().related_request_id().writer_guid()[3], 9);
@@ -447,25 +447,25 @@ TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
 }
 
 TEST_F(HandlersTest, AnotherContractIsRefusedUnread) {
-  ReplyMemory<wire::PredictErrorReply> memory(4);
+  test::Answered<wire::PredictError> calls(handlers_, "server-a");
   auto request = predict_request();
   request.header().contract_version(wire::CONTRACT_VERSION + 1);
-  EXPECT_EQ(reply_to(request, handlers_, memory, "server-a").header().result(), wire::RESULT_WRONG_CONTRACT);
+  EXPECT_EQ(calls.reply_to(request).header().result(), wire::RESULT_WRONG_CONTRACT);
 }
 
 TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
-  ReplyMemory<wire::TrainReply> memory(4);
+  test::Answered<wire::Train> calls(handlers_, "server-a");
   wire::TrainRequest request;
   request.header().contract_version(wire::CONTRACT_VERSION);
   request.header().request_id().sequence_number(8);
   request.about().cell("cell-7");
-  const auto first = reply_to(request, handlers_, memory, "server-a");
-  const auto repeat = reply_to(request, handlers_, memory, "server-a");
+  const auto first = calls.reply_to(request);
+  const auto repeat = calls.reply_to(request);
   ASSERT_EQ(first.header().result(), wire::RESULT_OK) << first.header().message();
   EXPECT_EQ(repeat.job(), first.job());
   request.header().request_id().sequence_number(9);
-  EXPECT_NE(reply_to(request, handlers_, memory, "server-a").job(), first.job());
+  EXPECT_NE(calls.reply_to(request).job(), first.job());
 }
 
 TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {
