@@ -19,6 +19,7 @@
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
+#include "server/dds/port_lock.h"
 #include "server/dds/watchdog.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
@@ -212,6 +213,11 @@ Status serve(const ServerConfig& config) {
   const auto notices = trainer.take_up();
   if (!notices) return tl::make_unexpected(notices.error());
   for (const std::string& notice : *notices) spdlog::warn("{}", notice);
+  // A second copy of this server is told about the port first.
+  const Status free = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
+  if (!free) return free;
+  const auto name = PortLock::take_name(config.dds.domain, config.dds.server_id);
+  if (!name) return tl::make_unexpected(name.error());
   if (const Status started = service.start(); !started) return started;
   if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
   spdlog::info("ready: {} serves {} cells on {}:{}, domain {}, store {}", config.dds.server_id, config.cells.size(),
