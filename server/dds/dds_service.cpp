@@ -16,6 +16,7 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/old_contract.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
@@ -104,6 +105,7 @@ class DdsService::Running {
     status_thread_ = {};
     publish_status(wire::SERVICE_STOPPING);
     endpoints_.clear();
+    old_contract_.reset();
   }
 
   Running(const Running&) = delete;
@@ -140,7 +142,7 @@ class DdsService::Running {
         topics_(topics),
         echo_(std::move(echo)),
         channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
-        core_{options.server_id, *participant_, subscriber, handlers_, channels_} {
+        core_{options.server_id, *participant_, subscriber, handlers_, channels_, events_->owners()} {
     for (const auto& [name, cell] : trainer.cells()) publishing_[name];
   }
 
@@ -156,8 +158,15 @@ class DdsService::Running {
     if (opened) opened = open(wire::SubmitMeasurements(), 1);
     if (opened) opened = open(wire::Train(), 1);
     if (opened) opened = open(wire::Diagnose(), 1);
+    if (opened) opened = open(wire::CheckHealth(), 1);
+    if (opened) opened = open(wire::ReadModels(), 1);
     if (opened) opened = open(wire::ManageModels(), 1);
-    return opened;
+    if (opened) opened = open(wire::ReleaseBatches(), 1);
+    if (!opened) return opened;
+    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_, core_.owners);
+    if (!old) return tl::make_unexpected(old.error());
+    old_contract_ = std::move(*old);
+    return {};
   }
 
   void tell_status(const std::stop_token& stop) {
@@ -197,6 +206,10 @@ class DdsService::Running {
     status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
     status.requests(core_.requests);
     status.refused(core_.refused);
+    status.shed(core_.shed);
+    status.unheard(core_.unheard);
+    status.misdirected(core_.misdirected);
+    status.unreadable(*core_.unreadable);
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -216,6 +229,7 @@ class DdsService::Running {
   ServiceCore core_;
   std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;

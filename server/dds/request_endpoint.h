@@ -21,6 +21,7 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/partition_owners.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/reply_memory.h"
 #include "server/dds/stillness.h"
@@ -34,10 +35,15 @@ struct ServiceCore {
   wire::dds::Subscriber& subscriber;
   Handlers& handlers;
   ReplyChannels& channels;
-  std::atomic<std::uint64_t> requests{0};  ///< answered
-  std::atomic<std::uint64_t> refused{0};   ///< answered with another code than RESULT_OK
-  std::atomic<std::uint64_t> unheard{0};   ///< answered after the client had left
-  WorkUnderWay taking{};                   ///< takes of requests from DDS readers
+  const PartitionOwners& owners;
+  std::atomic<std::uint64_t> requests{0};     ///< answered
+  std::atomic<std::uint64_t> refused{0};      ///< answered with another code than RESULT_OK
+  std::atomic<std::uint64_t> shed{0};         ///< answered with RESULT_BUSY or RESULT_DEADLINE_MISSED
+  std::atomic<std::uint64_t> unheard{0};      ///< answered after the client had left
+  std::atomic<std::uint64_t> misdirected{0};  ///< not answered: the reply partition is another client's
+  /// Not answered: not even the header could be read.
+  std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
+  WorkUnderWay taking{};  ///< takes of requests from DDS readers
   WorkUnderWay replying{};
 };
 
@@ -51,8 +57,37 @@ class RequestEndpointBase {
   [[nodiscard]] virtual std::optional<std::uint64_t> unseen() const = 0;
 };
 
-/// The reply to a request, with its header: from the handler, or from `memory` for a repeat. Another contract version
-/// gets an error.
+/// Of a request that claims to be of another DDS writer than the one that sent it.
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
+                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
+  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
+                     "request_id must hold the GUID of the writer that sends it",
+                     {},
+                     "writer_guid",
+                     {},
+                     {}};
+}
+
+/// Whose answer it is, and to which request.
+inline void put_identity(const wire::RequestHeader& asked, const std::string& server_id, wire::ReplyHeader& reply) {
+  reply.related_request_id(asked.request_id());
+  reply.server(server_id);
+  reply.contract_version(wire::CONTRACT_VERSION);
+  reply.trace_id(asked.trace_id());
+}
+
+/// The reply to a request that cannot be carried out.
+template <typename Reply>
+[[nodiscard]] Reply refusal_of(const wire::RequestHeader& asked, const wire::Fault& fault,
+                               const std::string& server_id) {
+  Reply reply;
+  put_error(fault, reply.header());
+  put_identity(asked, server_id, reply.header());
+  return reply;
+}
+
+/// The reply to a request, with its header: from the handler, or from `memory` for a repeat.
 template <typename Request, typename Reply>
 [[nodiscard]] Reply reply_to(const Request& request, Handlers& handlers, ReplyMemory<Reply>& memory,
                              const std::string& server_id) {
@@ -64,29 +99,18 @@ template <typename Request, typename Reply>
   }
 
   Reply reply;
-  const auto refuse = [&](wire::ResultCode code, const std::string& message) {
-    reply = Reply();
-    reply.header().result(code);
-    reply.header().message(message);
-  };
-  if (asked.contract_version() != wire::CONTRACT_VERSION) {
-    refuse(wire::RESULT_WRONG_CONTRACT, fmt::format("the request is of contract {}, this server speaks {}",
-                                                    asked.contract_version(), wire::CONTRACT_VERSION));
-  } else {
-    try {
-      Result<Reply> answer = handlers.answer(request);
-      if (answer) {
-        reply = std::move(*answer);
-      } else {
-        refuse(to_wire(answer.error().code), sentence(answer.error()));
-      }
-    } catch (const std::exception& failed) {
-      refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
+  try {
+    Result<Reply> answer = handlers.answer(request);
+    if (answer) {
+      reply = std::move(*answer);
+    } else {
+      put_error(answer.error(), reply.header());
     }
+  } catch (const std::exception& failed) {
+    reply = Reply();
+    put_error(wire::Fault{wire::RESULT_UNKNOWN_EXCEPTION, failed.what(), {}, {}, {}, {}}, reply.header());
   }
-  reply.header().related_request_id(asked.request_id());
-  reply.header().server(server_id);
-  reply.header().contract_version(wire::CONTRACT_VERSION);
+  put_identity(asked, server_id, reply.header());
   if (once && reply.header().result() == wire::RESULT_OK) memory.remember(id, reply);
   return reply;
 }
@@ -101,7 +125,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
   [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, int workers) {
     std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core));
-    const auto request_topic = wire::make_request_topic<Operation>(core.participant);
+    const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
     const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
@@ -133,7 +157,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   static constexpr std::size_t kRepliesRemembered = 1024;
-  static constexpr std::size_t kLately = 32;  // kept replies; those with many targets are large
+  static constexpr std::size_t kMemoryKept = 65536;  // bytes of a request whose memory serves for the next one
+  static constexpr std::size_t kLately = 32;         // kept replies; those with many targets are large
   /// Whether an answer takes long to compute. Then a repeat gets the kept reply.
   static constexpr bool kComputes =
       std::is_same_v<Operation, wire::PredictError> || std::is_same_v<Operation, wire::CorrectTarget>;
@@ -150,7 +175,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
   void work(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "requests");
-    Request request;
+    wire::Received<Request> request;
     wire::dds::SampleInfo info;
     while (!stop.stop_requested()) {
       MutexLock lock(mutex_);
@@ -158,6 +183,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
       lock.unlock();
       while (!stop.stop_requested() && take(request, info)) {
         if (info.valid_data) serve(request, info.sample_identity.writer_guid(), stop);
+        if (request.bytes > kMemoryKept) request = {};
       }
       ++idle_;
       lock.lock();
@@ -166,15 +192,21 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     }
   }
 
-  bool take(Request& request, wire::dds::SampleInfo& info) {
+  bool take(wire::Received<Request>& request, wire::dds::SampleInfo& info) {
     const WorkUnderWay::Piece piece = core_.taking.begin();
     looked_ = arrivals_.load();
     return reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
-  void serve(const Request& request, const eprosima::fastrtps::rtps::GUID_t& writer, const std::stop_token& stop) {
+  void serve(const wire::Received<Request>& request, const eprosima::fastrtps::rtps::GUID_t& writer,
+             const std::stop_token& stop) {
     const std::string wanted = request.header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
+    const std::string partition = request.header().reply_partition().to_string();
+    if (!core_.owners.may_use(partition, wire::participant_of(writer))) {
+      ++core_.misdirected;
+      return;
+    }
     // Keyed by the DDS writer of the sample, not by the id in the request: clients may reuse their ids.
     const std::string sent = wire::participant_of(writer) +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
@@ -182,13 +214,17 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     UnderWay::Piece answering(under_way_, sent);
     if (!answering.is_first()) return;
     std::optional<Reply> known = lately_.find(sent);
-    Reply reply =
-        known ? std::move(*known) : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
+    const std::optional<wire::Fault> fault =
+        request.fault ? request.fault : fault_of_identity(request.header(), writer);
+    Reply reply = known   ? std::move(*known)
+                  : fault ? refusal_of<Reply>(request.header(), *fault, core_.server_id)
+                          : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
     if (kComputes && !known && reply.header().result() == wire::RESULT_OK) lately_.remember(sent, reply);
     ++core_.requests;
-    if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
+    const wire::ResultCode result = reply.header().result();
+    if (result != wire::RESULT_OK) ++core_.refused;
+    if (result == wire::RESULT_BUSY || result == wire::RESULT_DEADLINE_MISSED) ++core_.shed;
     const WorkUnderWay::Piece piece = core_.replying.begin();
-    const std::string partition = request.header().reply_partition().to_string();
     do {
       if (!core_.channels.send(partition, reply_topic_, &reply, stop)) ++core_.unheard;
     } while (answering.has_repeat());

@@ -28,10 +28,15 @@ std::vector<ReplyReader> ServiceEvents::wait(const std::stop_token& stop, std::c
 
 void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
                                             eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
-  if (info.status != eprosima::fastrtps::rtps::ReaderDiscoveryInfo::DISCOVERED_READER) return;
+  using Change = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
+  if (info.status == Change::REMOVED_READER) return owners_.left(info.info.guid());
   const std::string topic = info.info.topicName().to_string();
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
-  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
+  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) {
+    return owners_.left(info.info.guid());
+  }
+  owners_.found(info.info.guid(), partitions.front());
+  if (info.status != Change::DISCOVERED_READER) return;
   {
     const MutexLock lock(mutex_);
     if (readers_.size() < kMaxReaders) readers_.push_back({topic, partitions.front()});

@@ -8,6 +8,7 @@
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
+#include "server/dds/partition_owners.h"
 
 namespace trammel {
 
@@ -17,10 +18,11 @@ struct ReplyReader {
   std::string partition;
 };
 
-/// What the status thread of a service waits for. As the participant's listener it notes reply readers and nothing
-/// else. Thread-safe.
+/// What the status thread of a service waits for. As the participant's listener it notes reply readers and whose they
+/// are, and nothing else. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
+  [[nodiscard]] const PartitionOwners& owners() const { return owners_; }
   void status_changed();
   /// Waits until the status has changed or readers have been found, at most `limit`. Returns the readers found since
   /// the last call.
@@ -30,6 +32,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 
+  PartitionOwners owners_;
   Mutex mutex_;
   Condition changed_;
   bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
