@@ -214,11 +214,11 @@ void shape(CdrWalk& walk, Of<Job>) {
   walk.longs(1);
   walk.flag("in_force");
   walk.enumerator("verdict", VERDICT_CANCELLED);
-  walk.longs(1);
   walk.wides(4);
   walk.enumerator("code", RESULT_MALFORMED);
   sentence(walk, "why");
   sentence(walk, "next");
+  walk.wides(2);
   batch_ids(walk);
   walk.wides(3);
 }
@@ -283,8 +283,9 @@ void shape(CdrWalk& walk, Of<ServiceStatus>) {
   walk.enumerator("state", SERVICE_STOPPING);
   walk.list("cells", MAX_CELLS, kNumber, "cell", [&] { id(walk, "cells"); });
   walk.longs(1);
-  walk.wides(7);
+  walk.wides(8);
   walk.longs(1);
+  sentence(walk, "trouble");
   walk.wides(1);
 }
 

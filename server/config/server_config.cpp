@@ -10,9 +10,7 @@
 #include "server/base/near_miss.h"
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
-#include "server/bias/kernels/kernel_spelling.h"
-#include "server/error_sources/error_source.h"
-#include "server/error_sources/physical_model.h"
+#include "server/compensate/model_spec.h"
 
 namespace trammel {
 namespace {
@@ -80,7 +78,8 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
 }
 
 void read_dds(const YamlMap& map, DdsOptions& dds) {
-  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients"});
+  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients",
+            "client_requests", "client_mb", "queued_requests", "queued_mb", "cell_share"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
@@ -89,6 +88,11 @@ void read_dds(const YamlMap& map, DdsOptions& dds) {
   map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
   map.attempt([&] { dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64); });
   map.attempt([&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
+  map.attempt([&] { dds.client_requests = integer_within(map, "client_requests", dds.client_requests, 1, 10000); });
+  map.attempt([&] { dds.client_mb = integer_within(map, "client_mb", dds.client_mb, 40, 65536); });
+  map.attempt([&] { dds.queued_requests = integer_within(map, "queued_requests", dds.queued_requests, 1, 1000000); });
+  map.attempt([&] { dds.queued_mb = integer_within(map, "queued_mb", dds.queued_mb, 80, 65536); });
+  map.attempt([&] { dds.cell_share = number_within(map, "cell_share", dds.cell_share, 0.5, 1); });
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
@@ -163,24 +167,6 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
 }
 
-/// Notes what the first training of the cell would refuse.
-void check_training(const Cell& cell, const std::string& file, std::vector<Error>& problems) {
-  const auto note = [&](const char* key, Error why) {
-    why.field.clear();
-    problems.push_back(Failure(std::move(why)).under(fmt::format("model: {}", key)).in(file).value());
-  };
-  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error());
-  bool each_is_known = true;
-  for (const std::string& source : cell.model.error_sources) {
-    const auto made = make_error_source(source, cell);
-    if (!made) note("error_sources", made.error());
-    each_is_known = each_is_known && made;
-  }
-  if (!each_is_known) return;
-  const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
-  if (!together) note("error_sources", together.error());
-}
-
 void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& problems) {
   std::map<std::string, std::string> file_of;
   for (const std::string& cell_file : file.cell_files) {
@@ -204,7 +190,7 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& p
                              .in(path)
                              .with_text(name)
                              .value());
-    check_training(*cell, cell_file, problems);
+    for (Error& one : check_model_spec(*cell, cell_file)) problems.push_back(std::move(one));
     file.config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
   }
 }

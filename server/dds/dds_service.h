@@ -13,9 +13,10 @@
 namespace trammel {
 
 /// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
-/// requests (DdsOptions::compute_workers for each of PredictError and CorrectTarget, one for each other operation) and
-/// one that publishes its status every second. stop() ends them all. A watchdog ends the process when these threads or
-/// the library's hang (watchdog.h). Thread-safe.
+/// requests (schedule/lane.h: DdsOptions::compute_workers for each of PredictError and CorrectTarget, some for what
+/// reads and some for what changes), one that sends replies which had to wait, and one that publishes its status every
+/// second. stop() ends them all. A watchdog ends the process when these threads or the library's hang (watchdog.h).
+/// Thread-safe.
 class DdsService {
  public:
   /// `trainer`, `store` and `registry` outlive the service.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "idl/valid.h"
 #include "server/base/mutex.h"
+#include "server/dds/portioned_answer.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -47,6 +50,12 @@ class Handlers {
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
+  using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
+  using Corrections = std::unique_ptr<PortionedAnswer<wire::CorrectTargetReply>>;
+  /// Checks the whole request and takes the model.
+  [[nodiscard]] Result<Predictions> begin(const wire::PredictErrorRequest& request);
+  [[nodiscard]] Result<Corrections> begin(const wire::CorrectTargetRequest& request);
+  /// All of begin(), computed here and now.
   [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
   [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);
   /// Accepted means stored: see Trainer::submit.
@@ -60,10 +69,18 @@ class Handlers {
   [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
 
  private:
-  [[nodiscard]] Result<std::int64_t> train_from_batches(const wire::TrainRequest& request);
-  [[nodiscard]] Result<std::int64_t> train_diagnosed(const wire::TrainRequest& request);
-  /// The version activated, gone back to or imported.
+  /// The job.
+  [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
+  /// The version activated, gone back to or imported; 0: none.
   [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
+  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job);
+  /// The job, or 0.
+  [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
+  /// Refuses (kConflict) where another version is in force.
+  [[nodiscard]] Status check_expected(const std::string& cell, const std::optional<int>& expected) const;
+  /// The same, unless the change has been made under this id.
+  [[nodiscard]] Status check_expected_once(const std::string& cell, const std::optional<int>& expected,
+                                           const ChangeId& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
                                                    const wire::ReadModelsRequest& request) const;
   [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;
@@ -79,6 +96,14 @@ class Handlers {
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
 };
+
+/// Computes all of an answer in one thread.
+template <typename Reply>
+[[nodiscard]] Result<Reply> computed(Result<std::unique_ptr<PortionedAnswer<Reply>>> begun) {
+  if (!begun) return tl::make_unexpected(begun.error());
+  (*begun)->compute(0, (*begun)->items());
+  return (*begun)->take();
+}
 
 /// Whether the request changes something. A repeat of such a request must not be carried out again.
 [[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);

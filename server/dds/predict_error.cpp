@@ -1,5 +1,6 @@
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "server/base/units.h"
 #include "server/dds/codec.h"
@@ -57,20 +58,46 @@ Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subjec
   return pose;
 }
 
+/// Its poses are checked, its model is taken.
+class PortionedPredictions final : public PortionedAnswer<wire::PredictErrorReply> {
+ public:
+  PortionedPredictions(Subject subject, std::vector<PoseContext> poses)
+      : subject_(std::move(subject)), poses_(std::move(poses)) {
+    reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
+    reply_.predictions().resize(poses_.size());
+  }
+  std::size_t items() const override { return poses_.size(); }
+  void compute(std::size_t first, std::size_t count) override {
+    const CompensatedModel& model = subject_.served->model;
+    for (std::size_t i = first; i < first + count; ++i) {
+      reply_.predictions()[i] = to_wire(model.predict_all({poses_[i]}).front());
+    }
+  }
+  wire::PredictErrorReply take() override { return std::move(reply_); }
+
+ private:
+  const Subject subject_;
+  const std::vector<PoseContext> poses_;
+  wire::PredictErrorReply reply_;
+};
+
 }  // namespace
 
-Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {
-  const auto subject = subjects_.find(request.about());
+Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& request) {
+  auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());
-  wire::PredictErrorReply reply;
-  reply.model(trammel::to_wire(*subject->served, subject->in_force, unix_now_s()));
-  reply.predictions().reserve(request.poses().size());
+  std::vector<PoseContext> poses;
+  poses.reserve(request.poses().size());
   for (std::size_t i = 0; i < request.poses().size(); ++i) {
-    const auto pose = context_of(request.poses()[i], *subject, fmt::format("joint vector {}", i + 1));
+    auto pose = context_of(request.poses()[i], *subject, fmt::format("joint vector {}", i + 1));
     if (!pose) return tl::make_unexpected(pose.error());
-    reply.predictions().push_back(to_wire(subject->served->model.predict_all({*pose}).front()));
+    poses.push_back(std::move(*pose));
   }
-  return reply;
+  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses));
+}
+
+Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {
+  return computed(begin(request));
 }
 
 bool happens_once(const wire::PredictErrorRequest&) { return false; }

@@ -45,15 +45,13 @@ Result<CheckedBatch> sent_batch(const std::string& csv, std::int64_t taken_in, c
 }
 
 JobBatches::JobBatches(const Store& store, const StoredJob& job, const Cell& cell, const TrainerOptions& options,
-                       std::optional<CheckedBatch> accepted, StoredDiagnosis asked)
+                       StoredDiagnosis asked)
     : store_(store),
       job_(job),
       cell_(cell),
       hold_out_(job.kind == JobKind::kDiagnose ? held_out_of_diagnosis(options, asked.apply)
                                                : held_out_to_judge(options)),
-      asked_(std::move(asked)) {
-  if (accepted) own_.emplace(job_.batch_ids.empty() ? "" : accepted->id(), *accepted);
-}
+      asked_(std::move(asked)) {}
 
 Result<CheckedBatch> JobBatches::first() { return own(job_.batch_ids.empty() ? "" : job_.batch_ids.front()); }
 

@@ -29,13 +29,12 @@ namespace trammel {
                                               const HoldOut& hold_out);
 
 /// The batches that one job works on, and those that judge what it makes. Each of them is parsed, checked and split
-/// once: when the job was accepted, else here.
+/// once.
 class JobBatches {
  public:
-  /// `accepted`: the batch that came with the job, where it is still at hand. `asked`: of a diagnosis. The others
-  /// outlive it.
+  /// `asked`: of a diagnosis. The others outlive it.
   JobBatches(const Store& store, const StoredJob& job, const Cell& cell, const TrainerOptions& options,
-             std::optional<CheckedBatch> accepted, StoredDiagnosis asked = {});
+             StoredDiagnosis asked = {});
 
   /// The first batch of the job, or the one that came with it.
   [[nodiscard]] Result<CheckedBatch> first();

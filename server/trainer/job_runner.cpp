@@ -41,6 +41,10 @@ JobProgress progress_at(const StoredJob& job, JobStage stage) {
   return progress;
 }
 
+JobVerdict verdict_of(const Error& error) {
+  return error.code == ErrorCode::kInternal ? JobVerdict::kBroken : JobVerdict::kRefused;
+}
+
 /// `; ` between what is said.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
@@ -56,49 +60,51 @@ JobRunner::JobRunner(const ServedCells& cells, Store& store, const ModelRegistry
                      ProgressBook& book, const TrainerOptions& options)
     : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
 
-void JobRunner::run(const QueuedJob& job, const std::stop_token& stop) {
+void JobRunner::run(std::int64_t id, const StopRequests& stop) {
   const Status outcome = [&]() -> Status {
     try {
-      return attempt(job, stop);
+      return attempt(id, stop);
     } catch (const std::exception& error) {  // out of memory, for one: this training ends, the service goes on
       return failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
     }
   }();
   if (outcome) return;
   JobProgress progress;
-  progress.job = job.id;
-  if (const auto stored = store_.job(job.id)) progress = progress_of(*stored);
-  if (stop.stop_requested()) {
+  progress.job = id;
+  if (const auto stored = store_.job(id)) progress = progress_of(*stored);
+  if (stop.service.stop_requested() && !stop.job.stop_requested()) {
     // Should the store refuse, the job counts as interrupted and is taken up all the same.
-    static_cast<void>(store_.set_job_queued(job.id));
+    static_cast<void>(store_.set_job_queued(id));
     progress.stage = JobStage::kQueued;
     return book_.report(progress);
   }
-  const Status failed = store_.set_job_failed(job.id, sentence(outcome.error()));
-  if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
   progress.stage = JobStage::kFailed;
-  progress.what = sentence(outcome.error());
+  progress.what = stop.job.stop_requested() ? cancelled_outcome().why : sentence(outcome.error());
+  progress.outcome =
+      stop.job.stop_requested() ? cancelled_outcome() : failed_outcome(outcome.error(), verdict_of(outcome.error()));
+  const Status failed = store_.set_job_failed(id, progress.what, progress.outcome);
+  if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
   book_.report(progress);
 }
 
-Status JobRunner::attempt(const QueuedJob& queued, const std::stop_token& stop) {
-  const auto job = store_.job(queued.id);
+Status JobRunner::attempt(std::int64_t id, const StopRequests& stop) {
+  const auto job = store_.job(id);
   if (!job) return tl::make_unexpected(job.error());
   const auto cell = find_cell(cells_, job->cell);
   if (!cell) return tl::make_unexpected(cell.error());
   if (auto running = store_.set_job_running(job->id); !running) return running;
   book_.report(progress_at(*job, JobStage::kTraining));
   if (job->kind == JobKind::kTrain) {
-    JobBatches batches(store_, *job, **cell, options_, queued.batch);
+    JobBatches batches(store_, *job, **cell, options_);
     return attempt_training(*job, batches, stop);
   }
   const auto asked = store_.diagnosis(job->id);
   if (!asked) return tl::make_unexpected(asked.error());
-  JobBatches batches(store_, *job, **cell, options_, queued.batch, *asked);
+  JobBatches batches(store_, *job, **cell, options_, *asked);
   return attempt_diagnosis(*job, batches, asked->apply, stop);
 }
 
-Status JobRunner::attempt_training(const StoredJob& job, JobBatches& batches, const std::stop_token& stop) {
+Status JobRunner::attempt_training(const StoredJob& job, JobBatches& batches, const StopRequests& stop) {
   const auto looked_at = hold_against_model_in_force(job, batches);
   if (!looked_at) return tl::make_unexpected(looked_at.error());
   const auto batch = batches.to_learn_from();
@@ -112,11 +118,10 @@ Status JobRunner::attempt_training(const StoredJob& job, JobBatches& batches, co
   if (!sessions) return tl::make_unexpected(sessions.error());
   const std::string seen = looked_at->empty() ? "" : "the batch: " + *looked_at;
   return keep(
-      {successor->model, job, Bar::kBetter, std::move(*sessions), joined_by_semicolons({seen, successor->note})});
+      {successor->model, job, Bar::kBetter, std::move(*sessions), joined_by_semicolons({seen, successor->note})}, stop);
 }
 
-Status JobRunner::attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply,
-                                    const std::stop_token& stop) {
+Status JobRunner::attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply, const StopRequests& stop) {
   // What is to judge an extended model must not have been looked at.
   const auto batch = batches.to_diagnose();
   if (!batch) return tl::make_unexpected(batch.error());
@@ -132,16 +137,21 @@ Status JobRunner::attempt_diagnosis(const StoredJob& job, JobBatches& batches, b
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
   const Status stored = store_.store_findings(job.id, findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
   if (!stored) return stored;
-  if (!apply) return finish(job, std::string(to_string(diagnosis->verdict)));
+  JobOutcome outcome;
+  outcome.verdict = JobVerdict::kDiagnosed;
+  outcome.why = diagnosis->sentence;
+  if (!apply) return finish(job, std::string(to_string(diagnosis->verdict)), outcome);
   if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
     const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
-    return finish(job, "nothing applied: " + sentence(can_apply.error()) + stays);
+    outcome.verdict = JobVerdict::kNothingApplied;
+    outcome.why = sentence(can_apply.error());
+    return finish(job, "nothing applied: " + outcome.why + stays, outcome);
   }
   return this->apply(job, batches, *batch, served->model.error_sources, *diagnosis, stop);
 }
 
 Status JobRunner::apply(const StoredJob& job, JobBatches& batches, const CheckedBatch& batch,
-                        const std::vector<std::string>& own, const Diagnosis& diagnosis, const std::stop_token& stop) {
+                        const std::vector<std::string>& own, const Diagnosis& diagnosis, const StopRequests& stop) {
   TrainOptions options = train_options(job, stop);
   options.progress = [report = options.progress](const std::string& stage, double share) {
     return report(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
@@ -155,7 +165,8 @@ Status JobRunner::apply(const StoredJob& job, JobBatches& batches, const Checked
   Judges judges = judges_of(diagnosis, std::move(own_judges));
   own_judges = std::move(judges.batch);
   return keep({extended->model, job, Bar::kBetterBeyondChance, std::move(found->sessions),
-               judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)})});
+               judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)})},
+              stop);
 }
 
 Result<std::string> JobRunner::hold_against_model_in_force(const StoredJob& job, JobBatches& batches) {
@@ -178,7 +189,7 @@ Result<std::string> JobRunner::hold_against_model_in_force(const StoredJob& job,
       .next("retrain --release if it is good");
 }
 
-std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const std::stop_token& stop) {
+std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const StopRequests& stop) {
   auto reported = std::make_shared<std::chrono::steady_clock::time_point>();
   return [this, running = progress_at(job, JobStage::kTraining), reported, stop](const std::string& stage,
                                                                                  double share) mutable {
@@ -189,11 +200,11 @@ std::function<bool(const std::string&, double)> JobRunner::reporter(const Stored
       running.share = share;
       book_.report(running);
     }
-    return !stop.stop_requested();
+    return !stop.any();
   };
 }
 
-TrainOptions JobRunner::train_options(const StoredJob& job, const std::stop_token& stop) {
+TrainOptions JobRunner::train_options(const StoredJob& job, const StopRequests& stop) {
   TrainOptions options;
   if (!job.level.empty()) {
     options.level = job.level;
@@ -207,15 +218,16 @@ TrainOptions JobRunner::train_options(const StoredJob& job, const std::stop_toke
   return options;
 }
 
-Status JobRunner::keep(Candidate candidate) {
+Status JobRunner::keep(Candidate candidate, const StopRequests& stop) {
   candidate.remarks += joined_by_semicolons(warnings_of(candidate.model, candidate.model.parts().validation));
-  const auto kept = history_.keep(candidate);
+  const auto kept = history_.keep(candidate, stop.service);
   if (!kept) return tl::make_unexpected(kept.error());
   JobProgress progress = progress_at(candidate.job, JobStage::kDone);
   progress.what = kept->message;
   progress.share = 1;
   progress.model_version = kept->version;
   progress.in_force = kept->in_force;
+  progress.outcome = kept->outcome;
   book_.report(progress);
   return {};
 }
@@ -226,10 +238,11 @@ void JobRunner::report_storing(const StoredJob& job) {
   book_.report(progress);
 }
 
-Status JobRunner::finish(const StoredJob& job, const std::string& outcome) {
-  if (const Status done = store_.set_job_done(job.id, outcome); !done) return done;
+Status JobRunner::finish(const StoredJob& job, const std::string& message, const JobOutcome& outcome) {
+  if (const Status done = store_.set_job_done(job.id, message, outcome); !done) return done;
   JobProgress progress = progress_at(job, JobStage::kDone);
-  progress.what = outcome;
+  progress.what = message;
+  progress.outcome = outcome;
   progress.share = 1;
   book_.report(progress);
   return {};

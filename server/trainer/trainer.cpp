@@ -8,6 +8,7 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
@@ -23,11 +24,7 @@ constexpr int kJobsListed = 20;           // of those done and of those failed, 
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
-  if (id.size() > kMaxBatchId)
-    return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId).of("batch").beyond(id.size(), kMaxBatchId);
-  const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!printable) return refused("batch id {:?} has control characters", id).of("batch").with_text(id);
-  return {};
+  return check_name(id, "batch", kMaxBatchId);
 }
 
 /// Level and bias of a training that is asked for; empty: as usual.
@@ -50,8 +47,7 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       registry_(registry),
       options_(options),
       history_(cells_, store, registry, options.accept_ratio),
-      runner_(cells_, store, registry, history_, book_, options),
-      queue_(std::make_unique<BoundedQueue<QueuedJob>>(static_cast<std::size_t>(options.queue_capacity))) {}
+      runner_(cells_, store, registry, history_, book_, options) {}
 
 Trainer::~Trainer() { stop(); }
 
@@ -73,13 +69,13 @@ Result<std::vector<std::string>> Trainer::take_up() {
   for (StoredJob& job : *unfinished) {
     const auto wanted = can_take_up(job, notices);
     if (!wanted) return tl::make_unexpected(wanted.error());
+    if (!*wanted) continue;
+    const auto asked_for = was_asked_for(job);
+    if (!asked_for) return tl::make_unexpected(asked_for.error());
+    queue_.push({job.id, job.cell, *asked_for});
     job.state = JobState::kQueued;
-    if (*wanted) jobs.push_back(std::move(job));
+    jobs.push_back(std::move(job));
   }
-  // Accepted is accepted: those of before may be more than the queue takes now.
-  queue_ = std::make_unique<BoundedQueue<QueuedJob>>(
-      std::max(static_cast<std::size_t>(options_.queue_capacity), jobs.size()));
-  for (const StoredJob& job : jobs) TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id}));
   taken_up_ = std::move(jobs);
   return notices;
 }
@@ -108,7 +104,10 @@ Result<std::vector<std::string>> Trainer::start() {
   taken_up_.reset();
   worker_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "trainer");
-    while (const auto job = queue_->pop(stop)) runner_.run(*job, stop);
+    while (const auto taken = queue_.take(stop)) {
+      runner_.run(taken->job.id, {stop, taken->cancelled});
+      queue_.put_down();
+    }
   });
   return notices;
 }
@@ -140,17 +139,14 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
-  if (!repeated) {
-    if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  }
   const auto accepted = store_.add_batch(stored, job);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  if (!repeated) enqueue(*accepted, *batch);
+  if (!repeated) enqueue(*accepted, false);
   return accepted->id;
 }
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
-                                       const std::string& csv, bool apply) {
+                                       const std::string& csv, bool apply, const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
@@ -160,26 +156,27 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
   job.kind = JobKind::kDiagnose;
   job.cell = cell_name;
   job.created_at = unix_now();
-  std::optional<CheckedBatch> sent;
   if (csv.empty()) {
     const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
     if (!stored) return tl::make_unexpected(stored.error());
     job.batch_ids = {*stored};
   } else {
-    auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
+    const auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
     if (!batch) return tl::make_unexpected(batch.error());
     if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
           .of("poses")
           .beyond(poses, options_.max_poses);
     }
-    sent = std::move(*batch);
   }
   const MutexLock lock(submit_mutex_);
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""});
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
+  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::move(sent));
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -197,7 +194,8 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
 }
 
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
-                                      const std::string& level, const std::string& bias, Quarantine quarantine) {
+                                      const std::string& level, const std::string& bias, Quarantine quarantine,
+                                      const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
@@ -218,10 +216,13 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_job(job, release);
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
+  const auto accepted = store_.add_job(job, release, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::nullopt);
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -242,9 +243,35 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
       .beyond(poses, options_.max_poses);
 }
 
-Status Trainer::release(const std::string& cell_name, const std::string& batch_id) {
+Status Trainer::cancel(std::int64_t id) {
+  const auto job = store_.job(id);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto asked_for = was_asked_for(*job);
+  if (!asked_for) return tl::make_unexpected(asked_for.error());
+  switch (queue_.cancel(id)) {
+    case JobQueue::Cancelled::kStopping:
+      return {};
+    case JobQueue::Cancelled::kUnknown:
+      return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id);
+    case JobQueue::Cancelled::kRemoved:
+      break;
+  }
+  const JobOutcome outcome = cancelled_outcome();
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome); !ended) {
+    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+    return ended;
+  }
+  JobProgress progress = progress_of(*job);
+  progress.stage = JobStage::kFailed;
+  progress.what = outcome.why;
+  progress.outcome = outcome;
+  book_.report(progress);
+  return {};
+}
+
+Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
   if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
-  return store_.set_quarantine(cell_name, batch_id, "");
+  return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
@@ -290,19 +317,33 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
   return jobs;
 }
 
-int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
+int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }
 
-Status Trainer::check_room() const {
-  if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}", queue_->size(), options_.queue_capacity)
+Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) const {
+  return store_.outcome_of(id).map(
+      [](const std::optional<ChangeOutcome>& made) { return made ? std::optional(made->job) : std::nullopt; });
+}
+
+Status Trainer::check_room(const std::string& cell) const {
+  const std::size_t waiting = queue_.asked_for(cell);
+  if (waiting < static_cast<std::size_t>(options_.queue_capacity)) return {};
+  return failure(ErrorCode::kBusy, "{} jobs that were asked for wait for cell {}, limit {}", waiting, cell,
+                 options_.queue_capacity)
       .of("queue")
-      .beyond(queue_->size(), options_.queue_capacity)
+      .beyond(waiting, options_.queue_capacity)
       .next("try again later");
 }
 
-void Trainer::enqueue(const StoredJob& job, std::optional<CheckedBatch> batch) {
+void Trainer::enqueue(const StoredJob& job, bool asked_for) {
   book_.report(progress_of(job));  // before the push: the worker's reports come after it
-  TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id, std::move(batch)}));
+  queue_.push({job.id, job.cell, asked_for});
+}
+
+Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
+  if (job.kind == JobKind::kDiagnose || job.batch_ids.size() != 1) return true;
+  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
+    return batch.job != job.id;
+  });
 }
 
 }  // namespace trammel

@@ -7,7 +7,7 @@
 
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
-#include "server/dds/request_endpoint.h"
+#include "tests/dds/answered.h"
 #include "tests/dds/backend.h"
 #include "tests/support/refusal.h"
 
@@ -409,8 +409,7 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
                           wire::READ_REPLAY}) {
     EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
   }
-  for (const auto action : {wire::MANAGE_CANCEL_JOB, wire::MANAGE_BACKUP})
-    EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(action)))) << action;
+  EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
   auto forced = manage_request(wire::MANAGE_ACTIVATE, 1);
   forced.force(true);
   EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
@@ -518,12 +517,12 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
 }
 
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
-  ReplyMemory<wire::PredictErrorReply> memory(4);
+  test::Answered<wire::PredictError> calls(handlers_, "server-a");
   auto request = predict_request();
   request.header().contract_version(wire::CONTRACT_VERSION);
   request.header().request_id().sequence_number(77);
   request.header().request_id().writer_guid()[3] = 9;
-  const auto reply = reply_to(request, handlers_, memory, "server-a");
+  const auto reply = calls.reply_to(request);
   EXPECT_EQ(reply.header().result(), wire::RESULT_NOT_FOUND);
   EXPECT_EQ(reply.header().related_request_id().sequence_number(), 77);
   EXPECT_EQ(reply.header().related_request_id().writer_guid()[3], 9);
@@ -531,12 +530,12 @@ TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
 }
 
 TEST_F(HandlersTest, AnErrorArrivesAsASentenceAndAsData) {
-  ReplyMemory<wire::PredictErrorReply> memory(4);
+  test::Answered<wire::PredictError> calls(handlers_, "server-a");
   backend_.serve(1);
   auto request = predict_request(2);
   request.poses()[1].joints_rad()[2] = 1.5;  // limit 70 deg
   request.header().trace_id("job-17");
-  const auto reply = reply_to(request, handlers_, memory, "server-a");
+  const auto reply = calls.reply_to(request);
   EXPECT_EQ(reply.header().result(), wire::RESULT_REFUSED);
   EXPECT_EQ(reply.header().trace_id().to_string(), "job-17");
   EXPECT_NE(reply.header().message().find("joint vector 2"), std::string::npos);
@@ -552,17 +551,17 @@ TEST_F(HandlersTest, AnErrorArrivesAsASentenceAndAsData) {
 
 TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
-  ReplyMemory<wire::TrainReply> memory(4);
+  test::Answered<wire::Train> calls(handlers_, "server-a");
   wire::TrainRequest request;
   request.header().contract_version(wire::CONTRACT_VERSION);
   request.header().request_id().sequence_number(8);
   request.about().cell("cell-7");
-  const auto first = reply_to(request, handlers_, memory, "server-a");
-  const auto repeat = reply_to(request, handlers_, memory, "server-a");
+  const auto first = calls.reply_to(request);
+  const auto repeat = calls.reply_to(request);
   ASSERT_EQ(first.header().result(), wire::RESULT_OK) << first.header().message();
   EXPECT_EQ(repeat.job(), first.job());
   request.header().request_id().sequence_number(9);
-  EXPECT_NE(reply_to(request, handlers_, memory, "server-a").job(), first.job());
+  EXPECT_NE(calls.reply_to(request).job(), first.job());
 }
 
 TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {

@@ -4,7 +4,9 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/mutex.h"
@@ -29,6 +31,13 @@ struct Kept {
   int version = 0;
   bool in_force = false;
   std::string message;  ///< the figures it was judged by, the limit and why
+  JobOutcome outcome;   ///< the same as data
+};
+
+/// A change of what is in force, as somebody asks for it.
+struct ChangeRequest {
+  ChangeId id = {};                  ///< it happens once under this id
+  std::optional<int> expected = {};  ///< the version served now, 0: none; with another one (kConflict) nothing changes
 };
 
 /// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
@@ -50,22 +59,46 @@ class ModelHistory {
 
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
-  /// Puts a stored version in force and publishes it.
-  [[nodiscard]] Status activate(const std::string& cell, int version);
-  /// Back to the version in force before, or the last one before it that can be served; returns it.
-  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// Puts a stored version in force and publishes it. A version that is served already is not published again.
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {});
+  /// Back to the version in force before, or the last one before it that can be served; returns it. Refuses (kBusy)
+  /// where others change what is in force all the time.
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {});
   /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
   /// same model is there already. Refuses one of another cell, robot or tool.
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
 
   /// Stores the model, ends its job and, if judge() says so, puts it in force. What the job may release leaves
-  /// quarantine where the model goes in force, and where too few poses can judge it.
-  [[nodiscard]] Result<Kept> keep(const Candidate& candidate);
+  /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
+  /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
+  /// `stop` was requested.
+  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const std::stop_token& stop = {});
 
  private:
   [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
   /// Of a model that the store has put in force; the cell's lock is held.
   void put_in_force(ServedModel model);
+  /// The cell's lock is held, or what it guards is looked at again when it is.
+  [[nodiscard]] Status check_expected(const std::string& cell, const ChangeRequest& request) const;
+  /// Where a rollback leads.
+  struct WayBack {
+    int version_now = 0;
+    std::vector<int> before;  ///< Store::previous_in_force()
+    bool operator==(const WayBack&) const = default;
+  };
+  [[nodiscard]] Result<WayBack> way_back(const std::string& cell) const;
+  /// The first of `before` that can be served: how many steps back it is, and the model.
+  [[nodiscard]] Result<std::pair<int, CompensatedModel>> load_first(const std::string& cell,
+                                                                    const std::vector<int>& before) const;
+  /// What is to be said and stored of a candidate that was judged.
+  struct Judged {
+    bool put_in_force = false, release = false;
+    std::string message;
+    JobOutcome outcome;
+  };
+  [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const ServedModel* present) const;
+  /// The cell's lock is held.
+  [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged);
   /// Of the candidate against `present`; null: none in force.
   [[nodiscard]] Result<GateVerdict> verdict(const Candidate& candidate, const ServedModel* present) const;
   /// The last versions that served the cell before the one in force, as far as they load.

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "idl/guard/dropped.h"
+#include "idl/guard/edited_message.h"
+#include "idl/guard/fragment_watch.h"
+#include "idl/guard/participant_watch.h"
+#include "idl/guard/sequence_watch.h"
+#include "server/base/mutex.h"
+
+namespace trammel::wire {
+
+/// Stands before the library's receiver: drops what would end, stop or flood it, and passes everything that an honest
+/// participant sends, secured or not. README.md says what is dropped and why. Reads hostile bytes: it never reads
+/// beyond a message, allocates nothing per packet and throws nothing. Thread-safe; it takes its one lock only for
+/// messages whose sender it must remember.
+class Guard {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  explicit Guard(std::shared_ptr<DropCounts> counts = nullptr);
+
+  /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
+  /// Empty: nothing. Valid until the calling thread's next call.
+  [[nodiscard]] std::optional<Bytes> check(Bytes message, std::uint64_t socket,
+                                           Time now = std::chrono::steady_clock::now());
+  /// A message of our own that leaves.
+  void sent(Bytes message);
+
+  [[nodiscard]] const DropCounts& counts() const { return *counts_; }
+
+ private:
+  friend class MessageCheck;
+  void confirm(Bytes to, const Submessage& acknack);
+
+  const std::shared_ptr<DropCounts> counts_;
+  Mutex mutex_;
+  SequenceWatch sequences_ TRAMMEL_GUARDED_BY(mutex_);
+  UnfinishedSamples unfinished_ TRAMMEL_GUARDED_BY(mutex_);
+  SentSamples sent_ TRAMMEL_GUARDED_BY(mutex_);
+  ParticipantWatch participants_ TRAMMEL_GUARDED_BY(mutex_);
+};
+
+}  // namespace trammel::wire
