@@ -1,5 +1,6 @@
 // trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
 #include <signal.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "server/base/mutex.h"
+#include "server/base/plain_text.h"
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
@@ -64,11 +66,23 @@ int refuse_start(std::vector<Error> problems) {
 /// Prints what a start would meet on this host.
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
-  for (const std::string& note : found.notes) fmt::print("{}\n", note);
+  for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
   if (!found.problems.empty()) return refuse_start(found.problems);
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
+
+/// The message in one line that controls no terminal, whatever names it holds.
+class PlainMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& line) override {
+    const std::string plain = shown({message.payload.data(), message.payload.size()});
+    line.append(plain.data(), plain.data() + plain.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PlainMessage>();
+  }
+};
 
 Status start_log(const LogOptions& options) {
   try {
@@ -79,7 +93,9 @@ Status start_log(const LogOptions& options) {
   }
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
+  auto line = std::make_unique<spdlog::pattern_formatter>();
+  line->add_flag<PlainMessage>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*");
+  spdlog::set_formatter(std::move(line));
   return {};
 }
 

@@ -219,13 +219,15 @@ DatedJob job_from(const nlohmann::json& one, const std::string& server) {
 }  // namespace
 
 Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::string& server) {
+  const std::string what = fmt::format("the list of jobs of server {}", server);
+  if (const Status small = check_json_limits(json, what); !small) return tl::make_unexpected(small.error());
   try {
     std::vector<DatedJob> jobs;
     const auto list = nlohmann::json::parse(json);
     for (const auto& one : list.at("jobs")) jobs.push_back(job_from(one, server));
     return jobs;
   } catch (const nlohmann::json::exception& error) {
-    return failure(ErrorCode::kInternal, "the list of jobs of server {} is none: {}", server, error.what());
+    return failure(ErrorCode::kInternal, "{} is none: {}", what, error.what());
   }
 }
 

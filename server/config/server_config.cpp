@@ -10,9 +10,7 @@
 #include "server/base/near_miss.h"
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
-#include "server/bias/kernels/kernel_spelling.h"
-#include "server/error_sources/error_source.h"
-#include "server/error_sources/physical_model.h"
+#include "server/compensate/model_spec.h"
 
 namespace trammel {
 namespace {
@@ -169,24 +167,6 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
 }
 
-/// Notes what the first training of the cell would refuse.
-void check_training(const Cell& cell, const std::string& file, std::vector<Error>& problems) {
-  const auto note = [&](const char* key, Error why) {
-    why.field.clear();
-    problems.push_back(Failure(std::move(why)).under(fmt::format("model: {}", key)).in(file).value());
-  };
-  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error());
-  bool each_is_known = true;
-  for (const std::string& source : cell.model.error_sources) {
-    const auto made = make_error_source(source, cell);
-    if (!made) note("error_sources", made.error());
-    each_is_known = each_is_known && made;
-  }
-  if (!each_is_known) return;
-  const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
-  if (!together) note("error_sources", together.error());
-}
-
 void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& problems) {
   std::map<std::string, std::string> file_of;
   for (const std::string& cell_file : file.cell_files) {
@@ -210,7 +190,7 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& p
                              .in(path)
                              .with_text(name)
                              .value());
-    check_training(*cell, cell_file, problems);
+    for (Error& one : check_model_spec(*cell, cell_file)) problems.push_back(std::move(one));
     file.config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
   }
 }

@@ -3,6 +3,7 @@
 #include "idl/limits.h"
 #include "idl/manage_text.h"
 #include "server/base/check.h"
+#include "server/base/json_guard.h"
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -68,6 +69,9 @@ struct ReleasedTraining {
 };
 
 Result<ReleasedTraining> released_training(const std::string& text) {
+  static const std::string kWhat = "what to release and to train from";
+  constexpr JsonLimits kLimits{.bytes = std::size_t{1} << 20, .depth = 4, .values = 10'000};
+  if (const Status small = check_json_limits(text, kWhat, kLimits); !small) return tl::make_unexpected(small.error());
   try {
     const auto json = nlohmann::json::parse(text);
     return ReleasedTraining{json.at("batches").get<std::vector<std::string>>(), json.value("level", ""),

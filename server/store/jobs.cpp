@@ -167,6 +167,15 @@ Status end_job(SQLite::Database& database, std::int64_t id, const std::string& c
 
 namespace {
 
+/// One job, where the others can be read even if it cannot.
+Result<StoredJob> read_alone(SQLite::Database& database, std::int64_t id) {
+  try {
+    return read_job(database, id);
+  } catch (const SQLite::Exception& error) {
+    return failure_of(error, database.getFilename());
+  }
+}
+
 Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
     if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
@@ -253,9 +262,16 @@ Result<StoredJob> Store::job(std::int64_t id) const {
 
 Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
-    return jobs_of(
-        database,
-        prepare(database, (std::string(kJobColumns) + "WHERE state IN ('queued', 'running') ORDER BY id").c_str()));
+    std::vector<std::int64_t> ids;
+    SQLite::Statement rows(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
+    while (rows.executeStep()) ids.push_back(rows.getColumn(0).getInt64());
+    std::vector<StoredJob> jobs;
+    for (const std::int64_t id : ids) {
+      auto job = read_alone(database, id);
+      if (job) jobs.push_back(std::move(*job));
+      if (!job) connection_->note_damage(fmt::format("job {}: {}", id, sentence(job.error())));
+    }
+    return jobs;
   });
 }
 

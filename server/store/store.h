@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -83,17 +84,40 @@ struct ChangeOutcome {
   std::int64_t made_at = 0;  ///< Unix time, s
 };
 
+/// What the disk lets a store do.
+struct StoreState {
+  std::optional<Error> why_not_written;  ///< set: every change is refused with it
+  bool readable = true;                  ///< false: only the copies of the models that were in force are there
+  std::int64_t since = 0;                ///< Unix time, s, of the last change of either; 0: none since it was opened
+  std::uint64_t failed_writes = 0;
+  std::vector<std::string> damages;  ///< what was found damaged since it was opened, the first hundred
+};
+
 struct StoreConnection;
 
 /// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, and it is on
-/// disk when the function returns. Errors of the disk or the database are kInternal and name the file.
+/// disk when the function returns. Errors of the disk or the database name the file: kBusy where the disk does not let
+/// it be written now (full, read-only, broken) and may later, kInternal where the file is damaged. Damage of one row is
+/// an error of what reads that row, and of nothing else.
+///
+/// Of each cell the last three versions in force are kept as plain files beside the store, too (`<file>.models`), and
+/// taken where the store does not give them.
 class Store {
  public:
-  /// Creates the file if there is none. Refuses (kRefused) a file of another program or of a newer schema, (kConflict)
-  /// a second writer on the same file, (kInternal) a damaged file. The file `<file>.lock` beside it holds the writer's
+  /// Creates the file if there is none. Refuses (kConflict) a second writer on the same file. A file on a disk that
+  /// cannot be written is read, and written as soon as that is possible: state(). Of a file that is damaged, emptied or
+  /// of another store the copies are there, and nothing is written to it; without copies it is refused (kInternal), as
+  /// is a file of another program or of a newer schema (kRefused). The file `<file>.lock` beside it holds the writer's
   /// process id.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
   ~Store();
+
+  /// Never waits for the disk.
+  [[nodiscard]] StoreState state() const;
+  /// Where it could not be written: whether it can now. Opens the file again where needed, once a second at most.
+  [[nodiscard]] Status try_again();
+  /// False: `stop` was requested first.
+  [[nodiscard]] bool wait_until_writable(const std::stop_token& stop);
 
   /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. A
   /// repeat of the request with the same content returns the job that the first one made. Refuses (kConflict) a batch
@@ -127,7 +151,8 @@ class Store {
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
 
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
-  /// Queued and running jobs of all cells, oldest first: a restart must finish them.
+  /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
+  /// left out, and stands in state().
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;
   /// Jobs of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished` done and the last
   /// `finished` failed.
@@ -158,12 +183,23 @@ class Store {
   [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1, const ChangeId& change_id = {});
   /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
+  /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
+  /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what
+  /// only copies have. Those that came after what the store knows come before it. Never fails: empty where there are
+  /// none.
+  [[nodiscard]] std::vector<int> versions_to_serve(const std::string& cell) const;
+  /// Where the store has lost what was in force last and its copy is there: takes it back into the history, as the
+  /// version in force that it was.
+  [[nodiscard]] Status take_back_from_copy(const std::string& cell);
+  /// Copies the model in force, if it has no copy.
+  [[nodiscard]] Status copy_model_in_force(const std::string& cell) const;
 
  private:
   explicit Store(std::unique_ptr<StoreConnection> connection);
+  void copy_after_change(const std::string& cell) const;
   std::unique_ptr<StoreConnection> connection_;
 };
 

@@ -8,6 +8,7 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
@@ -23,11 +24,7 @@ constexpr int kJobsListed = 20;           // of those done and of those failed, 
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
-  if (id.size() > kMaxBatchId)
-    return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId).of("batch").beyond(id.size(), kMaxBatchId);
-  const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!printable) return refused("batch id {:?} has control characters", id).of("batch").with_text(id);
-  return {};
+  return check_name(id, "batch", kMaxBatchId);
 }
 
 /// Level and bias of a training that is asked for; empty: as usual.

@@ -266,7 +266,8 @@ TEST_F(TrainerTest, RefusedInputStoresNothing) {
   const std::string good = csv();
   EXPECT_EQ(trainer_->submit("cell-9", "a", good, "r").error().code, ErrorCode::kNotFound);
   EXPECT_FALSE(trainer_->submit("cell-7", "", good, "r"));
-  EXPECT_FALSE(trainer_->submit("cell-7", "two\nlines", good, "r"));
+  for (const char* id : {"two\nlines", "\xff", "caf\xe9", "\x1b[2J", "\xc2\x9b", "\xe2\x80\xae"})
+    EXPECT_FALSE(trainer_->submit("cell-7", id, good, "r")) << id;
   EXPECT_FALSE(trainer_->submit("cell-7", std::string(200, 'x'), good, "r"));
   EXPECT_FALSE(trainer_->submit("cell-7", "a", "no,batch\n1,2\n", "r"));
   std::string beyond = good;
