@@ -248,6 +248,7 @@ class DdsService::Running {
                                      {"receiving", [this]() -> Mark { return echo_->heard(); }},
                                      {"taking requests", [this] { return core_.taking.oldest(); }},
                                      {"replying", [this] { return replying_.oldest(); }},
+                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
                                      {"status", [this]() -> Mark { return status_steps_.load(); }}};
     parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
