@@ -1,6 +1,8 @@
 #include "server/trainer/trainer.h"
 
 #include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -28,6 +30,7 @@ constexpr std::size_t kMaxBatches = 1000;           // of one training
 constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
+constexpr int kKeeperNiceness = 5;  // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
@@ -142,12 +145,30 @@ Result<std::vector<std::string>> Trainer::start() {
 
 void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "keeper");
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kKeeperNiceness);  // of this thread alone
   while (!stop.stop_requested()) {
     registry_.load_for(stop, kKeeperTick);
+    const bool was_readable = store_.state().readable;
     static_cast<void>(store_.try_again());  // what comes of it is the store's state
+    if (!was_readable && store_.state().readable) take_up_late();
     tell_troubles(told);
   }
   registry_.stop_loading();
+}
+
+void Trainer::take_up_late() {
+  for (const auto& [name, cell] : cells_) {
+    const std::vector<int> versions = store_.versions_to_serve(name);
+    if (!versions.empty() && versions.front() != registry_.version_in_force(name))
+      registry_.announce(name, versions.front());
+  }
+  const MutexLock lock(submit_mutex_);
+  std::vector<std::string> notices;  // the next start says them again
+  for (StoredJob& job : store_.unfinished_jobs().value_or(std::vector<StoredJob>())) {
+    if (book_.find(job.id) || !can_take_up(job, notices).value_or(false)) continue;
+    job.state = JobState::kQueued;
+    enqueue(job, was_asked_for(job).value_or(true));
+  }
 }
 
 void Trainer::tell_troubles(std::vector<std::string>& told) {

@@ -121,6 +121,8 @@ class Trainer {
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
+  /// Of a store that can be read only now.
+  void take_up_late();
   void tell_troubles(std::vector<std::string>& told);
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <optional>
 
+#include "server/base/hash.h"
 #include "server/compensate/model_file.h"
 #include "server/trainer/trainer.h"
 #include "tests/support/demand.h"
@@ -125,6 +127,26 @@ TEST_F(TrainerFaults, AServiceThatStartsOnAFullDiskServesAndLearnsOnceThereIsRoo
   const auto job = submit("a");
   ASSERT_TRUE(job) << sentence(job.error());
   EXPECT_TRUE(waits_until(*job, JobStage::kDone));
+}
+
+TEST_F(TrainerFaults, WhereTheRightStoreIsPutBackItIsServedAndItsJobsAreDoneWithoutARestart) {
+  add_models("cell-7", 2);
+  {
+    const auto store = demand(Store::open(path_));
+    const std::string csv = test::small_batch_csv(*cells_.at("cell-7"), {});
+    StoredJob job;
+    job.cell = "cell-7";
+    job.batch_ids = {"a"};
+    ASSERT_TRUE(store->add_batch({"cell-7", "a", csv, sha256_hex(csv), "client:a", 1, 40}, job));
+  }
+  const std::string good = test::read_file(path_);
+  std::ofstream(path_, std::ios::binary) << std::string(20'000, 'x');
+  start();
+  EXPECT_EQ(served(), 2);
+  EXPECT_FALSE(submit("b", 2));
+  std::ofstream(path_, std::ios::binary) << good;
+  EXPECT_TRUE(hears("cannot be written", true));
+  EXPECT_TRUE(waits_until(1, JobStage::kDone));
 }
 
 TEST_F(TrainerFaults, WhereTheModelInForceIsDamagedTheNewestGoodOneIsServedAndThatIsSaid) {
