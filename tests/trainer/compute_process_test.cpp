@@ -141,7 +141,8 @@ class SameResults : public ComputeProcessTest {
     finished(diagnosis);
     finished(submit("strange", {.poses = 120, .noise = 3e-3, .seed = 5}));
     All all;
-    for (const StoredModel& model : *store_->models("cell-7")) all.hashes.push_back(model.hash);
+    const auto models = store_->models("cell-7");
+    for (const StoredModel& model : *models) all.hashes.push_back(model.hash);
     for (std::int64_t job = 1; job <= 6; ++job) all.messages.push_back(store_->job(job)->message);
     all.findings = store_->diagnosis(diagnosis)->findings;
     return all;
