@@ -1,11 +1,15 @@
 // What comes over the wire: every type, every request with its handler, what a session makes of replies; and the server
 // file.
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "clients/cli/text/diagnose_text.h"
 #include "clients/session/convert.h"
+#include "idl/guard/guard.h"
+#include "idl/limits.h"
 #include "idl/manage_text.h"
 #include "idl/safe_type.h"
 #include "idl/topics.h"
@@ -17,6 +21,7 @@
 #include "server/simulate/simulate.h"
 #include "tests/dds/backend.h"
 #include "tests/fuzz/target.h"
+#include "tests/support/rtps_packet.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -226,6 +231,39 @@ Target request_target(const char* name) {
   return {name, ask<Operation>, mutate_cdr, samples<typename Operation::Request>};
 }
 
+/// What the guard makes of a packet; what passes must be whole.
+std::string guard_packet(std::string_view bytes) {
+  static wire::Guard guard(static_cast<std::uint32_t>(wire::kMaxTextSample));  // remembers what it has seen
+  static std::array<std::uint64_t, wire::kDroppedReasons> before{};
+  const wire::Bytes packet(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  guard.sent(packet);
+  const auto passed = guard.check(packet, 1);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto reason = static_cast<wire::Dropped>(i);
+    if (std::exchange(before[i], guard.counts().of(reason)) != guard.counts().of(reason)) return wire::name_of(reason);
+  }
+  TRAMMEL_CHECK(passed.has_value());
+  wire::Bytes rest = passed->subspan(wire::kHeader);
+  while (!rest.empty()) TRAMMEL_CHECK(wire::next_submessage(rest).has_value());
+  return passed->size() == packet.size() ? "passes" : "passes in part";
+}
+
+std::vector<std::string> packets() {
+  constexpr test::Prefix kFrom = {1, 15, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+  constexpr std::uint32_t kWriter = 0x00000103, kReader = 0x00000104;
+  test::ParameterList list;
+  list.guid(0x0050, kFrom, 0x000001c1).text(0x0062, "name").locator(0x0032, 7).add(0x002c, {4, 0, 0, 0, 1, 2, 3, 4});
+  const std::vector<test::PacketBytes> all = {
+      test::Packet(kFrom).data({0, wire::kAnnouncer, 1, {}, list.payload()}).bytes(),
+      test::Packet(kFrom).to(kFrom).data({0, kWriter, 1, {}, {0, 1, 0, 0}}).heartbeat(0, kWriter, 1, 1, 1).bytes(),
+      test::Packet(kFrom).gap(0, kWriter, 2, 9).acknack(kReader, kWriter, 2, 40, 1).bytes(),
+      test::Packet(kFrom).fragments({0, kWriter, 3, 1, 1, 64, 256, test::PacketBytes(64)}).bytes(),
+      test::Packet(kFrom).nack_frag(kReader, kWriter, 3, 2, 1).bytes()};
+  std::vector<std::string> seeds;
+  for (const test::PacketBytes& one : all) seeds.emplace_back(one.begin(), one.end());
+  return seeds;
+}
+
 }  // namespace
 
 const std::vector<Target>& targets() {
@@ -253,6 +291,7 @@ const std::vector<Target>& targets() {
       request_target<wire::Diagnose>("ask_diagnose"),
       {"ask_manage_models", ask<wire::ManageModels>, mutate_cdr, manage_samples},
       {"ask_release_and_train", ask_to_release, mutate_json, releases},
+      {"rtps_packet", guard_packet, mutate_bytes, packets},
       {"jobs_json", read_jobs, mutate_json, job_lists},
       {"quarantine_json", read_quarantine, mutate_json, quarantine_lists},
       {"findings_json", read_findings, mutate_json},
