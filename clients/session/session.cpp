@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <random>
-#include <thread>
 #include <utility>
 
 #include "clients/session/caller.h"
@@ -116,7 +115,7 @@ struct Session::Participant {
       const auto again = Clock::now() + std::chrono::milliseconds(
                                             is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
       if (!is_busy || again >= until) return as_result(std::move(reply));
-      std::this_thread::sleep_until(again);
+      watch->wait_until(again);
     }
   }
 

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "server/base/hash.h"
+#include "server/base/memory.h"
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
 #include "tests/dds/raw_client.h"
@@ -132,6 +133,7 @@ void send_what_is_always_wrong(Sender<Operation>& sender) {
 class BadRequests : public testing::Test {
  protected:
   BadRequests() {
+    give_large_blocks_back();  // as the daemon does
     if (!backend_.trainer->take_up()) throw std::runtime_error("cannot take up");
     for (const int version : {1, 2}) {
       const auto model = test::shifted_model(backend_.cell, version * 1e-4);
@@ -305,7 +307,7 @@ std::size_t BadRequests::submissions() {
   expect("a column that is missing", wire::RESULT_REFUSED, [](Request& r) { r.csv("q1_deg,x_mm\n1,2\n"); });
   expect("numbers that are none", wire::RESULT_REFUSED,
          [&](Request& r) { r.csv(csv.substr(0, csv.find('\n') + 1) + "nan,nan,nan,nan,nan,nan,1,2,3\n"); });
-  expect("a batch of the largest size", wire::RESULT_REFUSED, [](Request& r) { r.csv(std::string(30u << 20, 'x')); });
+  expect("a batch of the largest size", wire::RESULT_TOO_LARGE, [](Request& r) { r.csv(std::string(30u << 20, 'x')); });
   expect("a batch over the largest size", wire::RESULT_TOO_LARGE,
          [](Request& r) { r.csv(std::string(wire::kMaxText + 1, 'x')); });
   return send.check();
@@ -326,7 +328,7 @@ std::size_t BadRequests::trainings() {
   expect("too many batches", wire::RESULT_TOO_LARGE,
          [](Request& r) { r.batch_ids(std::vector<std::string>(1001, "lt-07")); });
   expect("a batch twice", wire::RESULT_REFUSED, [](Request& r) { r.batch_ids({"lt-07", "lt-07"}); });
-  expect("a level that does not exist", wire::RESULT_REFUSED, [](Request& r) {
+  expect("a level that does not exist", wire::RESULT_INVALID_ARGUMENT, [](Request& r) {
     r.batch_ids({"lt-07"});
     r.level("M9");
   });
@@ -427,14 +429,17 @@ std::size_t BadRequests::changes() {
     r.action(wire::MANAGE_CANCEL_JOB);
     r.job(99);
   });
-  for (const std::string& text :
-       {std::string(), std::string("{}"), std::string("no model"), std::string("[]"), std::string(2'000'000, '['),
-        std::string(R"({"trammel_model":1,"content":)") + std::string(1'000'000, '[')}) {
-    expect("a model that is none", wire::RESULT_REFUSED, [&](Request& r) {
+  const auto import = [&](const char* kind, wire::ResultCode code, const std::string& text) {
+    expect(kind, code, [&](Request& r) {
       r.action(wire::MANAGE_IMPORT);
       r.model_text(text);
     });
-  }
+  };
+  for (const char* text : {"", "{}", "no model", "[]", "{\"trammel_model\":1}"})
+    import("a model that is none", wire::RESULT_REFUSED, text);
+  import("brackets", wire::RESULT_TOO_LARGE, std::string(2'000'000, '['));
+  import("brackets in a model", wire::RESULT_TOO_LARGE,
+         R"({"trammel_model":1,"content":)" + std::string(30'000'000, '['));
   expect("a model of another cell", wire::RESULT_REFUSED, [](Request& r) {
     r.about().cell("cell-8");
     r.action(wire::MANAGE_IMPORT);
