@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <stop_token>
@@ -17,6 +18,7 @@
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/old_contract.h"
+#include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
@@ -106,16 +108,20 @@ class ThreadName {
 
 class DdsService::Running {
  public:
+  using PacketListener = std::function<void(const std::string& dropped)>;
+
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
-                                                              const ModelRegistry& registry) {
+                                                              const ModelRegistry& registry,
+                                                              const PacketListener& packet_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
     auto events = std::make_unique<ServiceEvents>();
     const auto heard = std::make_shared<wire::HeardOfItself>();
+    const auto dropped = std::make_shared<wire::DropCounts>();
     auto participant = wire::make_participant({"trammel server " + options.server_id, options.domain, options.address,
-                                               options.port, options.peer_ports, heard},
+                                               options.port, options.peer_ports, heard, dropped},
                                               events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
@@ -132,6 +138,8 @@ class DdsService::Running {
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
         std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
+    running->packets_.emplace(dropped);
+    running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
     return running;
@@ -226,6 +234,7 @@ class DdsService::Running {
     while (!stop.stop_requested()) {
       publish_status(wire::SERVICE_SERVING);
       ++status_steps_;
+      if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
       channels_.heard(events_->wait(stop, clients_wait ? wire::kAnnouncement : wire::kStatusPeriod));
       ++status_steps_;
       clients_wait = channels_.tend();
@@ -239,6 +248,7 @@ class DdsService::Running {
                                      {"receiving", [this]() -> Mark { return echo_->heard(); }},
                                      {"taking requests", [this] { return core_.taking.oldest(); }},
                                      {"replying", [this] { return replying_.oldest(); }},
+                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
                                      {"status", [this]() -> Mark { return status_steps_.load(); }}};
     parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
@@ -254,7 +264,7 @@ class DdsService::Running {
     status.program_version(options_.program_version);
     status.state(state);
     for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
-    status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
+    status.models_in_force(static_cast<std::int32_t>(registry_.cells_served()));
     status.requests(core_.counts.requests + core_.counts.shed);
     status.refused(core_.counts.refused + core_.counts.shed);
     status.shed(core_.counts.shed);
@@ -288,6 +298,8 @@ class DdsService::Running {
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
+  std::optional<PacketReport> packets_;  // of the status thread
+  PacketListener packet_listener_;
   std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
@@ -298,13 +310,17 @@ DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const
 
 DdsService::~DdsService() { stop(); }
 
+void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
+  packet_listener_ = std::move(listener);
+}
+
 Status DdsService::start() {
   {
     const MutexLock lock(mutex_);
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);

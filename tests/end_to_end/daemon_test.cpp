@@ -104,7 +104,7 @@ TEST_F(DaemonTest, EndsCleanlyWhileTrainingAndFinishesTheJobAfterwards) {
   EXPECT_EQ(model().version, done.model_version);
 }
 
-TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortIsRefused) {
+TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortOrOfTheSameNameIsRefused) {
   auto same_store = daemon_.command_line();
   same_store[4] = std::to_string(daemon_.port() + 2);
   const auto second = test::run(same_store);
@@ -116,6 +116,12 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortIsRefused) {
   const auto third = test::run(same_port);
   EXPECT_EQ(third.exit_code, 3);
   EXPECT_NE(third.err.find(std::to_string(daemon_.port())), std::string::npos) << third.err;
+
+  auto same_name = same_store;
+  same_name.insert(same_name.end(), {"--store", daemon_.store_path() + "2"});
+  const auto fourth = test::run(same_name);
+  EXPECT_EQ(fourth.exit_code, 3);
+  EXPECT_NE(fourth.err.find("is called"), std::string::npos) << fourth.err;
   EXPECT_EQ(daemon_.stop(), 0);
 }
 

@@ -1,9 +1,15 @@
 // Packets that end, stop or flood the library, each sent from a plain socket to a participant with the guard and to one
 // without it.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <string>
+#include <vector>
 
+#include "tests/support/daemon.h"
+#include "tests/support/killed_clients.h"
+#include "tests/support/mutated_packets.h"
 #include "tests/support/raw_participant.h"
 #include "tests/support/victim.h"
 
@@ -137,6 +143,46 @@ TEST(HostilePackets, APartitionThatLeadsOutOfMemory) {
 
 TEST(HostilePackets, FourBillionPropertiesOfAToken) {
   expect_only_the_library_is_harmed_by(announces(0x1001, words({1, 0, 30'000'000, 0})));
+}
+
+/// What a daemon says of itself to a client.
+std::string answers_of(const test::Daemon& daemon) {
+  const auto session = client::Session::open(daemon.session_options());
+  if (!session) return session.error().message;
+  const auto models = (*session)->models("cell-7");
+  const auto jobs = (*session)->jobs("");
+  client::CallContext context;
+  context.cell = "cell-7";
+  const auto error = (*session)->predict_error(context, {{0.1, 0.2, 0.3, 0.4, 0.5, 0.6}});
+  return fmt::format("{} models, {} jobs, {}", models ? static_cast<int>(models->size()) : -1,
+                     jobs ? static_cast<int>(jobs->size()) : -1, error ? "a model" : error.error().message);
+}
+
+TEST(HostilePackets, ADaemonIsAliveAndRightAfter300000MutatedOnes) {
+  test::Daemon daemon;
+  daemon.start();
+  const std::string before = answers_of(daemon);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    test::MutatedPackets packets(daemon.port(), daemon.domain(), seed);
+    ASSERT_TRUE(packets.collect());
+    packets.send(100'000);
+  }
+  EXPECT_EQ(answers_of(daemon), before);
+  EXPECT_TRUE(daemon.process().wait_for_line("packets were dropped unread", kLimit)) << "and says what it met";
+  EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
+}
+
+TEST(HostilePackets, HonestClientsLoseNothingWhileOthersAreKilled) {
+  test::Daemon daemon;
+  daemon.start();
+  test::KillLoad load;
+  load.server = daemon.session_options();
+  load.kills = 150;
+  const test::KillOutcome outcome = test::kill_clients(load);
+  EXPECT_EQ(outcome.killed, load.kills);
+  EXPECT_GT(outcome.calls, 20u);
+  EXPECT_EQ(outcome.lost, 0u);
+  EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "server/compensate/file/self_test.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <tuple>
@@ -67,19 +68,27 @@ Result<TestPose> pose_of(const Json& json, const CompensatedModel& model) {
   return pose;
 }
 
-/// m; rotations count as lengths at an arm of 1 m.
-double distance(const ErrorPrediction& now, const Json& stated) {
-  const Pose X_BT = pose_from(stated.at("X_BT"));
-  const double pose = (now.X_BT_predicted.matrix() - X_BT.matrix()).cwiseAbs().maxCoeff();
-  const double error = (now.error_B - vector3_from(stated.at("error_m"))).cwiseAbs().maxCoeff();
-  const double stddev = (now.stddev_B - vector3_from(stated.at("stddev_m"))).cwiseAbs().maxCoeff();
-  const double most = std::max({pose, error, stddev});
-  // A maximum passes over what is no number.
-  return std::isfinite(pose + error + stddev) ? most : std::numeric_limits<double>::infinity();
-}
+/// A difference and its limit, m; rotations count as lengths at an arm of 1 m.
+struct Difference {
+  double off = 0;
+  double limit = 0;
+};
 
-double allowed(const ErrorPrediction& now) {
-  return kSelfTestShare * (now.error_B.norm() + now.stddev_B.norm()) + kSelfTestMetres;
+/// The worst of pose, error and standard deviation, each by its own limit.
+Difference worst_of(const ErrorPrediction& now, const Json& stated) {
+  const auto largest = [](const Eigen::MatrixXd& difference) {
+    // A maximum passes over what is no number.
+    return difference.allFinite() ? difference.cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
+  };
+  const double of_error = kErrorShare * now.error_B.norm() + kSelfTestMetres;
+  const std::array<Difference, 3> all = {
+      {{largest(now.X_BT_predicted.matrix() - pose_from(stated.at("X_BT")).matrix()), of_error},
+       {largest(now.error_B - vector3_from(stated.at("error_m"))), of_error},
+       {largest(now.stddev_B - vector3_from(stated.at("stddev_m"))),
+        kStddevShare * now.stddev_B.norm() + kSelfTestMetres}}};
+  return *std::max_element(all.begin(), all.end(), [](const Difference& one, const Difference& other) {
+    return one.off / one.limit < other.off / other.limit;
+  });
 }
 
 /// Whether the numbers are lengths of this world.
@@ -112,8 +121,7 @@ Status check_self_test(const CompensatedModel& model, const Json& self_test) {
     if (!pose) return tl::make_unexpected(pose.error());
     const ErrorPrediction now = predict(model, *pose);
     if (!possible(now)) return impossible();
-    const double off = distance(now, one);
-    const double limit = allowed(now);
+    const auto [off, limit] = worst_of(now, one);
     if (off <= limit) continue;
     return refused("model: predicts otherwise than when it was written, by {:.3g} mm, limit {:.3g} mm", 1e3 * off,
                    1e3 * limit)

@@ -9,9 +9,11 @@
 namespace trammel::model_file {
 
 /// How far a prediction may be from the stated one: another processor adds and multiplies in another order, and another
-/// release may compute the same in another way. Of a length kSelfTestShare of it and kSelfTestMetres together.
-constexpr double kSelfTestShare = 1e-6;
+/// release may compute the same in another way. kSelfTestMetres always; of the error kErrorShare; of a standard
+/// deviation, which is left over where large variances cancel, kStddevShare.
 constexpr double kSelfTestMetres = 1e-9;
+constexpr double kErrorShare = 1e-8;
+constexpr double kStddevShare = 1e-3;
 
 /// The `self_test` of a model file (MODEL_FILE.md): what the model predicts at a few joints of its range and one beside
 /// it.

@@ -30,7 +30,8 @@ bool is_text(const std::string& field) { return !field.empty() && !is_number(fie
 
 BatchKind recognise_batch(const std::string& text) {
   const std::vector<TextLine> lines = first_lines(text, 2);
-  if (lines.empty()) return BatchKind::kTrammel;
+  const auto is_long = [](const TextLine& line) { return line.text.size() > kLongestLine; };
+  if (lines.empty() || std::any_of(lines.begin(), lines.end(), is_long)) return BatchKind::kTrammel;
   const char separator = separator_of(lines[0].text);
   const std::vector<std::string> first = split_fields(lines[0].text, separator);
   if (any_of(first, is_first_joint)) {

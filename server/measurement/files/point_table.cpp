@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kLeastFields = 4;
 constexpr std::size_t kMostFields = 9;
-constexpr std::size_t kLongestLine = 1000;  // bytes: regular expressions recurse once for each
-constexpr std::size_t kMostComments = 500;  // each is searched for statements
+constexpr std::size_t kLongestLineOfPoints = 1000;  // bytes: regular expressions recurse once for each
+constexpr std::size_t kMostComments = 500;          // each is searched for statements
 
 template <typename T>
 Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
@@ -236,7 +236,7 @@ CoordinateNames uncertainty_columns(Coordinates coordinates) {
 }
 
 Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
-  const Result<std::vector<TextLine>> read = text_lines(text, where, kLongestLine);
+  const Result<std::vector<TextLine>> read = text_lines(text, where, kLongestLineOfPoints);
   if (!read) return tl::make_unexpected(read.error());
   const std::vector<TextLine>& lines = *read;
   if (const Status few = check_comments(lines, where); !few) return tl::make_unexpected(few.error());

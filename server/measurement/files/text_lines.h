@@ -10,6 +10,8 @@
 /// Splits the text files of other programs into lines and fields.
 namespace trammel {
 
+constexpr std::size_t kLongestLine = 65'536;  ///< bytes
+
 struct TextLine {
   int number = 0;  ///< from 1
   std::string_view text;
@@ -19,7 +21,7 @@ struct TextLine {
 /// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order mark. Refuses as
 /// kTooLarge more than a million lines, 100,000 lines of data, and a line longer than `longest` bytes.
 [[nodiscard]] Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where,
-                                                       std::size_t longest = 65'536);
+                                                       std::size_t longest = kLongestLine);
 /// The first lines of data, `count` at most, without comments.
 [[nodiscard]] std::vector<TextLine> first_lines(std::string_view text, std::size_t count);
 
