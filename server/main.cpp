@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/base/memory.h"
 #include "server/base/mutex.h"
 #include "server/base/plain_text.h"
 #include "server/config/server_config.h"
@@ -272,5 +273,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : trammel::kExitUsage;
   }
+  trammel::give_large_blocks_back();
   return trammel::run(arguments);
 }

@@ -16,6 +16,7 @@ namespace {
 constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kNoTime = -1;
+constexpr double kTemperatureLimit = 1e3;      // degrees Celsius, as in files
 constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, where nobody knows better
 
 double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
@@ -105,6 +106,12 @@ Status read_approach(const wire::Approach& approach, const Chain& chain, const s
   for (const auto& [value, field] :
        {std::pair(approach.temperature_c(), "temperature_c"), std::pair(approach.time_s(), "time_s")}) {
     if (std::isinf(value)) return refused("{} is not finite", field).in(where).of(field).with_value(value);
+  }
+  if (std::abs(approach.temperature_c()) > kTemperatureLimit) {
+    return refused("temperature {} C, limit {}", approach.temperature_c(), kTemperatureLimit)
+        .in(where)
+        .of("temperature_c")
+        .beyond(approach.temperature_c(), kTemperatureLimit);
   }
   context.direction.assign(directions.begin(), directions.end());
   if (!std::isnan(approach.temperature_c())) context.temperature = approach.temperature_c();

@@ -178,6 +178,7 @@ TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {
   ASSERT_TRUE(reader.wait_until_matched());
   wire::ManageModelsRequest import;
   import.about().cell("cell-7");
+  import.change().expected_version(-1);
   import.action(wire::MANAGE_IMPORT);
   std::string text = "[";
   for (int i = 0; i < 500000; ++i) text += "0.125,";
@@ -189,6 +190,7 @@ TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {
   reader.send(list, 1);
   wire::ManageModelsRequest rollback;
   rollback.about().cell("cell-8");
+  rollback.change().expected_version(-1);
   rollback.action(wire::MANAGE_ROLLBACK);
   other.send(rollback, 2);
   ASSERT_EQ(reader.wait_for_replies(1).size(), 1U);
