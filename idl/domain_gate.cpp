@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "idl/guard/guard.h"
+#include "idl/limits.h"
 #include "server/base/mutex.h"
 
 namespace trammel::wire {
@@ -185,7 +186,9 @@ Gate::Gate(const GateDescriptor& descriptor)
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
       domain_(descriptor.domain),
       heard_(descriptor.heard),
-      guard_(descriptor.dropped ? std::make_unique<Guard>(descriptor.dropped) : nullptr) {}
+      guard_(descriptor.dropped
+                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.dropped)
+                 : nullptr) {}
 
 rtps::TransportDescriptorInterface* Gate::get_configuration() { return configuration_.get(); }
 

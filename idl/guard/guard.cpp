@@ -1,6 +1,7 @@
 #include "idl/guard/guard.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "idl/guard/message_check.h"
@@ -21,12 +22,12 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::shared_ptr<DropCounts> counts)
-    : counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()) {}
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts)
+    : largest_sample_(largest_sample), counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()) {}
 
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
-  if (const auto dropped = MessageCheck(*this, message, socket, now, edited).run()) {
+  if (const auto dropped = MessageCheck({largest_sample_, socket, now}, memory_, message, edited).run()) {
     counts_->add(*dropped);
     return std::nullopt;
   }
@@ -44,8 +45,8 @@ void Guard::sent(Bytes message) {
     } else if (submessage->id == kDataFrag) {
       const auto fragments = fragments_of(*submessage);
       if (!fragments || fragments->size == 0) continue;
-      const MutexLock lock(mutex_);
-      sent_.add(*fragments);
+      const MutexLock lock(memory_.mutex);
+      memory_.sent.add(*fragments);
     }
   }
 }
@@ -56,8 +57,9 @@ void Guard::confirm(Bytes to, const Submessage& acknack) {
   const auto writer = reader.entity();
   const auto base = reader.sequence_number();
   if (!writer || !base) return;
-  const MutexLock lock(mutex_);
-  sequences_.confirmed(key_of(to, *writer), std::max<std::int64_t>(0, *base - 1), std::chrono::steady_clock::now());
+  const MutexLock lock(memory_.mutex);
+  memory_.sequences.confirmed(key_of(to, *writer), std::max<std::int64_t>(0, *base - 1),
+                              std::chrono::steady_clock::now());
 }
 
 }  // namespace trammel::wire

@@ -6,11 +6,8 @@
 #include <optional>
 
 #include "idl/guard/dropped.h"
-#include "idl/guard/edited_message.h"
-#include "idl/guard/fragment_watch.h"
-#include "idl/guard/participant_watch.h"
-#include "idl/guard/sequence_watch.h"
-#include "server/base/mutex.h"
+#include "idl/guard/guard_memory.h"
+#include "idl/guard/rtps_bytes.h"
 
 namespace trammel::wire {
 
@@ -22,7 +19,8 @@ class Guard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  explicit Guard(std::shared_ptr<DropCounts> counts = nullptr);
+  /// `largest_sample`: bytes that a sample of any topic may have.
+  explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr);
 
   /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
   /// Empty: nothing. Valid until the calling thread's next call.
@@ -34,15 +32,11 @@ class Guard {
   [[nodiscard]] const DropCounts& counts() const { return *counts_; }
 
  private:
-  friend class MessageCheck;
   void confirm(Bytes to, const Submessage& acknack);
 
+  const std::uint32_t largest_sample_;
   const std::shared_ptr<DropCounts> counts_;
-  Mutex mutex_;
-  SequenceWatch sequences_ TRAMMEL_GUARDED_BY(mutex_);
-  UnfinishedSamples unfinished_ TRAMMEL_GUARDED_BY(mutex_);
-  SentSamples sent_ TRAMMEL_GUARDED_BY(mutex_);
-  ParticipantWatch participants_ TRAMMEL_GUARDED_BY(mutex_);
+  GuardMemory memory_;
 };
 
 }  // namespace trammel::wire

@@ -1,10 +1,10 @@
 #include "idl/guard/message_check.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 #include "idl/guard/announcement_check.h"
-#include "idl/limits.h"
 
 namespace trammel::wire {
 namespace {
@@ -159,15 +159,15 @@ std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
   if (writer == kHandshake) return check_handshake(payload);
   if (writer != kAnnouncer) return {};
-  const MutexLock lock(guard_.mutex_);
-  return guard_.participants_.announced(source_, socket_, now_);
+  const MutexLock lock(memory_.mutex);
+  return memory_.participants.announced(source_, received_.socket, received_.now);
 }
 
 std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {
   const auto fragments = fragments_of(submessage);
   if (!fragments) return Dropped::kLength;
   if (!is_number(fragments->sequence_number)) return Dropped::kNumber;
-  if (fragments->sample_size > kMaxTextSample) return Dropped::kSampleSize;
+  if (fragments->sample_size > received_.largest_sample) return Dropped::kSampleSize;
   if ((fragments->writer & kBuiltIn) == kBuiltIn) return Dropped::kFragment;
   if (fragments->size < kSmallestFragment || fragments->first < 1 || fragments->count < 1) return Dropped::kFragment;
   const std::uint64_t last = std::uint64_t{fragments->first} + fragments->count - 1;
@@ -185,8 +185,8 @@ std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessag
   const std::uint64_t begin = std::uint64_t{fragments->first - 1} * fragments->size;
   const std::uint64_t end = std::min<std::uint64_t>(last * fragments->size, fragments->sample_size);
   if (after.rest().size() < end - begin) return Dropped::kFragment;
-  const MutexLock lock(guard_.mutex_);
-  return guard_.unfinished_.add(source_, *fragments, now_);
+  const MutexLock lock(memory_.mutex);
+  return memory_.unfinished.add(source_, *fragments, received_.now);
 }
 
 std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessage) {
@@ -198,9 +198,9 @@ std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessag
   if (!head || !first || !last || !count) return Dropped::kLength;
   if (!is_number(first) || *last < *first - 1 || *last > kLargestNumber) return Dropped::kNumber;
   if (*last - *first > kMostHistory) return Dropped::kNumber;
-  const MutexLock lock(guard_.mutex_);
-  if (!guard_.sequences_.count(key_of(source_, head->writer), *count, now_)) return Dropped::kCount;
-  const std::int64_t allowed = guard_.sequences_.heartbeat(key_of(source_, head->writer), *first, now_);
+  const MutexLock lock(memory_.mutex);
+  if (!memory_.sequences.count(key_of(source_, head->writer), *count, received_.now)) return Dropped::kCount;
+  const std::int64_t allowed = memory_.sequences.heartbeat(key_of(source_, head->writer), *first, received_.now);
   if (allowed < *first) edited_.put_sequence_number(first_field.first(8), allowed, reader.little_endian());
   return {};
 }
@@ -222,8 +222,8 @@ std::optional<Dropped> MessageCheck::check_gap(const Submessage& submessage) {
   if (!head || !start || !base) return Dropped::kLength;
   if (!is_number(start) || !is_number(base) || *base < *start) return Dropped::kNumber;
   if (const Set set = take_set(reader); set.fault) return set.fault;
-  const MutexLock lock(guard_.mutex_);
-  const auto range = guard_.sequences_.gap(key_of(source_, head->writer), {*start, *base}, now_);
+  const MutexLock lock(memory_.mutex);
+  const auto range = memory_.sequences.gap(key_of(source_, head->writer), {*start, *base}, received_.now);
   if (range.start == *start && range.end == *base) return {};
   if (range.end <= range.start) return Dropped::kSkipped;
   edited_.put_sequence_number(fields.first(8), range.start, reader.little_endian());
@@ -260,16 +260,16 @@ std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessag
   if (!count) return Dropped::kLength;
   if (std::uint64_t{*base} + kMostBits > UINT32_MAX) return Dropped::kNotSent;
   {
-    const MutexLock lock(guard_.mutex_);
-    if (!guard_.sent_.has(head->writer, *number, *base + set.highest)) return Dropped::kNotSent;
+    const MutexLock lock(memory_.mutex);
+    if (!memory_.sent.has(head->writer, *number, *base + set.highest)) return Dropped::kNotSent;
   }
   return check_count(head->reader, head->writer ^ kNacks, *count);
 }
 
 std::optional<Dropped> MessageCheck::check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count) {
-  const MutexLock lock(guard_.mutex_);
+  const MutexLock lock(memory_.mutex);
   const std::uint32_t mixed = endpoint * 0x9e3779b1u ^ tag;
-  return guard_.sequences_.count(key_of(source_, mixed), count, now_) ? Fault() : Fault(Dropped::kCount);
+  return memory_.sequences.count(key_of(source_, mixed), count, received_.now) ? Fault() : Fault(Dropped::kCount);
 }
 
 std::optional<Dropped> MessageCheck::check_statistics(const Submessage& submessage, Bytes behind) {

@@ -2,7 +2,10 @@
 
 #include <optional>
 
-#include "idl/guard/guard.h"
+#include "idl/guard/dropped.h"
+#include "idl/guard/edited_message.h"
+#include "idl/guard/guard_memory.h"
+#include "idl/guard/rtps_bytes.h"
 
 namespace trammel::wire {
 
@@ -12,8 +15,13 @@ namespace trammel::wire {
 /// One message on its way through the guard.
 class MessageCheck {
  public:
-  MessageCheck(Guard& guard, Bytes message, std::uint64_t socket, Guard::Time now, EditedMessage& edited)
-      : guard_(guard), message_(message), socket_(socket), now_(now), edited_(edited) {}
+  struct Circumstances {
+    std::uint32_t largest_sample = 0;  // bytes
+    std::uint64_t socket = 0;
+    SequenceWatch::Time now{};
+  };
+  MessageCheck(Circumstances received, GuardMemory& memory, Bytes message, EditedMessage& edited)
+      : received_(received), memory_(memory), message_(message), edited_(edited) {}
 
   [[nodiscard]] std::optional<Dropped> run();
 
@@ -34,10 +42,9 @@ class MessageCheck {
   Fault check_secured(const Submessage& submessage, Bytes behind);
   Fault check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count);
 
-  Guard& guard_;
-  Bytes message_;
-  std::uint64_t socket_;
-  Guard::Time now_;
+  const Circumstances received_;
+  GuardMemory& memory_;
+  const Bytes message_;
   EditedMessage& edited_;
   Bytes source_{};  // prefix
 };

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
 constexpr std::size_t kMaxName = 64;     // likewise, bytes
+constexpr int kLeastMemory = 64;         // MiB, of a job: what the program itself takes, and something to compute with
 constexpr int kMaxDomain = 232;          // above it the port numbers of DDS overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
@@ -96,7 +97,7 @@ void read_dds(const YamlMap& map, DdsOptions& dds) {
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
-  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed"});
+  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s"});
   map.attempt([&] { trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000); });
   map.attempt([&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
   map.attempt(
@@ -106,6 +107,15 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
     trainer.seed = static_cast<std::uint64_t>(
         integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
   });
+  ComputeOptions& compute = trainer.compute;
+  map.attempt([&] {
+    const int memory = integer_within(map, "memory_mb", compute.memory_mb, 0, 1 << 24);
+    if (memory != 0 && memory < kLeastMemory)
+      map.refuse("memory_mb",
+                 refused("{}, limit 0 or {} to {}", memory, kLeastMemory, 1 << 24).beyond(memory, kLeastMemory));
+    compute.memory_mb = memory;
+  });
+  map.attempt([&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
 void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
@@ -147,7 +157,7 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
+  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -156,6 +166,11 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] { config.dds.server_id = server_id(map, "server"); });
   map.attempt([&] { file.cell_files = cell_files_of(map, folder); });
   map.attempt([&] { config.store = store_of(map, folder); });
+  map.attempt([&] {
+    const auto otherwise = static_cast<int>(config.models_in_memory >> 20);
+    config.models_in_memory =
+        static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
+  });
   map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), config.dds);
   });

@@ -17,6 +17,7 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/old_contract.h"
 #include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
@@ -149,6 +150,7 @@ class DdsService::Running {
     status_thread_ = {};
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
+    old_contract_.reset();
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
@@ -180,6 +182,7 @@ class DdsService::Running {
           const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
+        store_(store),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
@@ -212,8 +215,15 @@ class DdsService::Running {
     if (opened) opened = open(wire::SubmitMeasurements(), others);
     if (opened) opened = open(wire::Train(), others);
     if (opened) opened = open(wire::Diagnose(), others);
+    if (opened) opened = open(wire::CheckHealth(), others);
+    if (opened) opened = open(wire::ReadModels(), others);
     if (opened) opened = open(wire::ManageModels(), others);
-    return opened;
+    if (opened) opened = open(wire::ReleaseBatches(), others);
+    if (!opened) return opened;
+    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_);
+    if (!old) return tl::make_unexpected(old.error());
+    old_contract_ = std::move(*old);
+    return {};
   }
 
   [[nodiscard]] std::array<Lane*, 4> lanes() { return {&predictions_, &corrections_, &reads_, &changes_}; }
@@ -238,6 +248,7 @@ class DdsService::Running {
                                      {"receiving", [this]() -> Mark { return echo_->heard(); }},
                                      {"taking requests", [this] { return core_.taking.oldest(); }},
                                      {"replying", [this] { return replying_.oldest(); }},
+                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
                                      {"status", [this]() -> Mark { return status_steps_.load(); }}};
     parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
@@ -253,9 +264,15 @@ class DdsService::Running {
     status.program_version(options_.program_version);
     status.state(state);
     for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
-    status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
+    status.models_in_force(static_cast<std::int32_t>(registry_.cells_served()));
     status.requests(core_.counts.requests + core_.counts.shed);
     status.refused(core_.counts.refused + core_.counts.shed);
+    status.shed(core_.counts.shed);
+    status.unheard(channels_.unheard());
+    status.misdirected(core_.counts.misdirected);
+    status.unreadable(*core_.unreadable);
+    status.lost(core_.counts.lost);
+    if (const auto why = store_.state().why_not_written) status.trouble(cut(sentence(*why), wire::MAX_SENTENCE));
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -264,6 +281,7 @@ class DdsService::Running {
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
+  const Store& store_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;
@@ -278,6 +296,7 @@ class DdsService::Running {
   ServiceCore core_;
   std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::optional<PacketReport> packets_;  // of the status thread
   PacketListener packet_listener_;

@@ -212,6 +212,7 @@ void ReplyChannels::deliver(const std::stop_token& stop) {
     std::vector<Ready> ready = wait_for_ready(stop);
     is_last = is_last && ready.empty();
     for (const Ready& each : ready) write(each.writer, each.reply.get());
+    ++looks_;
   }
 }
 

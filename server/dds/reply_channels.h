@@ -61,6 +61,8 @@ class ReplyChannels final : public ReplySink {
   /// Writes what was posted, and what was kept once its reader is matched, until `stop`.
   void deliver(const std::stop_token& stop);
 
+  /// How often deliver() has looked; it does at least twice a second. For the watchdog: takes no lock.
+  [[nodiscard]] std::uint64_t looks() const { return looks_; }
   /// Replies that were dropped because nobody listened.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }
   [[nodiscard]] std::size_t clients() const;
@@ -90,6 +92,7 @@ class ReplyChannels final : public ReplySink {
   WorkUnderWay& writing_;
   ParkedChannels parked_;  // of the tending thread
   std::atomic<std::uint64_t> unheard_{0};
+  std::atomic<std::uint64_t> looks_{0};
   mutable Mutex mutex_;
   Condition due_;
   std::map<std::string, wire::dds::Topic*> topics_ TRAMMEL_GUARDED_BY(mutex_);                // by name

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "idl/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -25,7 +26,21 @@ struct CallCounts {
   std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
   std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY: there was no time or no room
   std::atomic<std::uint64_t> lost{0};      ///< by a DDS reader, before anybody saw them
+  /// Not answered: another client listens where the reply was to go.
+  std::atomic<std::uint64_t> misdirected{0};
 };
+
+/// Of a request that claims to be of another DDS writer than the one that sent it.
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
+                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
+  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
+                     "request_id must hold the GUID of the writer that sends it",
+                     {},
+                     "writer_guid",
+                     {},
+                     {}};
+}
 
 /// What the calls of one operation share. Outlives them.
 template <typename Operation>
@@ -48,7 +63,7 @@ struct CallContext {
 template <typename Operation>
 class Call final : public Job {
  public:
-  using Request = typename Operation::Request::type;
+  using Request = wire::Received<typename Operation::Request::type>;
   using Reply = typename Operation::Reply::type;
   /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
   static constexpr bool kComputes = AsksForTargets<Request> || AsksForJoints<Request>;
@@ -68,12 +83,11 @@ class Call final : public Job {
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
 
   std::size_t begin() override {
-    if (find_known()) return 0;
-    if (request_->header().contract_version() != wire::CONTRACT_VERSION) {
-      refuse(wire::RESULT_WRONG_CONTRACT, fmt::format("the request is of contract {}, this server speaks {}",
-                                                      request_->header().contract_version(), wire::CONTRACT_VERSION));
+    if (request_->fault) {
+      refuse(*request_->fault);
       return 0;
     }
+    if (find_known()) return 0;
     if constexpr (!kComputes) return 1;
     guarded([this] { begin_portions(); });
     return portions_ ? portions_->items() : 0;
@@ -101,7 +115,14 @@ class Call final : public Job {
   }
 
   void shed(const Shed& shed) override {
-    refuse(wire::RESULT_BUSY, fmt::format("{}; try again in {} ms", shed.why, shed.retry_after.count()));
+    const bool is_over = shed.too_late && request_->header().deadline_ms() > 0;
+    refuse(wire::Fault{is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY,
+                       fmt::format("{}; try again in {} ms", shed.why, shed.retry_after.count()),
+                       {},
+                       is_over ? "deadline_ms" : "",
+                       {},
+                       {}});
+    reply_.header().retry_after_ms(static_cast<std::uint32_t>(shed.retry_after.count()));
     put_identity();
     context_.counts.shed += answer(&ReplySink::post);
   }
@@ -134,15 +155,16 @@ class Call final : public Job {
     if (answer) {
       reply_ = std::move(*answer);
     } else {
-      refuse(to_wire(answer.error().code), sentence(answer.error()));
+      refuse(answer.error());
     }
   }
 
-  void refuse(wire::ResultCode code, const std::string& message) {
+  /// `why`: an Error or a wire::Fault.
+  template <typename Why>
+  void refuse(const Why& why) {
     const MutexLock lock(mutex_);
     reply_ = Reply();
-    reply_.header().result(code);
-    reply_.header().message(message);
+    put_error(why, reply_.header());
     refused_ = true;
   }
 
@@ -156,7 +178,7 @@ class Call final : public Job {
     try {
       work();
     } catch (const std::exception& failed) {
-      refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
+      refuse(wire::Fault{wire::RESULT_UNKNOWN_EXCEPTION, failed.what(), {}, {}, {}, {}});
     }
   }
 
@@ -164,6 +186,7 @@ class Call final : public Job {
     reply_.header().related_request_id(request_->header().request_id());
     reply_.header().server(context_.server_id);
     reply_.header().contract_version(wire::CONTRACT_VERSION);
+    reply_.header().trace_id(request_->header().trace_id());
   }
 
   void remember(bool is_good) {

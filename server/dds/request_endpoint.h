@@ -1,6 +1,8 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <memory>
@@ -24,6 +26,8 @@ struct ServiceCore {
   Handlers& handlers;
   ReplyChannels& channels;
   CallCounts counts{};
+  /// Dropped: not even the header could be read.
+  std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
   WorkUnderWay taking{};  ///< takes of requests from DDS readers
 };
 
@@ -45,10 +49,10 @@ class RequestEndpointBase {
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:
-  using Request = typename Operation::Request::type;
+  using Request = wire::Received<typename Operation::Request::type>;
 
   [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lanes lanes) {
-    const auto request_topic = wire::make_request_topic<Operation>(core.participant);
+    const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
     const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
@@ -72,7 +76,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   /// How long a request waits for its turn whose client does not say how long it waits.
-  static constexpr std::chrono::seconds kPatience{5};
+  static constexpr std::chrono::milliseconds kPatience{5000};
 
   RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
       : core_(core),
@@ -105,7 +109,11 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     const ReplyAddress to{wire::participant_of(writer), request->header().reply_partition().to_string(),
                           context_.reply_topic};
     auto expectation = core_.channels.expect(to.participant, to.partition);
-    if (!expectation) return;
+    if (!expectation) {
+      ++core_.counts.misdirected;
+      return;
+    }
+    if (!request->fault) request->fault = fault_of_identity(request->header(), writer);
     const std::string sent = to.participant +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request->header().request_id());
@@ -124,7 +132,10 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     if (is_served) ask.work = work_of(request, cell, Operation::kName);
     ask.items = items_of(request);
     ask.bytes = bytes_of_request(request);
-    ask.start_by = std::chrono::steady_clock::now() + kPatience;
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::milliseconds deadline(request.header().deadline_ms());
+    ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
+    if (deadline.count() > 0) ask.finish_by = ask.start_by;
     return ask;
   }
 

@@ -15,7 +15,7 @@ concept AsksForTargets = requires(const Request& request) {
 };
 template <typename Request>
 concept AsksForJoints = requires(const Request& request) {
-  request.joints_rad();
+  request.poses();
 };
 template <typename Request>
 concept HasAction = requires(const Request& request) {
@@ -28,7 +28,7 @@ template <typename Request>
   if constexpr (AsksForTargets<Request>) {
     return request.targets().size();
   } else if constexpr (AsksForJoints<Request>) {
-    return request.joints_rad().size();
+    return request.poses().size();
   } else {
     return 1;
   }
@@ -39,7 +39,7 @@ template <typename Request>
 [[nodiscard]] std::size_t bytes_of_request(const Request& request) {
   constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
   std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
-  if constexpr (requires { request.text(); }) bytes += request.text().size();
+  if constexpr (requires { request.model_text(); }) bytes += request.model_text().size();
   if constexpr (requires { request.csv(); }) bytes += request.csv().size();
   return bytes;
 }
@@ -52,8 +52,8 @@ template <typename Reply>
   if constexpr (requires { reply.corrections(); }) bytes += kAnswered * reply.corrections().size();
   if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
   if constexpr (requires { reply.models(); }) bytes += kAnswered * reply.models().size();
-  if constexpr (requires { reply.text(); }) bytes += reply.text().size();
-  if constexpr (requires { reply.findings_json(); }) bytes += reply.findings_json().size() + reply.page_html().size();
+  if constexpr (requires { reply.jobs(); }) bytes += kAnswered * (reply.jobs().size() + reply.batches().size());
+  if constexpr (requires { reply.text(); }) bytes += reply.text().size() + reply.page_html().size();
   return bytes;
 }
 
@@ -62,6 +62,7 @@ template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
   std::string work = cell + '/' + operation;
   if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
+  if constexpr (requires { request.what(); }) work += '/' + std::to_string(static_cast<int>(request.what()));
   return work;
 }
 

@@ -62,6 +62,9 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
     found.joint_types_.push_back(column.second);
     direction_names.push_back(fmt::format("dir{}", number));
   }
+  // Targets on a branch have no joints of their own, but a way to come there.
+  for (int n = 1; joints.empty() && table.find(fmt::format("dir{}", n)); ++n)
+    direction_names.push_back(fmt::format("dir{}", n));
   Result<std::vector<std::size_t>> directions = table.all_or_none(direction_names);
   if (!directions) return tl::make_unexpected(directions.error());
   found.directions_ = std::move(*directions);

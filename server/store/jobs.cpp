@@ -298,12 +298,12 @@ Status Store::set_job_running(std::int64_t id) {
   });
 }
 
-Status Store::set_job_queued(std::int64_t id) {
+Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
-                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - 1, 0) "
+                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - ?, 0) "
                               "WHERE id = ? AND state IN ('queued', 'running')",
-                              id),
+                              attempt_counts ? 0 : 1, id),
                        id);
   });
 }

@@ -218,9 +218,8 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
   });
 }
 
-Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
-  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
-  const auto content = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
+Result<std::string> Store::model_text(const std::string& cell, int version) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
     if (!row.executeStep())
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
@@ -228,6 +227,11 @@ Result<CompensatedModel> Store::model(const std::string& cell, int version) cons
           .with_value(version);
     return row.getColumn(0).getString();
   });
+}
+
+Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
+  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
+  const auto content = model_text(cell, version);
   auto stored = content ? deserialize(*content, where) : Result<CompensatedModel>(tl::make_unexpected(content.error()));
   if (stored) return stored;
   for (const ServedCopies::Copy& copy : connection_->copies->of(cell)) {

@@ -32,10 +32,8 @@ std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   return entries;
 }
 
-std::string cell_part(const std::string& cell) { return sha256_hex(cell).substr(0, kCellDigits); }
-
-std::string name_of(const std::string& cell, std::int64_t activation, int version) {
-  return fmt::format("{}.{}.{}{}", cell_part(cell), activation, version, kEnding);
+std::string name_of(std::int64_t activation, int version) {
+  return fmt::format("{}.{}{}", activation, version, kEnding);
 }
 
 template <typename Number>
@@ -46,13 +44,11 @@ bool read_number(std::string_view& text, Number* number) {
   return true;
 }
 
-/// What the name of a copy of the cell says.
-std::optional<ServedCopies::Copy> copy_at(const fs::path& file, const std::string& cell) {
+/// What the name of a copy says; empty: it is none.
+std::optional<ServedCopies::Copy> copy_at(const fs::path& file) {
   const std::string name = file.filename().string();
-  const std::string begin = cell_part(cell) + ".";
-  if (!name.starts_with(begin) || !name.ends_with(kEnding)) return std::nullopt;
+  if (!name.ends_with(kEnding)) return std::nullopt;
   std::string_view rest(name);
-  rest.remove_prefix(begin.size());
   ServedCopies::Copy copy{0, 0, file.string()};
   if (!read_number(rest, &copy.activation) || !read_number(rest, &copy.version)) return std::nullopt;
   return copy;
@@ -62,8 +58,8 @@ Failure cannot(const char* what, const std::string& path) {
   return failure(ErrorCode::kInternal, "cannot be {}: {}", what, std::strerror(errno)).in(path);
 }
 
-Status sync(const std::string& path, int flags) {
-  const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC);
+Status sync_folder(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return cannot("opened", path);
   const int failed = ::fsync(descriptor);
   ::close(descriptor);
@@ -118,20 +114,17 @@ Status ServedCopies::belong_to(const std::string& store, bool served) {
   return {};
 }
 
-bool ServedCopies::any() const {
-  const std::string where = folder();
-  if (where.empty()) return false;
-  const auto entries = entries_of(where);
-  return std::any_of(entries.begin(), entries.end(),
-                     [](const fs::directory_entry& entry) { return entry.path().extension() == kEnding; });
+std::string ServedCopies::folder(const std::string& cell) const {
+  const std::string all = folder();
+  return all.empty() ? "" : all + "/" + sha256_hex(cell).substr(0, kCellDigits);
 }
 
 std::vector<ServedCopies::Copy> ServedCopies::of(const std::string& cell) const {
   std::vector<Copy> copies;
-  const std::string where = folder();
+  const std::string where = folder(cell);
   if (where.empty()) return copies;
   for (const fs::directory_entry& entry : entries_of(where)) {
-    if (auto copy = copy_at(entry.path(), cell)) copies.push_back(std::move(*copy));
+    if (auto copy = copy_at(entry.path())) copies.push_back(std::move(*copy));
   }
   std::sort(copies.begin(), copies.end(), [](const Copy& a, const Copy& b) { return a.activation > b.activation; });
   return copies;
@@ -139,15 +132,19 @@ std::vector<ServedCopies::Copy> ServedCopies::of(const std::string& cell) const 
 
 Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int version,
                           const std::string& content) const {
-  const std::string where = folder();
+  const std::string where = folder(cell);
+  if (where.empty()) return {};
   std::error_code error;
-  fs::create_directories(where, error);
-  const std::string file = where + "/" + name_of(cell, activation, version);
+  const bool is_new = fs::create_directories(where, error);
+  const std::string file = where + "/" + name_of(activation, version);
   const std::string part = file + ".part";
   if (auto written = write_part(part, content); !written) return written;
   fs::rename(part, file, error);
   if (error) return failure(ErrorCode::kInternal, "cannot be renamed: {}", error.message()).in(part);
-  if (auto synced = sync(where, O_RDONLY | O_DIRECTORY); !synced) return synced;
+  if (auto synced = sync_folder(where); !synced) return synced;
+  if (is_new) {
+    if (auto synced = sync_folder(folder()); !synced) return synced;
+  }
   std::set<int> seen;
   for (const Copy& copy : of(cell)) {
     const bool newest_of_its_version = seen.insert(copy.version).second;

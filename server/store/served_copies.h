@@ -10,8 +10,8 @@
 namespace trammel {
 
 /// The last models in force of each cell as plain files beside the store: what is served where the store cannot be
-/// read. They lie in `<store>.models/<id of the store>/`, one file a version, newest three of a cell. Thread-safe; one
-/// thread at a time keeps copies of a cell.
+/// read. They lie in `<store>.models/<id of the store>/<hash of the cell's name>/`, one file a version, the newest
+/// three. Thread-safe; one thread at a time keeps copies of a cell.
 class ServedCopies {
  public:
   explicit ServedCopies(const std::string& store) : root_(store + ".models") {}
@@ -26,8 +26,6 @@ class ServedCopies {
   /// From now on copies are those of this store. A store that is `served` from gets a folder even before its first
   /// copy.
   [[nodiscard]] Status belong_to(const std::string& store, bool served);
-  /// Whether there is any copy of this store.
-  [[nodiscard]] bool any() const;
   /// Newest first; none where they cannot be read.
   [[nodiscard]] std::vector<Copy> of(const std::string& cell) const;
   /// On disk when it returns. Takes the place of an older copy of the same version.
@@ -36,7 +34,9 @@ class ServedCopies {
   [[nodiscard]] const std::string& root() const { return root_; }
 
  private:
+  /// Of the store's copies; empty: not known yet.
   [[nodiscard]] std::string folder() const;
+  [[nodiscard]] std::string folder(const std::string& cell) const;
 
   const std::string root_;
   mutable Mutex mutex_;

@@ -158,9 +158,9 @@ class Store {
   /// `finished` failed.
   [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
   /// These refuse (kNotFound) a job that is done or failed already. Setting it running counts an attempt; setting it
-  /// queued takes the attempt back.
+  /// queued takes the attempt back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
-  [[nodiscard]] Status set_job_queued(std::int64_t id);
+  [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
   [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
   /// For a job that makes no model.
   [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
@@ -185,6 +185,8 @@ class Store {
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
+  /// The same as it is stored, not checked.
+  [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
   /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,23 +33,28 @@ class Trainer {
   /// Called by whichever thread changes the job; for one job never by two at a time.
   using ProgressListener = ProgressBook::Listener;
   using ModelListener = ModelHistory::Listener;
+  /// Something is wrong, or (`over`) no longer.
+  using TroubleListener = std::function<void(const std::string& trouble, bool over)>;
 
   /// `store` and `registry` outlive it.
   Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry, TrainerOptions options);
   ~Trainer();  ///< stops as stop()
 
   /// Set before start().
-  void set_listeners(ProgressListener progress, ModelListener model);
-  /// Publishes the models in force from the store and queues unfinished jobs. Returns what could not be taken up, for
-  /// the log: a model that does not load or was trained for another robot or tool, a job of a cell not served here, a
-  /// job that was interrupted too often and is now failed. Requests may come as soon as it returns.
+  void set_listeners(ProgressListener progress, ModelListener model, TroubleListener trouble = nullptr);
+  /// Announces the models in force of the store, loads as many as a second allows (the rest when they are asked for, or
+  /// in the background), and queues unfinished jobs. Returns what could not be taken up, for the log: a model that does
+  /// not load or was trained for another robot or tool, a job of a cell not served here, a job that was interrupted too
+  /// often and is now failed. Requests may come as soon as it returns.
   [[nodiscard]] Result<std::vector<std::string>> take_up();
-  /// Reports the jobs taken up and starts the worker. Does take_up() itself where that has not been done.
+  /// Reports the jobs taken up and starts the threads. Does take_up() itself where that has not been done.
   [[nodiscard]] Result<std::vector<std::string>> start();
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
   [[nodiscard]] const ServedCells& cells() const { return cells_; }
+  /// What is wrong now: with the store, with its disk, with the models of cells; one sentence each. Never waits.
+  [[nodiscard]] std::vector<std::string> troubles() const;
 
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
   /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
@@ -63,7 +69,8 @@ class Trainer {
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
   /// and what the model in force has besides. Refuses batches that stay in quarantine and, where as many jobs that were
-  /// asked for wait for this cell as may, everything (kBusy).
+  /// asked for wait for this cell as may, everything (kBusy). Refuses, with the limit, what no training may ask for:
+  /// more than max_poses, 1000 batches, 500 error sources, a bias of more than 32 kernels.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
                                              Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});
@@ -111,6 +118,12 @@ class Trainer {
   [[nodiscard]] int queued_jobs() const;
 
  private:
+  /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
+  /// `told`.
+  void keep_up(std::vector<std::string> told, const std::stop_token& stop);
+  /// Of a store that can be read only now.
+  void take_up_late();
+  void tell_troubles(std::vector<std::string>& told);
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
   /// The job that was queued under this id before; empty: none.
@@ -130,15 +143,16 @@ class Trainer {
 
   const ServedCells cells_;
   Store& store_;
-  const ModelRegistry& registry_;
+  ModelRegistry& registry_;
   const TrainerOptions options_;
   ModelHistory history_;
+  TroubleListener trouble_listener_;
   ProgressBook book_;
   JobRunner runner_;
   JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
   Mutex submit_mutex_;  // one at a time between the look at what is there and the push: who may push
-  std::jthread worker_;
+  std::jthread worker_, keeper_, reclaimer_;
 };
 
 }  // namespace trammel

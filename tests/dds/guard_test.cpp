@@ -38,7 +38,7 @@ std::optional<Dropped> fate(Guard& guard, const PacketBytes& message) {
   return std::nullopt;
 }
 std::optional<Dropped> fate(const PacketBytes& message) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   return fate(guard, message);
 }
 constexpr std::optional<Dropped> kPasses;
@@ -61,7 +61,7 @@ PacketBytes with(std::uint16_t id, const std::vector<std::uint32_t>& words, std:
 }
 
 TEST(Guard, WhatHonestParticipantsSendPasses) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   EXPECT_EQ(fate(guard, announcement(participant())), kPasses);
   EXPECT_EQ(fate(guard, announcement(writer(), kPublications)), kPasses);
   EXPECT_EQ(fate(guard, announcement(writer(), kSubscriptions)), kPasses);
@@ -114,7 +114,7 @@ TEST(Guard, AStatisticsSubmessagePassesNowhere) {
   };
   EXPECT_EQ(fate(with_statistics(56, false)), Dropped::kStatistics);
   EXPECT_EQ(fate(with_statistics(52, true)), Dropped::kStatistics);
-  Guard guard;
+  Guard guard(kMaxTextSample);
   const PacketBytes honest = with_statistics(56, true);
   const auto passed = guard.check(honest, kSocket);
   ASSERT_TRUE(passed);
@@ -196,7 +196,7 @@ TEST(Guard, CountsAndLengthsOfAnnouncementsStayWithinTheirParameter) {
 TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
   for (const std::uint16_t id :
        std::initializer_list<std::uint16_t>{0x0069, 0x0072, 0x0075, 0x0035}) {  // type objects, content filters
-    Guard guard;
+    Guard guard(kMaxTextSample);
     const PacketBytes message = with(id, {0xfffffff0u, 0});
     const auto passed = guard.check(message, kSocket);
     ASSERT_TRUE(passed) << id;
@@ -205,7 +205,7 @@ TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
 }
 
 TEST(Guard, AParticipantThatIsNotHeardIsNotKeptForEver) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   PacketBytes lease;
   test::put32(lease, 0x7fffffffu);
   test::put32(lease, 0xffffffffu);
@@ -249,13 +249,13 @@ TEST(Guard, FragmentsThatTheirSampleDoesNotHaveAreDropped) {
   EXPECT_EQ(fate(fragments(1, 1, 1024, 4096, 1024, kPublications)), Dropped::kFragment) << "would hide a list";
   EXPECT_EQ(fate(fragments(1, 1, 60000, kMaxTextSample + 1, 60000)), Dropped::kSampleSize);
 
-  Guard guard;
+  Guard guard(kMaxTextSample);
   EXPECT_EQ(fate(guard, fragments(1, 1, 1024, 4096, 1024)), kPasses);
   EXPECT_EQ(fate(guard, fragments(2, 1, 2048, 4096, 2048)), Dropped::kFragment) << "another size than before";
 }
 
 TEST(Guard, SamplesBegunAndNotFinishedAreBounded) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   int begun = 0;
   for (std::int64_t number = 1; number <= 64; ++number) {
     const PacketBytes first =
@@ -270,7 +270,7 @@ TEST(Guard, SamplesBegunAndNotFinishedAreBounded) {
 }
 
 TEST(Guard, FinishedSamplesMakeRoom) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   constexpr std::uint32_t kFragments = (kMaxTextSample + 59999) / 60000;
   for (std::int64_t number = 1; number <= 20; ++number) {
     for (std::uint32_t first = 1; first <= kFragments; ++first) {
@@ -293,7 +293,7 @@ std::int64_t first_of(Bytes message) {
 }
 
 TEST(Guard, AWriterThatSkipsABillionNumbersIsFollowedInSteps) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   constexpr std::int64_t kFirst = 1'000'000'001;
   Guard::Time now = std::chrono::steady_clock::now();
   std::int64_t reached = 0;
@@ -312,7 +312,7 @@ TEST(Guard, AWriterThatSkipsABillionNumbersIsFollowedInSteps) {
 }
 
 TEST(Guard, WhatOurReaderHasNotConfirmedIsNotSkippedFurther) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   for (std::uint32_t count = 1; count <= 100; ++count) {
     const PacketBytes heartbeat =
         from().heartbeat(0, kUserWriter, std::int64_t{1} << 40, std::int64_t{1} << 40, count).bytes();
@@ -323,7 +323,7 @@ TEST(Guard, WhatOurReaderHasNotConfirmedIsNotSkippedFurther) {
 }
 
 TEST(Guard, AGapIsTakenInSteps) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   constexpr std::int64_t kEnd = 100'000'000;
   Guard::Time now = std::chrono::steady_clock::now();
   std::int64_t reached = 1;
@@ -342,7 +342,7 @@ TEST(Guard, AGapIsTakenInSteps) {
 }
 
 TEST(Guard, AFloodOfGapsDoesNotKeepTheReceiverBusy) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   const Guard::Time now = std::chrono::steady_clock::now();
   for (std::int64_t i = 0; i < 1000; ++i) {
     static_cast<void>(guard.check(from().gap(0, kUserWriter, 1 + (i << 20), (i + 1) << 20).bytes(), kSocket, now));
@@ -352,7 +352,7 @@ TEST(Guard, AFloodOfGapsDoesNotKeepTheReceiverBusy) {
 }
 
 TEST(Guard, ACountThatJumpsIsDroppedAndTheHonestOneGoesOn) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   constexpr std::uint32_t kAll = 0xffffffffu;
   EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, 10).bytes()), kPasses);
   EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, kAll).bytes()), Dropped::kCount);
@@ -363,7 +363,7 @@ TEST(Guard, ACountThatJumpsIsDroppedAndTheHonestOneGoesOn) {
 }
 
 TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   const auto asks = [](std::int64_t number, std::uint32_t fragment, std::uint32_t count) {
     return from().nack_frag(kUserReader, kUserWriter, number, fragment, count).bytes();
   };
@@ -376,7 +376,7 @@ TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
 }
 
 TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   int passed = 0;
   for (unsigned char i = 0; i < 200; ++i) {
     Prefix prefix = kSource;
@@ -389,7 +389,7 @@ TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
 }
 
 TEST(Guard, TwoHundredCellsThatStartAtOnceAreAllHeard) {
-  Guard guard;
+  Guard guard(kMaxTextSample);
   for (std::uint64_t socket = 0; socket < 1000; ++socket) {
     Prefix prefix = kSource;
     prefix[10] = static_cast<unsigned char>(socket >> 8);
@@ -445,7 +445,7 @@ std::vector<PacketBytes> everything() {
 TEST(Guard, AMillionMutatedPacketsAreReadWithinTheirBytes) {
   const std::vector<PacketBytes> corpus = everything();
   std::mt19937 random(7);
-  Guard guard;
+  Guard guard(kMaxTextSample);
   int passed = 0;
   for (int run = 0; run < 1'000'000; ++run) {
     PacketBytes message = corpus[random() % corpus.size()];

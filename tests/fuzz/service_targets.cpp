@@ -1,13 +1,15 @@
 // What comes over the wire: every type, every request with its handler, what a session makes of replies; and the server
 // file.
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "clients/cli/text/diagnose_text.h"
 #include "clients/session/convert.h"
 #include "idl/guard/guard.h"
-#include "idl/manage_text.h"
+#include "idl/limits.h"
 #include "idl/safe_type.h"
 #include "idl/topics.h"
 #include "server/base/check.h"
@@ -52,7 +54,12 @@ template <typename Sample>
 void convert(const Sample& sample) {
   if constexpr (requires { client::error_of(sample.header()); }) static_cast<void>(client::error_of(sample.header()));
   if constexpr (requires { client::from_wire(sample.model()); }) static_cast<void>(client::from_wire(sample.model()));
-  if constexpr (requires { client::from_wire(sample.job()); }) static_cast<void>(client::from_wire(sample.job()));
+  if constexpr (requires { sample.jobs(); }) {
+    for (const auto& one : sample.jobs()) static_cast<void>(client::from_wire(one, "server-1"));
+  }
+  if constexpr (requires { sample.batches(); }) {
+    for (const auto& one : sample.batches()) static_cast<void>(client::from_wire(one));
+  }
   if constexpr (requires { client::from_wire(sample); }) static_cast<void>(client::from_wire(sample));
   if constexpr (requires { sample.predictions(); }) {
     for (const auto& one : sample.predictions()) static_cast<void>(client::from_wire(one));
@@ -98,7 +105,10 @@ void fill(Sample& sample) {
   if constexpr (requires { sample.batch_ids().resize(2); }) sample.batch_ids() = {"a", "b"};
   if constexpr (requires { sample.batch_id("a"); }) sample.batch_id("a");
   if constexpr (requires { sample.csv("q1_deg"); }) sample.csv("q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n");
-  if constexpr (requires { sample.text("text"); }) sample.text(R"({"batches": ["a"], "level": "", "bias": ""})");
+  if constexpr (requires { sample.model_text("text"); }) sample.model_text("{}");
+  if constexpr (requires { sample.text("text"); }) sample.text("{}");
+  if constexpr (requires { sample.jobs().resize(2); }) sample.jobs().resize(2);
+  if constexpr (requires { sample.batches().resize(2); }) sample.batches().resize(2);
 }
 
 template <typename PubSubType>
@@ -109,16 +119,33 @@ std::vector<std::string> samples() {
   return {bytes_of<PubSubType>(empty), bytes_of<PubSubType>(full)};
 }
 
-std::vector<std::string> manage_samples() {
-  using Type = wire::ManageModels::Request;
+/// A request for each value of the enumeration that says what is wanted.
+template <typename Operation, typename Set>
+std::vector<std::string> of_each(int last, const Set& set) {
+  using Type = typename Operation::Request;
   std::vector<std::string> all = samples<Type>();
-  for (int action = 0; action <= static_cast<int>(wire::MANAGE_JOBS); ++action) {
-    Type::type sample;
+  for (int value = 0; value <= last; ++value) {
+    typename Type::type sample;
     fill(sample);
-    sample.action(static_cast<wire::ManageAction>(action));
+    set(sample, value);
     all.push_back(bytes_of<Type>(sample));
   }
   return all;
+}
+std::vector<std::string> manage_samples() {
+  return of_each<wire::ManageModels>(wire::MANAGE_BACKUP, [](wire::ManageModelsRequest& request, int action) {
+    request.action(static_cast<wire::ManageAction>(action));
+  });
+}
+std::vector<std::string> read_samples() {
+  return of_each<wire::ReadModels>(wire::READ_REPLAY, [](wire::ReadModelsRequest& request, int what) {
+    request.what(static_cast<wire::ReadKind>(what));
+  });
+}
+std::vector<std::string> release_samples() {
+  return of_each<wire::ReleaseBatches>(wire::RELEASE_DISCARD, [](wire::ReleaseBatchesRequest& request, int action) {
+    request.action(static_cast<wire::ReleaseAction>(action));
+  });
 }
 
 /// A server without its network, with a model in force and a trainer that takes jobs and does none of them.
@@ -141,33 +168,6 @@ std::string ask(std::string_view bytes) {
   if (!reply) return words_of(reply.error());
   static_cast<void>(bytes_of<typename Operation::Reply>(*reply));
   return "answered";
-}
-
-/// MANAGE_RELEASE_AND_TRAIN with this text.
-std::string ask_to_release(std::string_view bytes) {
-  wire::ManageModelsRequest request = wire::release_and_train_of(std::string(bytes));
-  fill(request);
-  request.text(std::string(bytes));
-  auto reply = service().handlers.answer(request);
-  return reply ? "answered" : words_of(reply.error());
-}
-std::vector<std::string> releases() { return {R"({"batches": ["a", "b"], "level": "M2", "bias": "se"})"}; }
-
-std::string read_jobs(std::string_view bytes) {
-  const auto jobs = client::jobs_from(std::string(bytes), "server-1");
-  return jobs ? "taken" : words_of(jobs.error());
-}
-std::vector<std::string> job_lists() {
-  return {R"({"jobs": [{"job": 1, "cell": "cell-7", "kind": "train", "stage": "done", "what": "", "share": 1.0,)"
-          R"( "batches": ["a"], "model_version": 2, "in_force": true, "created_unix_s": 1, "started_unix_s": 2,)"
-          R"( "finished_unix_s": null}]})"};
-}
-std::string read_quarantine(std::string_view bytes) {
-  const auto list = client::quarantine_from(std::string(bytes));
-  return list ? "taken" : words_of(list.error());
-}
-std::vector<std::string> quarantine_lists() {
-  return {R"([{"cell": "cell-7", "batch": "a", "poses": 40, "reason": "the tool has moved"}])"};
 }
 
 /// In a folder with the cell files that it names.
@@ -222,9 +222,9 @@ std::vector<std::string> truths() {
 /// A packet from the network, met by a guard that has seen nothing and by one that has seen all the others.
 std::string guard_packet(std::string_view bytes) {
   constexpr std::uint64_t kSocket = 4711;
-  static wire::Guard old;
+  static wire::Guard old(wire::kMaxTextSample);
   const std::vector<unsigned char> packet(bytes.begin(), bytes.end());
-  wire::Guard fresh;
+  wire::Guard fresh(wire::kMaxTextSample);
   const bool passes = fresh.check(packet, kSocket).has_value();
   static_cast<void>(old.check(packet, kSocket));
   std::string said = passes ? "passes" : "dropped";
@@ -267,6 +267,39 @@ Target request_target(const char* name) {
   return {name, ask<Operation>, mutate_cdr, samples<typename Operation::Request>};
 }
 
+/// What the guard makes of a packet; what passes must be whole.
+std::string guard_packet(std::string_view bytes) {
+  static wire::Guard guard(static_cast<std::uint32_t>(wire::kMaxTextSample));  // remembers what it has seen
+  static std::array<std::uint64_t, wire::kDroppedReasons> before{};
+  const wire::Bytes packet(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  guard.sent(packet);
+  const auto passed = guard.check(packet, 1);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto reason = static_cast<wire::Dropped>(i);
+    if (std::exchange(before[i], guard.counts().of(reason)) != guard.counts().of(reason)) return wire::name_of(reason);
+  }
+  TRAMMEL_CHECK(passed.has_value());
+  wire::Bytes rest = passed->subspan(wire::kHeader);
+  while (!rest.empty()) TRAMMEL_CHECK(wire::next_submessage(rest).has_value());
+  return passed->size() == packet.size() ? "passes" : "passes in part";
+}
+
+std::vector<std::string> packets() {
+  constexpr test::Prefix kFrom = {1, 15, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+  constexpr std::uint32_t kWriter = 0x00000103, kReader = 0x00000104;
+  test::ParameterList list;
+  list.guid(0x0050, kFrom, 0x000001c1).text(0x0062, "name").locator(0x0032, 7).add(0x002c, {4, 0, 0, 0, 1, 2, 3, 4});
+  const std::vector<test::PacketBytes> all = {
+      test::Packet(kFrom).data({0, wire::kAnnouncer, 1, {}, list.payload()}).bytes(),
+      test::Packet(kFrom).to(kFrom).data({0, kWriter, 1, {}, {0, 1, 0, 0}}).heartbeat(0, kWriter, 1, 1, 1).bytes(),
+      test::Packet(kFrom).gap(0, kWriter, 2, 9).acknack(kReader, kWriter, 2, 40, 1).bytes(),
+      test::Packet(kFrom).fragments({0, kWriter, 3, 1, 1, 64, 256, test::PacketBytes(64)}).bytes(),
+      test::Packet(kFrom).nack_frag(kReader, kWriter, 3, 2, 1).bytes()};
+  std::vector<std::string> seeds;
+  for (const test::PacketBytes& one : all) seeds.emplace_back(one.begin(), one.end());
+  return seeds;
+}
+
 }  // namespace
 
 const std::vector<Target>& targets() {
@@ -281,8 +314,14 @@ const std::vector<Target>& targets() {
       type_target<wire::Train::Reply>("train_reply"),
       type_target<wire::Diagnose::Request>("diagnose_request"),
       type_target<wire::Diagnose::Reply>("diagnose_reply"),
+      type_target<wire::CheckHealth::Request>("check_health_request"),
+      type_target<wire::CheckHealth::Reply>("check_health_reply"),
+      type_target<wire::ReadModels::Request>("read_models_request"),
+      type_target<wire::ReadModels::Reply>("read_models_reply"),
       type_target<wire::ManageModels::Request>("manage_models_request"),
       type_target<wire::ManageModels::Reply>("manage_models_reply"),
+      type_target<wire::ReleaseBatches::Request>("release_batches_request"),
+      type_target<wire::ReleaseBatches::Reply>("release_batches_reply"),
       type_target<wire::ModelStatusTopic::Type>("model_status"),
       type_target<wire::TrainingProgressTopic::Type>("training_progress"),
       type_target<wire::ServiceStatusTopic::Type>("service_status"),
@@ -292,11 +331,11 @@ const std::vector<Target>& targets() {
       request_target<wire::SubmitMeasurements>("ask_submit_measurements"),
       request_target<wire::Train>("ask_train"),
       request_target<wire::Diagnose>("ask_diagnose"),
+      request_target<wire::CheckHealth>("ask_check_health"),
+      {"ask_read_models", ask<wire::ReadModels>, mutate_cdr, read_samples},
       {"ask_manage_models", ask<wire::ManageModels>, mutate_cdr, manage_samples},
-      {"ask_release_and_train", ask_to_release, mutate_json, releases},
-      {"jobs_json", read_jobs, mutate_json, job_lists},
-      {"quarantine_json", read_quarantine, mutate_json, quarantine_lists},
-      {"rtps_packet", guard_packet, mutate_cdr, packets},
+      {"ask_release_batches", ask<wire::ReleaseBatches>, mutate_cdr, release_samples},
+      {"rtps_packet", guard_packet, mutate_bytes, packets},
       {"findings_json", read_findings, mutate_json},
       {"truth_yaml", read_truth_file, mutate_yaml, truths},
       {"server_yaml", read_server_file, mutate_yaml, server_files},

@@ -1,6 +1,10 @@
 // What is left of a store, and what it goes on doing, after faults of the disk.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -10,8 +14,8 @@
 #include "server/base/hash.h"
 #include "server/compensate/model_file.h"
 #include "server/store/store.h"
-#include "tests/store/faulty_disk.h"
 #include "tests/support/demand.h"
+#include "tests/support/faulty_disk.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -153,6 +157,112 @@ TEST_F(StoreFaults, AfterAPowerCutAtAnyCallAllThatWasAcknowledgedIsThere) {
       EXPECT_EQ(demand((*store)->unfinished_jobs()).size(), batches.size() - models.size());
     }
   }
+}
+
+/// Changes in an order that `seed` draws, each under an id of its own.
+class Changes {
+ public:
+  explicit Changes(std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 4)(random));
+  }
+  /// Those from `*next` on, which rises with every answer.
+  void ask(Store& store, std::size_t* next) const {
+    for (; *next < kinds_.size(); ++*next) {
+      const std::size_t i = *next;
+      const ChangeId id{"robot-3:" + std::to_string(i), std::to_string(kinds_[i])};
+      const int version = static_cast<int>(i) % 3 + 1;
+      const std::string name = std::to_string(i);
+      StoredBatch brought = batch(name);
+      switch (kinds_[i]) {
+        case 0:
+          static_cast<void>(store.activate("cell-7", version, id));
+          break;
+        case 1:
+          static_cast<void>(store.rollback("cell-7", 1, id));  // refused where nothing was before
+          break;
+        case 2:
+          static_cast<void>(store.add_batch(brought, job_of(name)));
+          break;
+        case 3:
+          static_cast<void>(store.add_job(job_of("first"), false, id));
+          break;
+        default:
+          static_cast<void>(store.set_quarantine("cell-7", "first", name, id));
+      }
+    }
+  }
+
+ private:
+  std::vector<int> kinds_;
+};
+
+/// Everything that the changes change.
+std::string contents(const Store& store) {
+  std::string all = fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
+  if (const auto before = store.previous_in_force("cell-7")) all += fmt::format(", before {}", fmt::join(*before, " "));
+  for (const StoredBatch& one : demand(store.batches("cell-7"))) all += "\n" + one.id + " " + one.quarantine;
+  for (const StoredJob& one : demand(store.unfinished_jobs()))
+    all += fmt::format("\njob of {}", fmt::join(one.batch_ids, " "));
+  return all;
+}
+
+TEST_F(StoreFaults, AfterAKillAtAnyCallEveryChangeThatIsAskedForAgainHasHappenedOnce) {
+  constexpr int kSeeds = 10, kPoints = 32;
+  open();
+  for (int i = 1; i <= 3; ++i) put_in_force(i);
+  ASSERT_TRUE(store_->add_batch(batch("first"), job_of("first")));
+  store_.reset();
+  const auto fresh_copy = [&](const test::TemporaryFolder& to) {
+    fs::copy(folder_.path(), to.path(), fs::copy_options::recursive);
+    return to.file("trammel.db");
+  };
+  int killed = 0;
+  auto* answered = static_cast<std::size_t*>(
+      ::mmap(nullptr, sizeof(std::size_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Changes changes(static_cast<std::uint64_t>(seed));
+    std::string expected;
+    std::size_t calls = 0;
+    {
+      test::TemporaryFolder whole;
+      test::FaultyDisk disk;
+      auto store = demand(Store::open(fresh_copy(whole)));
+      const std::size_t before = disk.calls();
+      std::size_t next = 0;
+      changes.ask(*store, &next);
+      calls = disk.calls() - before;
+      expected = contents(*store);
+      store.reset();
+    }
+    for (int point = 0; point < kPoints; ++point) {
+      test::TemporaryFolder left;
+      const std::string path = fresh_copy(left);
+      *answered = 0;
+      const pid_t child = ::fork();
+      ASSERT_GE(child, 0);
+      if (child == 0) {
+        test::FaultyDisk disk;
+        auto store = Store::open(path);
+        auto calls_left = static_cast<int>(calls) * point / kPoints;
+        disk.set_plan([calls_left](auto, const std::string&) mutable {
+          if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
+          return SQLITE_OK;
+        });
+        if (store) changes.ask(**store, answered);
+        ::_exit(0);
+      }
+      int status = 0;
+      ASSERT_EQ(::waitpid(child, &status, 0), child);
+      killed += WIFSIGNALED(status) ? 1 : 0;
+      const auto store = demand(Store::open(path));
+      EXPECT_FALSE(store->versions_to_serve("cell-7").empty());
+      changes.ask(*store, answered);  // the client knows what was answered, and repeats the rest
+      EXPECT_EQ(contents(*store), expected)
+          << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
+    }
+  }
+  EXPECT_GE(killed, kSeeds * (kPoints - 1));
 }
 
 TEST_F(StoreFaults, WhateverPageIsDamagedTheLastModelOfEveryCellIsServed) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <new>
 #include <thread>
 
@@ -300,6 +301,25 @@ TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }
 
+TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor) {
+  submit("a");
+  std::string kernel = "se", sources = "M1";
+  for (int i = 0; i < 200; ++i) kernel += " + se";
+  for (int i = 0; i < 600; ++i) sources += ",gear_transmission:3";
+  const auto refused_with = [this](const std::vector<std::string>& batches, const std::string& level,
+                                   const std::string& bias) {
+    const auto job = trainer_->retrain("cell-7", batches, level, bias);
+    EXPECT_EQ(job ? ErrorCode::kInternal : job.error().code, ErrorCode::kTooLarge);
+    return job ? 0 : job.error().limit.value_or(0);
+  };
+  EXPECT_EQ(refused_with({"a"}, "", kernel), 32);
+  EXPECT_EQ(refused_with({"a"}, "", std::string(100'000, '(')), 1000);
+  EXPECT_EQ(refused_with({"a"}, sources, ""), 500);
+  EXPECT_EQ(refused_with({"a"}, std::string(1'000'000, 'x'), ""), 16384);
+  EXPECT_EQ(refused_with(std::vector<std::string>(1001, "a"), "", ""), 1000);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+}
+
 TEST_F(TrainerTest, RetrainsFromTheNewestBatchWhenNoneIsNamed) {
   submit("older");
   submit("newer", {.seed = 2});
@@ -527,7 +547,7 @@ TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   EXPECT_EQ(in_force(), 2);
 }
 
-TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbackStepsPastIt) {
+TEST_F(TrainerTest, WhereNoModelCanBeLoadedTheRecordOfTheOneInForceJudges) {
   start();
   train("first");
   for (const int version : {2, 3}) {
@@ -535,7 +555,9 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
     ASSERT_TRUE(trainer_->activate("cell-7", version));
   }
   SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
-      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version > 1");
+      .exec("UPDATE models SET content = replace(content, '10', '11')");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
   restart();
   ASSERT_TRUE(trainer_->start());
   ASSERT_EQ(in_force(), 0);
@@ -544,6 +566,22 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
   EXPECT_NE(worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
             std::string::npos)
       << worse.what;
+}
+
+TEST_F(TrainerTest, ARollbackStepsPastWhatCannotBeLoaded) {
+  start();
+  train("first");
+  for (const int version : {2, 3}) {
+    train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
+    ASSERT_TRUE(trainer_->activate("cell-7", version));
+  }
+  SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version = 2");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  ASSERT_EQ(in_force(), 3);
   EXPECT_EQ(trainer_->rollback("cell-7").value(), 1);
   EXPECT_EQ(in_force(), 1);
   EXPECT_EQ(*store_->version_in_force("cell-7"), 1);

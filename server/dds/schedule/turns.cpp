@@ -143,7 +143,8 @@ std::optional<Shed> Turns::too_late(const Client& client, const Entry& entry, St
                       static_cast<double>(std::max<std::size_t>(1, std::min(ask.items, limits_.workers))));
   const Cost late = Cost(now - limit) + (ask.finish_by && !begun ? together : Cost(0));
   if (late <= Cost(0)) return std::nullopt;
-  return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1))};
+  return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1)),
+              true};
 }
 
 void Turns::open(Entry& entry, std::size_t items) {
