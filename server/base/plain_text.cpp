@@ -1,5 +1,7 @@
 #include "server/base/plain_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 
@@ -81,17 +83,6 @@ bool is_plain(std::string_view text) {
 
 bool is_plain_lines(std::string_view text) {
   return all_of_characters(text, [](std::uint32_t code) { return !controls(code) || ends_line_or_field(code); });
-}
-
-Status check_name(std::string_view name, const char* what, std::size_t limit_bytes) {
-  if (name.size() > limit_bytes)
-    return failure(ErrorCode::kTooLarge, "{} of {} bytes, limit {}", what, name.size(), limit_bytes)
-        .of(what)
-        .beyond(name.size(), limit_bytes);
-  if (!is_utf8(name)) return refused("{} '{}' is not UTF-8 text", what, shown(name)).of(what).with_text(shown(name));
-  if (!is_plain(name))
-    return refused("{} '{}' has control characters", what, shown(name)).of(what).with_text(shown(name));
-  return {};
 }
 
 std::string shown(std::string_view text) {

@@ -4,13 +4,9 @@
 #include <string>
 #include <string_view>
 
-#include "server/base/result.h"
-
 /// What names, ids and messages may hold. Whoever reads a name from outside checks it here; whoever shows a foreign
 /// text to people shows it by shown().
 namespace trammel {
-
-constexpr std::size_t kMostNameBytes = 256;  ///< of an id or a name, unless its place is smaller
 
 /// Whether the bytes are UTF-8 (RFC 3629) without NUL.
 [[nodiscard]] bool is_utf8(std::string_view text);
@@ -19,10 +15,6 @@ constexpr std::size_t kMostNameBytes = 256;  ///< of an id or a name, unless its
 [[nodiscard]] bool is_plain(std::string_view text);
 /// The same, with tabs and line ends allowed: a field of a table, the text of a file.
 [[nodiscard]] bool is_plain_lines(std::string_view text);
-
-/// Refuses a name that is not plain or longer than `limit_bytes`. `what` says whose it is: `pose_id`. An empty name is
-/// fine here.
-[[nodiscard]] Status check_name(std::string_view name, const char* what, std::size_t limit_bytes = kMostNameBytes);
 
 /// The text with everything that is not plain spelled out, as JSON spells it: `\u001b`, `\u009b`; a byte that is no
 /// UTF-8 as `\xff`. Plain text stays as it is.

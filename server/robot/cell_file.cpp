@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "server/base/plain_text.h"
+#include "server/base/name_check.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"

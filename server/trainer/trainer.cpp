@@ -11,7 +11,7 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
-#include "server/base/plain_text.h"
+#include "server/base/name_check.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"

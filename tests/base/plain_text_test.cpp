@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/base/name_check.h"
 #include "tests/support/refusal.h"
 
 namespace trammel {

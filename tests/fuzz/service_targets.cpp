@@ -219,45 +219,6 @@ std::vector<std::string> truths() {
       "course: {seconds_per_pose: 10, temperature_c: [20, 30], time_constant_s: 3600}\n"};
 }
 
-/// A packet from the network, met by a guard that has seen nothing and by one that has seen all the others.
-std::string guard_packet(std::string_view bytes) {
-  constexpr std::uint64_t kSocket = 4711;
-  static wire::Guard old(wire::kMaxTextSample);
-  const std::vector<unsigned char> packet(bytes.begin(), bytes.end());
-  wire::Guard fresh(wire::kMaxTextSample);
-  const bool passes = fresh.check(packet, kSocket).has_value();
-  static_cast<void>(old.check(packet, kSocket));
-  std::string said = passes ? "passes" : "dropped";
-  for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
-    const auto reason = static_cast<wire::Dropped>(i);
-    if (fresh.counts().of(reason) > 0) said += fmt::format(", {}", wire::name_of(reason));
-  }
-  return said;
-}
-
-std::vector<std::string> packets() {
-  const test::Prefix from = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
-  constexpr std::uint32_t kPublications = 0x000003c2, kWriter = 0x00000103, kReader = 0x00000104;
-  const auto of = [](const test::Packet& packet) { return std::string(packet.bytes().begin(), packet.bytes().end()); };
-  const auto participant =
-      test::ParameterList().add(0x0015, {2, 3, 0, 0}).guid(0x0050, from, 0x000001c1).text(0x0062, "somebody");
-  const auto writer = test::ParameterList()
-                          .guid(0x005a, from, kWriter)
-                          .text(0x0005, "Topic")
-                          .text(0x0007, "Type")
-                          .locator(0x0031, 7400);
-  const auto key = test::ParameterList().guid(0x0070, from, 0x000001c1).add(0x0071, {0, 0, 0, 3});
-  const test::PacketBytes sample = {0, 1, 0, 0, 1, 2, 3, 4};
-  return {of(test::Packet(from).data({0, wire::kAnnouncer, 1, {}, participant.payload()})),
-          of(test::Packet(from).data({0, kPublications, 1, {}, writer.payload()})),
-          of(test::Packet(from).data({0, wire::kAnnouncer, 2, key.bytes(), {}})),
-          of(test::Packet(from).to(from).data({0, kWriter, 1, {}, sample}).heartbeat(0, kWriter, 1, 1, 1)),
-          of(test::Packet(from).gap(0, kWriter, 2, 9).acknack(kReader, kWriter, 7, 256, 2)),
-          of(test::Packet(from)
-                 .fragments({0, kWriter, 9, 1, 2, 1024, 4096, test::PacketBytes(2048)})
-                 .nack_frag(kReader, kWriter, 9, 1, 1))};
-}
-
 template <typename PubSubType>
 Target type_target(const char* name) {
   return {name, read_sample<PubSubType>, mutate_cdr, samples<PubSubType>};
@@ -335,7 +296,7 @@ const std::vector<Target>& targets() {
       {"ask_read_models", ask<wire::ReadModels>, mutate_cdr, read_samples},
       {"ask_manage_models", ask<wire::ManageModels>, mutate_cdr, manage_samples},
       {"ask_release_batches", ask<wire::ReleaseBatches>, mutate_cdr, release_samples},
-      {"rtps_packet", guard_packet, mutate_bytes, packets},
+      {"rtps_packet", guard_packet, mutate_cdr, packets},
       {"findings_json", read_findings, mutate_json},
       {"truth_yaml", read_truth_file, mutate_yaml, truths},
       {"server_yaml", read_server_file, mutate_yaml, server_files},

@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "server/base/name_check.h"
 #include "server/base/plain_text.h"
 
 namespace trammel {

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+#include "server/base/result.h"
+
+namespace trammel {
+
+constexpr std::size_t kMostNameBytes = 256;  ///< of an id or a name, unless its place is smaller
+
+/// Refuses a name that is not plain or longer than `limit_bytes`. `what` says whose it is: `pose_id`. An empty name is
+/// fine here.
+[[nodiscard]] Status check_name(std::string_view name, const char* what, std::size_t limit_bytes = kMostNameBytes);
+
+}  // namespace trammel
