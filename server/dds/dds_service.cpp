@@ -112,7 +112,8 @@ class DdsService::Running {
 
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
-                                                              const PacketListener& packet_listener) {
+                                                              const PacketListener& packet_listener,
+                                                              const CallListener& call_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
@@ -134,6 +135,7 @@ class DdsService::Running {
 
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));
+    running->core_.listener = call_listener;
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
@@ -310,6 +312,8 @@ DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const
 
 DdsService::~DdsService() { stop(); }
 
+void DdsService::set_call_listener(CallListener listener) { call_listener_ = std::move(listener); }
+
 void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
   packet_listener_ = std::move(listener);
 }
@@ -320,7 +324,7 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);
