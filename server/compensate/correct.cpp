@@ -169,10 +169,12 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.q = start->q;
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
 
-  const ErrorPrediction before = predict(context, std::nullopt);
-  result.error_before =
-      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
+  const ErrorPrediction before = predict(context);
+  const Vector6 error = pose_difference(result.X_BT_wanted, before.X_BT_predicted);
+  result.error_before = rms(error.head<3>(), before.true_stddev_B);
   result.error_after = result.error_before;
+  result.turn_before = rms(error.tail<3>(), before.true_rotation_stddev_B);
+  result.turn_after = result.turn_before;
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
   if (start->status != InverseStatus::kOk) return not_reached(*start);
 
@@ -189,8 +191,9 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   context.q = found.joints.q;
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
-  const ErrorPrediction after = found.iterations > 0 ? predict(context, bias_weight) : before;
-  result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
+  // The standard deviation is that at the target: a correction moves it by far less than it is known.
+  result.error_after = rms(found.missing.head<3>(), before.true_stddev_B);
+  result.turn_after = rms(found.missing.tail<3>(), before.true_rotation_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
   return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));

@@ -24,7 +24,8 @@ struct Target {
 
 /// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
 /// Expected errors are root mean squares of the true distance from the target, without the instrument's noise; NaN
-/// where no joints bring the tool there.
+/// where no joints bring the tool there. Their standard deviations are those at the target, before and after: a
+/// correction moves the joints by milliradians, and a standard deviation changes over a length scale of the bias.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();
@@ -33,6 +34,8 @@ struct Correction {
   double error_before = kNothingToSay;     ///< m, to expect without correction
   double error_after = kNothingToSay;      ///< m, to expect with it; the same where the target is not corrected
   double stddev = kNothingToSay;           ///< m, of the true position: root mean square of the three axes
+  double turn_before = kNothingToSay;      ///< rad, error of the orientation to expect without correction
+  double turn_after = kNothingToSay;       ///< rad, with it
   double left = 0;                         ///< m, what the iteration left over; part of error_after
   int iterations = 0;
   std::string message;  ///< why not ok

@@ -49,12 +49,12 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
   context.tool = tool;
   context.payload = payload;
   context.served = true;
-  return predict(context, std::nullopt);
+  return predict(context);
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optional<double> bias_weight) const {
-  if (!inside_->bias) return predict(asked, nullptr, bias_weight);
-  return predict(asked, &learned({asked}).front(), bias_weight);
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked) const {
+  if (!inside_->bias) return predict(asked, nullptr);
+  return predict(asked, &learned({asked}).front());
 }
 
 std::vector<CompensatedModel::Learned> CompensatedModel::turn(std::vector<Learned> all) const {
@@ -94,7 +94,7 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
   if (inside_->bias) all = learned(poses);
   std::vector<ErrorPrediction> predictions;
   for (std::size_t i = 0; i < poses.size(); ++i)
-    predictions.push_back(predict(poses[i], all.empty() ? nullptr : &all[i], std::nullopt));
+    predictions.push_back(predict(poses[i], all.empty() ? nullptr : &all[i]));
   return predictions;
 }
 
@@ -232,11 +232,12 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
                        .unlearned = instrument,
                        .growth = 0,
                        .bias_size = inside_->rotation_bias_size_B};
-  prediction->rotation_stddev_B = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
+  const Vector3 variance = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal();
+  prediction->rotation_stddev_B = variance.cwiseSqrt();
+  prediction->true_rotation_stddev_B = (variance.array() - instrument).max(0.0).sqrt();
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned,
-                                          std::optional<double> bias_weight) const {
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned) const {
   const PhysicalModel& physics = parts().physics;
   CalibratedPose pose{completed(asked), physics.X_WB.inverse(), {}, 0};
   const PoseContext& context = pose.context;
@@ -250,13 +251,15 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 
   Matrix3 covariance;
+  const Eigen::MatrixXd turn_J_B = pose.X_BW.linear() * pose.J_W.bottomRows<3>();
+  prediction.true_rotation_stddev_B = identified(turn_J_B).diagonal().cwiseSqrt();
   if (learned == nullptr) {
     covariance = identified(pose.X_BW.linear() * pose.J_W.topRows<3>()) + unsaid;
     covariance.diagonal().array() += unlearned(pose);
   } else {
     const double share = learned->position.prior_share;
     prediction.in_domain &= share <= parts().prior_share_limit;
-    prediction.bias_weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, share) : 0.0);
+    prediction.bias_weight = trained_with ? domain.bias_weight(context.q, share) : 0.0;
     covariance = add_position_bias(pose, learned->position, &prediction) + unsaid;
     if (inside_->bias_has_parameters && prediction.bias_weight < 1) {
       // Near its poses the bias has learned this; part of it went into the weights, so its direction is not known.
