@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -54,6 +55,8 @@ class CompensatedModel {
                                         const std::string& payload) const;
   /// The same at many poses, faster for a bias with blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
+  /// As BiasModel::prepare(): so that the first targets do not wait.
+  void prepare(const std::function<bool()>& go_on) const;
   /// The physics with which the bias was learned.
   [[nodiscard]] BiasPhysics learned_physics() const;
   /// The learned bias, if any, and the features of a pose for it.

@@ -86,6 +86,10 @@ class IndependentOutputs final : public BiasOutputs {
     return error;
   }
 
+  void prepare(const std::function<bool()>& go_on) const override {
+    for (const LocalExperts& output : outputs_) output.prepare(go_on);
+  }
+
   BiasOutputsPtr with(const OutputData& more) const override {
     std::vector<LocalExperts> grown;
     for (Index d = 0; d < count(); ++d) {
@@ -117,10 +121,11 @@ class IndependentOutputs final : public BiasOutputs {
 }  // namespace
 
 BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
-                                     const std::vector<GpHyperparameters>& at) {
+                                     const std::vector<GpHyperparameters>& at, VarianceForm form) {
   std::vector<LocalExperts> outputs;
   for (std::size_t d = 0; d < at.size(); ++d) {
-    auto output = LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)), data.noise_shape, at[d]);
+    auto output =
+        LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)), data.noise_shape, at[d], form);
     if (!output) return nullptr;
     outputs.push_back(*std::move(output));
   }

@@ -21,15 +21,6 @@ constexpr Index kMostOfAnExpert =
     1200;  // neighbours: twice as many take twice the time and leave a tenth less (DECISIONS.md)
 constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
 
-// In units of the length scales for a kernel with one length scale for each joint; in rad for all others, whose idea of
-// neighbours is not a single distance.
-MatrixXd joints_as_seen_by(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
-  MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
-  if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
-  kernel.features(parameters, q, features.data(), features.rows());
-  return features.leftCols(q.cols());
-}
-
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());
   return halved(joints_as_seen_by(kernel, parameters, q), kMostOfAnExpert);
@@ -39,13 +30,14 @@ std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const Vecto
 
 std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const Kernel>& kernel, const MatrixXd& q,
                                                     const VectorXd& y, const VectorXd& noise_shape,
-                                                    const GpHyperparameters& hyperparameters) {
+                                                    const GpHyperparameters& hyperparameters, VarianceForm form) {
   LocalExperts local;
   local.size_ = q.rows();
   local.members_ = neighbourhoods(*kernel, hyperparameters.kernel, q);
   for (const std::vector<Index>& points : local.members_) {
     auto expert =
-        GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points), hyperparameters);
+        GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points), hyperparameters,
+                                   local.members_.size() == 1 ? form : VarianceForm::kCompressed);
     if (!expert) return std::nullopt;
     local.experts_.push_back(*std::move(expert));
   }
