@@ -6,6 +6,7 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -51,9 +52,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (caller->reader_ == nullptr || caller->writer_ == nullptr) {
       return failure(ErrorCode::kInternal, "cannot create the endpoints of {}", Operation::kName);
     }
-    const auto& guid = caller->writer_->guid();
-    const auto rest = std::copy_n(guid.guidPrefix.value, guid.guidPrefix.size, caller->guid_.begin());
-    std::copy_n(guid.entityId.value, guid.entityId.size, rest);
+    caller->guid_ = wire::octets_of(caller->writer_->guid());
     return caller;
   }
 
@@ -76,6 +75,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
                      wire::kReplyDepth);
     }
     id.sequence_number(++last_sequence_);
+    request.header().trace_id(fmt::format("{}-{}", partition_.substr(partition_.size() - kTraceBytes), last_sequence_));
     waiting_.try_emplace(last_sequence_);
     lock.unlock();
     auto answer = attempt_twice(request, route, deadline);
@@ -86,6 +86,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
  private:
+  static constexpr std::size_t kTraceBytes = 8;  // of the partition's name
+
   /// A call under way. An element of waiting_, guarded by the same mutex.
   struct Waiting {
     Condition changed;
@@ -108,6 +110,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       if (!server) continue;
       asked = server->id();
       request.header().server(asked);
+      request.header().deadline_ms(milliseconds_until(deadline));
       if (!writer_->write(&request)) {
         return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
       }
@@ -118,9 +121,16 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       });
       if (waiting.reply) return std::move(*waiting.reply);
     }
+    if (const auto other = watch_.other_contract(); asked.empty() && other) return tl::make_unexpected(*other);
     return asked.empty()
                ? failure(ErrorCode::kUnreachable, "{}: no server found in time", Operation::kName)
                : failure(ErrorCode::kUnreachable, "{}: server {} did not answer in time", Operation::kName, asked);
+  }
+
+  /// At least one: zero would be no deadline.
+  static std::uint32_t milliseconds_until(Clock::time_point deadline) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(left, 1, std::numeric_limits<std::uint32_t>::max()));
   }
 
   [[nodiscard]] bool reachable(const std::string& participant, bool and_back) const {

@@ -101,7 +101,7 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
 }
 
 Result<BiasModel> BiasModel::restore(const BiasState& state, bool rough) {
-  const VarianceForm form = rough ? VarianceForm::kRough : VarianceForm::kRegional;
+  const VarianceForm form = rough ? VarianceForm::kRough : VarianceForm::kRegionalOnly;
   return Fitted::from(state, form).map([](std::shared_ptr<Fitted> fitted) { return BiasModel(std::move(fitted)); });
 }
 

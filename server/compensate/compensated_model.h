@@ -30,8 +30,6 @@ struct ErrorPrediction {
   Matrix3 covariance_B = Matrix3::Zero();
   /// Of one measured orientation, rad, about the axes of B; only where the model learned orientations.
   std::optional<Vector3> rotation_stddev_B;
-  /// Of the true orientation, rad, about the axes of B; where no orientations were learned, what the parameters leave.
-  Vector3 true_rotation_stddev_B = Vector3::Zero();
   bool in_domain = false;  ///< false: the bias is not fully taken
   double bias_weight = 0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside
 };

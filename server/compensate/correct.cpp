@@ -87,8 +87,27 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
                      has_blocks ? "its kernel" : "the learned bias");
 }
 
+/// How the arm comes to the target.
+PoseContext way_to(const Target& target) {
+  PoseContext context;
+  context.direction = target.direction;
+  context.temperature = target.temperature;
+  context.time = target.time;
+  context.served = true;
+  return context;
+}
+
+/// Of one measurement where the true position has this stddev an axis.
+double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
+
 /// rms of an error of this mean whose true value spreads by this stddev.
 double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.squaredNorm() + stddev.squaredNorm()); }
+
+/// The same of a rotation vector, rad; `stddev` is of one measurement by an instrument of this sigma.
+double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, double sigma) {
+  if (!stddev) return mean.norm();
+  return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
+}
 
 }  // namespace
 
@@ -143,10 +162,9 @@ std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, cons
 
 Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
                                      const CorrectOptions& options) const {
-  PoseContext context;
+  PoseContext context = way_to(target);
   context.tool = tool;
   context.payload = payload;
-  context.served = true;
   Correction result;
   const auto end = [&](CorrectionStatus status, std::string message) {
     result.status = status;
@@ -170,12 +188,15 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
 
   const ErrorPrediction before = predict(context);
-  const Vector6 error = pose_difference(result.X_BT_wanted, before.X_BT_predicted);
-  result.error_before = rms(error.head<3>(), before.true_stddev_B);
+  result.error_before =
+      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
   result.error_after = result.error_before;
-  result.turn_before = rms(error.tail<3>(), before.true_rotation_stddev_B);
-  result.turn_after = result.turn_before;
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
+  const double sigma_rotation = cell().tracker.sigma_rotation;
+  result.turn_before = turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
+                                before.rotation_stddev_B, sigma_rotation);
+  result.turn_after = result.turn_before;
   if (start->status != InverseStatus::kOk) return not_reached(*start);
 
   // The weight is that at the target: a correction moves too little to change it.
@@ -188,13 +209,13 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return end(CorrectionStatus::kNotConverged,
                fmt::format("{:.2e} mm left after {} iterations", to_mm(result.left), result.iterations));
   }
-  context.q = found.joints.q;
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
   // The standard deviation is that at the target: a correction moves it by far less than it is known.
   result.error_after = rms(found.missing.head<3>(), before.true_stddev_B);
-  result.turn_after = rms(found.missing.tail<3>(), before.true_rotation_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
+  result.turn_after = turn_rms(found.missing.tail<3>(), before.rotation_stddev_B, sigma_rotation);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
   return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
 }

@@ -232,9 +232,7 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
                        .unlearned = instrument,
                        .growth = 0,
                        .bias_size = inside_->rotation_bias_size_B};
-  const Vector3 variance = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal();
-  prediction->rotation_stddev_B = variance.cwiseSqrt();
-  prediction->true_rotation_stddev_B = (variance.array() - instrument).max(0.0).sqrt();
+  prediction->rotation_stddev_B = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
 }
 
 ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned) const {
@@ -251,8 +249,6 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 
   Matrix3 covariance;
-  const Eigen::MatrixXd turn_J_B = pose.X_BW.linear() * pose.J_W.bottomRows<3>();
-  prediction.true_rotation_stddev_B = identified(turn_J_B).diagonal().cwiseSqrt();
   if (learned == nullptr) {
     covariance = identified(pose.X_BW.linear() * pose.J_W.topRows<3>()) + unsaid;
     covariance.diagonal().array() += unlearned(pose);

@@ -1,3 +1,6 @@
+#include <utility>
+#include <vector>
+
 #include "server/base/units.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -17,6 +20,12 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
     if (!X_BT) return tl::make_unexpected(X_BT.error());
     target.X_BT = *X_BT;
   }
+  PoseContext comes;
+  if (const Status known = read_approach(wanted.approach(), chain, where, comes); !known)
+    return tl::make_unexpected(known.error());
+  target.direction = std::move(comes.direction);
+  target.temperature = comes.temperature;
+  target.time = comes.time;
   if (wanted.kind() == wire::TARGET_POSE_ON_BRANCH) {
     if (wanted.conf() < 0 || wanted.conf() > kMaxConf) {
       return refused("branch {} is not one of 0 to {}", wanted.conf(), kMaxConf)
@@ -41,23 +50,45 @@ wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) 
   item.error_before_mm(to_mm(correction.error_before));
   item.error_after_mm(to_mm(correction.error_after));
   item.sigma_mm(to_mm(correction.stddev));
+  item.sigma_measured_mm(to_mm(correction.measured_stddev));
+  item.turn_before_rad(correction.turn_before);
+  item.turn_after_rad(correction.turn_after);
   item.iterations(correction.iterations);
-  item.message(correction.message.substr(0, kMaxMessage));
+  item.message(cut(correction.message, kMaxMessage));
   return item;
 }
 
+/// Its targets are known, its model is taken.
+class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetReply> {
+ public:
+  PortionedCorrections(Subject subject, std::vector<Target> targets)
+      : subject_(std::move(subject)), targets_(std::move(targets)) {
+    reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
+    reply_.corrections().resize(targets_.size());
+  }
+  std::size_t items() const override { return targets_.size(); }
+  void compute(std::size_t first, std::size_t count) override {
+    const CompensatedModel& model = subject_.served->model;
+    for (std::size_t i = first; i < first + count; ++i) {
+      reply_.corrections()[i] =
+          to_wire(model.correct(targets_[i], subject_.tool, subject_.payload), model.cell().robot);
+    }
+  }
+  wire::CorrectTargetReply take() override { return std::move(reply_); }
+
+ private:
+  const Subject subject_;
+  const std::vector<Target> targets_;
+  wire::CorrectTargetReply reply_;
+};
+
 }  // namespace
 
-Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {
+Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& request) {
   const auto& wanted = request.targets();
-  if (wanted.size() > wire::MAX_TARGETS) {
-    return failure(ErrorCode::kTooLarge, "{} targets in one request, limit {}", wanted.size(), wire::MAX_TARGETS)
-        .beyond(wanted.size(), wire::MAX_TARGETS);
-  }
-  const auto subject = subjects_.find(request.about());
+  auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());
-  const CompensatedModel& model = subject->served->model;
-  const Chain& chain = model.cell().robot;
+  const Chain& chain = subject->served->model.cell().robot;
 
   std::vector<Target> targets;
   targets.reserve(wanted.size());
@@ -66,14 +97,11 @@ Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetReque
     if (!target) return tl::make_unexpected(target.error());
     targets.push_back(*target);
   }
+  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets));
+}
 
-  wire::CorrectTargetReply reply;
-  reply.model(trammel::to_wire(*subject->served, subject->in_force, unix_now_s()));
-  reply.corrections().reserve(targets.size());
-  for (const Target& target : targets) {
-    reply.corrections().push_back(to_wire(model.correct(target, subject->tool, subject->payload), chain));
-  }
-  return reply;
+Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {
+  return computed(begin(request));
 }
 
 bool happens_once(const wire::CorrectTargetRequest&) { return false; }

@@ -14,8 +14,13 @@ struct DdsOptions {
   std::vector<std::uint16_t> peer_ports;  ///< UDP ports of the replicas on `address`
   std::string server_id = "trammel";      ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
-  int compute_workers = 2;  ///< threads for PredictError, and as many for CorrectTarget; other operations have one each
-  int max_clients = 128;    ///< reply channels at a time; for one more, the longest silent client loses its own
+  int compute_workers = 2;     ///< threads for PredictError, and as many for CorrectTarget
+  int max_clients = 128;       ///< reply channels at a time; when more clients come, those take turns that do nothing
+  int client_requests = 64;    ///< requests of one client that may wait: predictions, corrections, others
+  int client_mb = 64;          ///< memory that they may take, all together
+  int queued_requests = 4096;  ///< requests of all clients that may wait, likewise
+  int queued_mb = 256;         ///< memory that they may take, all together
+  double cell_share = 0.5;     ///< of these two, for the requests of one cell
 };
 
 }  // namespace trammel

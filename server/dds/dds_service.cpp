@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <stop_token>
@@ -16,6 +17,8 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/old_contract.h"
+#include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
@@ -51,6 +54,40 @@ Status check_names(const DdsOptions& options, const Trainer& trainer) {
   return {};
 }
 
+/// Added to the priority value of workers that do not compute.
+constexpr int kBehindComputing = 5;
+
+RoomLimits room_limits(const DdsOptions& options) {
+  const auto bytes = [](int mb) { return static_cast<std::size_t>(mb) << 20; };
+  return {bytes(options.queued_mb), bytes(options.client_mb), options.cell_share};
+}
+
+TurnLimits compute_limits(const DdsOptions& options) {
+  TurnLimits limits;
+  limits.workers = static_cast<std::size_t>(options.compute_workers);
+  limits.client_requests = static_cast<std::size_t>(options.client_requests);
+  limits.requests = static_cast<std::size_t>(options.queued_requests);
+  limits.cell_share = options.cell_share;
+  return limits;
+}
+
+/// Such requests cannot be interrupted: no client may take all workers, however many it sends.
+TurnLimits limits_of_reads(const DdsOptions& options) {
+  TurnLimits limits = compute_limits(options);
+  limits.workers = 4;
+  limits.client_workers = 2;
+  return limits;
+}
+
+/// The changes of one cell come one after the other.
+TurnLimits limits_of_changes(const DdsOptions& options) {
+  TurnLimits limits = compute_limits(options);
+  limits.workers = 8;
+  limits.client_workers = 4;
+  limits.cell_workers = 1;
+  return limits;
+}
+
 /// Threads that start while this lives get its name. The library does not name its threads, and `top` and debuggers
 /// show names.
 class ThreadName {
@@ -71,16 +108,20 @@ class ThreadName {
 
 class DdsService::Running {
  public:
+  using PacketListener = std::function<void(const std::string& dropped)>;
+
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
-                                                              const ModelRegistry& registry) {
+                                                              const ModelRegistry& registry,
+                                                              const PacketListener& packet_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
     auto events = std::make_unique<ServiceEvents>();
     const auto heard = std::make_shared<wire::HeardOfItself>();
+    const auto dropped = std::make_shared<wire::DropCounts>();
     auto participant = wire::make_participant({"trammel server " + options.server_id, options.domain, options.address,
-                                               options.port, options.peer_ports, heard},
+                                               options.port, options.peer_ports, heard, dropped},
                                               events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
@@ -94,6 +135,11 @@ class DdsService::Running {
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
+    for (Lane* lane : running->lanes()) lane->start();
+    running->replies_thread_ =
+        std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
+    running->packets_.emplace(dropped);
+    running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
     return running;
@@ -103,6 +149,10 @@ class DdsService::Running {
     watchdog_.reset();
     status_thread_ = {};
     publish_status(wire::SERVICE_STOPPING);
+    for (const auto& endpoint : endpoints_) endpoint->close();
+    old_contract_.reset();
+    for (Lane* lane : lanes()) lane->stop();
+    replies_thread_ = {};
     endpoints_.clear();
   }
 
@@ -132,6 +182,7 @@ class DdsService::Running {
           const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
+        store_(store),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
@@ -139,37 +190,54 @@ class DdsService::Running {
         participant_(std::move(participant)),
         topics_(topics),
         echo_(std::move(echo)),
-        channels_(*participant_, static_cast<std::size_t>(options.max_clients)),
-        core_{options.server_id, *participant_, subscriber, handlers_, channels_} {
+        channels_(
+            *participant_, static_cast<std::size_t>(options.max_clients),
+            [events = events_.get()] { events->status_changed(); }, replying_),
+        room_(room_limits(options)),
+        predictions_(compute_limits(options), room_),
+        corrections_(compute_limits(options), room_),
+        reads_(limits_of_reads(options), room_, kBehindComputing),
+        changes_(limits_of_changes(options), room_, kBehindComputing),
+        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {
     for (const auto& [name, cell] : trainer.cells()) publishing_[name];
   }
 
   Status open_endpoints() {
-    const auto open = [this]<typename Operation>(Operation, int workers) -> Status {
-      auto endpoint = RequestEndpoint<Operation>::open(core_, workers);
+    const auto open = [this]<typename Operation>(Operation, Lanes lanes) -> Status {
+      auto endpoint = RequestEndpoint<Operation>::open(core_, lanes);
       if (!endpoint) return tl::make_unexpected(endpoint.error());
       endpoints_.push_back(std::move(*endpoint));
       return {};
     };
-    Status opened = open(wire::PredictError(), options_.compute_workers);
-    if (opened) opened = open(wire::CorrectTarget(), options_.compute_workers);
-    if (opened) opened = open(wire::SubmitMeasurements(), 1);
-    if (opened) opened = open(wire::Train(), 1);
-    if (opened) opened = open(wire::Diagnose(), 1);
-    if (opened) opened = open(wire::ManageModels(), 1);
-    return opened;
+    const Lanes others{changes_, reads_};
+    Status opened = open(wire::PredictError(), {predictions_, predictions_});
+    if (opened) opened = open(wire::CorrectTarget(), {corrections_, corrections_});
+    if (opened) opened = open(wire::SubmitMeasurements(), others);
+    if (opened) opened = open(wire::Train(), others);
+    if (opened) opened = open(wire::Diagnose(), others);
+    if (opened) opened = open(wire::CheckHealth(), others);
+    if (opened) opened = open(wire::ReadModels(), others);
+    if (opened) opened = open(wire::ManageModels(), others);
+    if (opened) opened = open(wire::ReleaseBatches(), others);
+    if (!opened) return opened;
+    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_);
+    if (!old) return tl::make_unexpected(old.error());
+    old_contract_ = std::move(*old);
+    return {};
   }
+
+  [[nodiscard]] std::array<Lane*, 4> lanes() { return {&predictions_, &corrections_, &reads_, &changes_}; }
 
   void tell_status(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "status");
+    bool clients_wait = false;
     while (!stop.stop_requested()) {
       publish_status(wire::SERVICE_SERVING);
       ++status_steps_;
-      while (channels_.sweep()) ++status_steps_;
-      for (const ReplyReader& reader : events_->wait(stop, wire::kStatusPeriod)) {
-        channels_.expect(reader.partition, reader.topic);
-        ++status_steps_;
-      }
+      if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
+      channels_.heard(events_->wait(stop, clients_wait ? wire::kAnnouncement : wire::kStatusPeriod));
+      ++status_steps_;
+      clients_wait = channels_.tend();
     }
   }
 
@@ -179,11 +247,13 @@ class DdsService::Running {
     std::vector<MovingPart> parts = {{"discovery", [heard]() -> Mark { return heard->announcements.load(); }},
                                      {"receiving", [this]() -> Mark { return echo_->heard(); }},
                                      {"taking requests", [this] { return core_.taking.oldest(); }},
-                                     {"replying", [this] { return core_.replying.oldest(); }},
+                                     {"replying", [this] { return replying_.oldest(); }},
+                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
                                      {"status", [this]() -> Mark { return status_steps_.load(); }}};
-    for (const auto& endpoint : endpoints_) {
-      parts.push_back({endpoint->name(), [at = endpoint.get()] { return at->unseen(); }});
-    }
+    parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
+    parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
+    parts.push_back({"reading requests", [this] { return reads_.unseen(); }});
+    parts.push_back({"changing requests", [this] { return changes_.unseen(); }});
     return parts;
   }
 
@@ -194,9 +264,15 @@ class DdsService::Running {
     status.program_version(options_.program_version);
     status.state(state);
     for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
-    status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
-    status.requests(core_.requests);
-    status.refused(core_.refused);
+    status.models_in_force(static_cast<std::int32_t>(registry_.cells_served()));
+    status.requests(core_.counts.requests + core_.counts.shed);
+    status.refused(core_.counts.refused + core_.counts.shed);
+    status.shed(core_.counts.shed);
+    status.unheard(channels_.unheard());
+    status.misdirected(core_.counts.misdirected);
+    status.unreadable(*core_.unreadable);
+    status.lost(core_.counts.lost);
+    if (const auto why = store_.state().why_not_written) status.trouble(cut(sentence(*why), wire::MAX_SENTENCE));
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -205,6 +281,7 @@ class DdsService::Running {
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
+  const Store& store_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;
@@ -212,11 +289,18 @@ class DdsService::Running {
   wire::ParticipantPtr participant_;
   StateTopics topics_;
   std::unique_ptr<StatusEcho> echo_;
+  WorkUnderWay replying_;
   ReplyChannels channels_;
+  Room room_;
+  Lane predictions_, corrections_, reads_, changes_;
   ServiceCore core_;
   std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
+  std::optional<PacketReport> packets_;  // of the status thread
+  PacketListener packet_listener_;
+  std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
 };
@@ -226,13 +310,17 @@ DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const
 
 DdsService::~DdsService() { stop(); }
 
+void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
+  packet_listener_ = std::move(listener);
+}
+
 Status DdsService::start() {
   {
     const MutexLock lock(mutex_);
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "idl/valid.h"
 #include "server/base/mutex.h"
+#include "server/dds/portioned_answer.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -47,25 +50,46 @@ class Handlers {
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
+  using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
+  using Corrections = std::unique_ptr<PortionedAnswer<wire::CorrectTargetReply>>;
+  /// Checks the whole request and takes the model.
+  [[nodiscard]] Result<Predictions> begin(const wire::PredictErrorRequest& request);
+  [[nodiscard]] Result<Corrections> begin(const wire::CorrectTargetRequest& request);
+  /// All of begin(), computed here and now.
   [[nodiscard]] Result<wire::PredictErrorReply> answer(const wire::PredictErrorRequest& request);
   [[nodiscard]] Result<wire::CorrectTargetReply> answer(const wire::CorrectTargetRequest& request);
   /// Accepted means stored: see Trainer::submit.
   [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
   [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
-  /// Queues a diagnosis, or returns the findings of one: see Trainer::diagnose.
+  /// Queues a diagnosis: see Trainer::diagnose.
   [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
+  [[nodiscard]] Result<wire::CheckHealthReply> answer(const wire::CheckHealthRequest& request);
+  [[nodiscard]] Result<wire::ReadModelsReply> answer(const wire::ReadModelsRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
 
  private:
-  [[nodiscard]] Result<wire::ManageModelsReply> answer_of_cell(const std::string& cell,
-                                                               const wire::ManageModelsRequest& request);
-  [[nodiscard]] Result<wire::ManageModelsReply> job_of(std::int64_t job) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> models_of(const std::string& cell) const;
+  /// The job.
+  [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
+  /// The version activated, gone back to or imported; 0: none.
+  [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
+  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job);
+  /// The job, or 0.
+  [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
+  /// Refuses (kConflict) where another version is in force.
+  [[nodiscard]] Status check_expected(const std::string& cell, const std::optional<int>& expected) const;
+  /// The same, unless the change has been made under this id.
+  [[nodiscard]] Status check_expected_once(const std::string& cell, const std::optional<int>& expected,
+                                           const ChangeId& id) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
+                                                   const wire::ReadModelsRequest& request) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
-  [[nodiscard]] Result<wire::ManageModelsReply> exported(const std::string& cell, int version) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> release_and_train(const std::string& cell, const std::string& text);
+  [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> quarantine_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
 
   Trainer& trainer_;
   Store& store_;
@@ -73,12 +97,23 @@ class Handlers {
   SubjectFinder subjects_;
 };
 
+/// Computes all of an answer in one thread.
+template <typename Reply>
+[[nodiscard]] Result<Reply> computed(Result<std::unique_ptr<PortionedAnswer<Reply>>> begun) {
+  if (!begun) return tl::make_unexpected(begun.error());
+  (*begun)->compute(0, (*begun)->items());
+  return (*begun)->take();
+}
+
 /// Whether the request changes something. A repeat of such a request must not be carried out again.
 [[nodiscard]] bool happens_once(const wire::PredictErrorRequest& request);
 [[nodiscard]] bool happens_once(const wire::CorrectTargetRequest& request);
 [[nodiscard]] bool happens_once(const wire::SubmitMeasurementsRequest& request);
 [[nodiscard]] bool happens_once(const wire::TrainRequest& request);
 [[nodiscard]] bool happens_once(const wire::DiagnoseRequest& request);
+[[nodiscard]] bool happens_once(const wire::CheckHealthRequest& request);
+[[nodiscard]] bool happens_once(const wire::ReadModelsRequest& request);
 [[nodiscard]] bool happens_once(const wire::ManageModelsRequest& request);
+[[nodiscard]] bool happens_once(const wire::ReleaseBatchesRequest& request);
 
 }  // namespace trammel

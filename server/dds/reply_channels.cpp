@@ -1,149 +1,224 @@
 #include "server/dds/reply_channels.h"
 
+#include <pthread.h>
+
 #include <algorithm>
+#include <list>
 #include <utility>
-#include <vector>
 
 namespace trammel {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How long to wait for a client's reader: DDS matches it within a few announcements, or never.
-constexpr auto kPatience = 5 * wire::kAnnouncement;
-constexpr std::size_t kSweptAtOnce = 16;  // clients per sweep; each has up to six endpoints to delete
+/// How long a reply is kept for a reader that is not matched: DDS matches it within a few announcements, or never.
+constexpr auto kPatience = wire::kLease;
+/// A channel that was opened or used so lately is not given to another client.
+constexpr auto kGrace = 5 * wire::kAnnouncement;
+constexpr std::chrono::milliseconds kLook{500};  // for what is kept too long
+constexpr std::size_t kWrittenAtOnce = 64;
+
+OutboxLimits limits_of_kept() {
+  OutboxLimits limits;
+  limits.client_replies = wire::kReplyDepth;
+  return limits;
+}
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher)
-    : publisher_(publisher), patient_until_(Clock::now() + kPatience) {}
-
-std::unique_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher, wire::dds::Topic* topic) {
-  std::unique_ptr<ReplyWriter> result(new ReplyWriter(publisher));
-  result->writer_ = publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
-                                                wire::dds::StatusMask::publication_matched());
-  return result->writer_ == nullptr ? nullptr : std::move(result);
-}
-
-ReplyWriter::~ReplyWriter() {
-  if (writer_ != nullptr) publisher_.delete_datawriter(writer_);
-}
-
-bool ReplyWriter::send(void* reply, const std::stop_token& stop) {
-  {
-    MutexLock lock(mutex_);
-    const Clock::time_point until = patient_until_;
-    matched_.wait_until(lock, stop, until, [this]() TRAMMEL_REQUIRES(mutex_) { return readers_ > 0; });
-    if (readers_ == 0) return false;
-  }
-  return writer_->write(reply);
-}
-
-bool ReplyWriter::abandoned() const {
-  const MutexLock lock(mutex_);
-  return readers_ == 0 && Clock::now() > patient_until_;
-}
-
-void ReplyWriter::on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) {
-  {
-    const MutexLock lock(mutex_);
-    readers_ = status.current_count;
-    if (readers_ == 0) patient_until_ = Clock::now() + kPatience;
-  }
-  matched_.notify_all();
-}
-
-class ReplyChannels::Client {
- public:
-  explicit Client(wire::dds::DomainParticipant& participant, const std::string& partition)
-      : participant_(participant), publisher_(participant.create_publisher(wire::publisher_qos(partition))) {}
-  ~Client() {
-    writers_.clear();
-    if (publisher_ != nullptr) participant_.delete_publisher(publisher_);
-  }
-  Client(const Client&) = delete;
-  Client& operator=(const Client&) = delete;
-
-  /// Null when DDS refuses.
-  [[nodiscard]] ReplyWriter* writer(wire::dds::Topic* topic) {
-    const MutexLock lock(mutex_);
-    auto& writer = writers_[topic];
-    if (!writer && publisher_ != nullptr) writer = ReplyWriter::make(*publisher_, topic);
-    return writer.get();
-  }
-
-  [[nodiscard]] bool left() const {
-    const MutexLock lock(mutex_);
-    return std::all_of(writers_.begin(), writers_.end(),
-                       [](const auto& entry) { return !entry.second || entry.second->abandoned(); });
-  }
-
- private:
-  wire::dds::DomainParticipant& participant_;
-  wire::dds::Publisher* publisher_;
-  mutable Mutex mutex_;
-  std::map<wire::dds::Topic*, std::unique_ptr<ReplyWriter>> writers_ TRAMMEL_GUARDED_BY(mutex_);
-};
+ReplyChannels::ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity,
+                             std::function<void()> wants_tending, WorkUnderWay& writing)
+    : participant_(participant),
+      wants_tending_(std::move(wants_tending)),
+      writing_(writing),
+      book_(capacity, kGrace),
+      posted_(OutboxLimits{}),
+      kept_(limits_of_kept()) {}
 
 void ReplyChannels::add_topic(wire::dds::Topic* topic) {
   const MutexLock lock(mutex_);
   topics_[topic->get_name()] = topic;
 }
 
-void ReplyChannels::expect(const std::string& partition, const std::string& topic) {
-  wire::dds::Topic* known = nullptr;
+void ReplyChannels::heard(const std::vector<ReaderEvent>& events) {
+  const MutexLock lock(mutex_);
+  for (const ReaderEvent& event : events) {
+    if (event.kind == ReaderEvent::Kind::kLeft) book_.left(event.reader.participant);
+    if (!topics_.contains(event.reader.topic)) continue;
+    if (event.kind == ReaderEvent::Kind::kFound) book_.found(event.reader, Clock::now());
+    if (event.kind == ReaderEvent::Kind::kLost) book_.lost(event.reader);
+  }
+}
+
+bool ReplyChannels::tend() {
+  std::vector<ChannelBook::Change> changes;
+  std::vector<std::shared_ptr<ReplyChannel>> unused;  // parked without the lock
+  bool somebody_waits = false;
   {
     const MutexLock lock(mutex_);
-    const auto found = topics_.find(topic);
-    if (found == topics_.end()) return;
-    known = found->second;
+    changes = book_.changes(Clock::now());
+    somebody_waits = book_.somebody_waits() || !closed_.empty();
+    const auto used = std::partition(closed_.begin(), closed_.end(), [](const auto& one) { return one->is_in_use(); });
+    unused.assign(std::make_move_iterator(used), std::make_move_iterator(closed_.end()));
+    closed_.erase(used, closed_.end());
   }
-  if (const auto to = client(partition, false)) static_cast<void>(to->writer(known));
+  for (auto& channel : unused) parked_.park(std::move(channel), Clock::now());
+  for (const ChannelBook::Change& each : changes) change(each);
+  return parked_.tend(Clock::now()) || somebody_waits;
 }
 
-bool ReplyChannels::send(const std::string& partition, wire::dds::Topic* topic, void* reply,
-                         const std::stop_token& stop) {
-  const std::shared_ptr<Client> to = client(partition, true);
-  ReplyWriter* writer = to->writer(topic);
-  return writer != nullptr && writer->send(reply, stop);
-}
-
-std::shared_ptr<ReplyChannels::Client> ReplyChannels::client(const std::string& partition, bool crowd_out) {
-  std::shared_ptr<Client> crowded_out;  // destroyed without the lock
-  const MutexLock lock(mutex_);
-  if (!crowd_out && clients_.size() >= capacity_ && !clients_.contains(partition)) return nullptr;
-  Known& known = clients_[partition];
-  if (!known.client) known.client = std::make_shared<Client>(participant_, partition);
-  known.last_used = Clock::now();
-  const std::shared_ptr<Client> result = known.client;
-  if (clients_.size() > capacity_) {
-    const auto oldest = std::min_element(clients_.begin(), clients_.end(), [](const auto& a, const auto& b) {
-      return a.second.last_used < b.second.last_used;
-    });
-    crowded_out = std::move(oldest->second.client);
-    clients_.erase(oldest);
+void ReplyChannels::change(const ChannelBook::Change& change) {
+  if (change.kind == ChannelBook::Change::Kind::kClose) {
+    close(change.partition);
+  } else {
+    open(change);
   }
-  return result;
 }
 
-bool ReplyChannels::sweep() {
-  std::vector<std::shared_ptr<Client>> gone;  // destroyed without the lock
-  const MutexLock lock(mutex_);
-  for (auto entry = clients_.begin(); entry != clients_.end() && gone.size() < kSweptAtOnce;) {
-    const bool idle = Clock::now() - entry->second.last_used > kPatience;
-    if (idle && entry->second.client->left()) {
-      gone.push_back(std::move(entry->second.client));
-      entry = clients_.erase(entry);
+void ReplyChannels::open(const ChannelBook::Change& change) {
+  std::shared_ptr<ReplyChannel> channel;
+  wire::dds::Topic* of = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    of = topics_.at(change.topic);
+    if (const auto found = channels_.find(change.partition); found != channels_.end()) channel = found->second;
+  }
+  if (!channel) channel = parked_.take(change.participant, change.partition);
+  if (!channel) channel = std::make_shared<ReplyChannel>(participant_, change.partition);
+  if (channel->publisher() == nullptr) return;
+  Writer writer = channel->writer(change.topic);
+  if (!writer) writer = ReplyWriter::make(*channel->publisher(), of, [this] { matched(); });
+  {
+    const MutexLock lock(mutex_);
+    if (writer) channel->add(change.topic, std::move(writer));
+    channels_[change.partition] = std::move(channel);
+  }
+  matched();  // perhaps before the writer was known here
+}
+
+void ReplyChannels::close(const std::string& partition) {
+  std::shared_ptr<ReplyChannel> unused;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = channels_.find(partition);
+    if (found == channels_.end()) return;
+    if (found->second->is_in_use()) {
+      closed_.push_back(std::move(found->second));
     } else {
-      ++entry;
+      unused = std::move(found->second);
+    }
+    channels_.erase(found);
+  }
+  if (unused) parked_.park(std::move(unused), Clock::now());
+}
+
+void ReplyChannels::matched() {
+  {
+    const MutexLock lock(mutex_);
+    has_matched_ = true;
+  }
+  due_.notify_all();
+}
+
+std::unique_ptr<ReplyChannels::Expectation> ReplyChannels::expect(const std::string& participant,
+                                                                  const std::string& partition) {
+  bool has_channel = false;
+  {
+    const MutexLock lock(mutex_);
+    if (!book_.may_listen(participant, partition)) {
+      ++unheard_;
+      return nullptr;
+    }
+    book_.asked(partition, Clock::now());
+    has_channel = channels_.contains(partition);
+  }
+  if (!has_channel) wants_tending_();
+  return std::make_unique<Expectation>(*this, partition);
+}
+
+void ReplyChannels::answered(const std::string& partition) {
+  const MutexLock lock(mutex_);
+  book_.answered(partition, Clock::now());
+}
+
+ReplyChannels::Writer ReplyChannels::writer(const std::string& participant, const std::string& partition,
+                                            const std::string& topic) const {
+  const auto channel = channels_.find(partition);
+  if (channel == channels_.end() || !book_.listens(participant, partition)) return nullptr;
+  Writer found = channel->second->writer(topic);
+  return found && found->has_reader() ? found : nullptr;
+}
+
+void ReplyChannels::put(Outbox& outbox, const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
+  const Parcel parcel{to.participant, to.partition, to.topic, std::move(reply), bytes, Clock::now() + kPatience};
+  if (!book_.may_listen(to.participant, to.partition) || !outbox.put(parcel)) ++unheard_;
+}
+
+void ReplyChannels::send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
+  Writer at_hand;
+  {
+    const MutexLock lock(mutex_);
+    at_hand = writer(to.participant, to.partition, to.topic);
+    if (!at_hand) put(kept_, to, std::move(reply), bytes);
+  }
+  if (at_hand) write(at_hand, reply.get());
+}
+
+void ReplyChannels::post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
+  {
+    const MutexLock lock(mutex_);
+    put(writer(to.participant, to.partition, to.topic) ? posted_ : kept_, to, std::move(reply), bytes);
+  }
+  due_.notify_all();
+}
+
+void ReplyChannels::write(const Writer& writer, void* reply) {
+  const WorkUnderWay::Piece piece = writing_.begin();
+  if (!writer->write(reply)) ++unheard_;
+}
+
+void ReplyChannels::add_ready(std::list<Parcel> parcels, std::vector<Ready>* ready) {
+  for (Parcel& parcel : parcels) {
+    Writer to = writer(parcel.client, parcel.partition, parcel.topic);
+    if (to) {
+      ready->push_back({std::move(to), std::move(parcel.reply)});
+    } else if (!kept_.put(std::move(parcel))) {
+      ++unheard_;
     }
   }
-  return gone.size() == kSweptAtOnce;
+}
+
+std::vector<ReplyChannels::Ready> ReplyChannels::wait_for_ready(const std::stop_token& stop) {
+  MutexLock lock(mutex_);
+  due_.wait_for(lock, stop, kLook, [this]() TRAMMEL_REQUIRES(mutex_) { return has_matched_ || !posted_.empty(); });
+  unheard_ += kept_.expire(Clock::now());
+  std::vector<Ready> ready;
+  if (has_matched_) {
+    add_ready(
+        kept_.take(kWrittenAtOnce, [this](const Parcel& one) TRAMMEL_REQUIRES(
+                                       mutex_) { return writer(one.client, one.partition, one.topic) != nullptr; }),
+        &ready);
+    has_matched_ = ready.size() == kWrittenAtOnce;
+  }
+  add_ready(posted_.take(kWrittenAtOnce, [](const Parcel&) { return true; }), &ready);
+  return ready;
+}
+
+void ReplyChannels::deliver(const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "replies");
+  bool is_last = false;
+  while (!is_last) {
+    is_last = stop.stop_requested();
+    std::vector<Ready> ready = wait_for_ready(stop);
+    is_last = is_last && ready.empty();
+    for (const Ready& each : ready) write(each.writer, each.reply.get());
+    ++looks_;
+  }
 }
 
 std::size_t ReplyChannels::clients() const {
   const MutexLock lock(mutex_);
-  return clients_.size();
+  return book_.open();
 }
 
 }  // namespace trammel

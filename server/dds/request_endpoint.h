@@ -1,28 +1,18 @@
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
+#include <chrono>
 #include <cstdint>
-#include <exception>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
-#include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "idl/transport.h"
-#include "server/base/mutex.h"
-#include "server/dds/codec.h"
-#include "server/dds/handlers.h"
 #include "server/dds/reply_channels.h"
-#include "server/dds/reply_memory.h"
+#include "server/dds/request_call.h"
+#include "server/dds/schedule/lane.h"
 #include "server/dds/stillness.h"
 
 namespace trammel {
@@ -32,180 +22,127 @@ struct ServiceCore {
   std::string server_id;
   wire::dds::DomainParticipant& participant;
   wire::dds::Subscriber& subscriber;
+  const Trainer& trainer;  ///< knows which cells are served
   Handlers& handlers;
   ReplyChannels& channels;
-  std::atomic<std::uint64_t> requests{0};  ///< answered
-  std::atomic<std::uint64_t> refused{0};   ///< answered with another code than RESULT_OK
-  std::atomic<std::uint64_t> unheard{0};   ///< answered after the client had left
-  WorkUnderWay taking{};                   ///< takes of requests from DDS readers
-  WorkUnderWay replying{};
+  CallCounts counts{};
+  /// Dropped: not even the header could be read.
+  std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
+  WorkUnderWay taking{};  ///< takes of requests from DDS readers
+};
+
+/// Where the requests of an operation queue: those that change something, and those that only read.
+struct Lanes {
+  Lane& changes;
+  Lane& reads;
 };
 
 class RequestEndpointBase {
  public:
   virtual ~RequestEndpointBase() = default;
-  /// Name of the operation.
-  [[nodiscard]] virtual const char* name() const = 0;
-  /// For the watchdog: a number while requests are waiting and an idle worker has not looked for them; else empty. The
-  /// number is how many requests had come when a worker last looked. Takes no lock.
-  [[nodiscard]] virtual std::optional<std::uint64_t> unseen() const = 0;
+  /// No more requests come in. The lanes must be stopped between this and the destruction.
+  virtual void close() = 0;
 };
 
-/// The reply to a request, with its header: from the handler, or from `memory` for a repeat. Another contract version
-/// gets an error.
-template <typename Request, typename Reply>
-[[nodiscard]] Reply reply_to(const Request& request, Handlers& handlers, ReplyMemory<Reply>& memory,
-                             const std::string& server_id) {
-  const wire::RequestHeader& asked = request.header();
-  const std::string id = request_id_text(asked.request_id());
-  const bool once = happens_once(request);
-  if (once) {
-    if (auto known = memory.find(id)) return std::move(*known);
-  }
-
-  Reply reply;
-  const auto refuse = [&](wire::ResultCode code, const std::string& message) {
-    reply = Reply();
-    reply.header().result(code);
-    reply.header().message(message);
-  };
-  if (asked.contract_version() != wire::CONTRACT_VERSION) {
-    refuse(wire::RESULT_WRONG_CONTRACT, fmt::format("the request is of contract {}, this server speaks {}",
-                                                    asked.contract_version(), wire::CONTRACT_VERSION));
-  } else {
-    try {
-      Result<Reply> answer = handlers.answer(request);
-      if (answer) {
-        reply = std::move(*answer);
-      } else {
-        refuse(to_wire(answer.error().code), sentence(answer.error()));
-      }
-    } catch (const std::exception& failed) {
-      refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
-    }
-  }
-  reply.header().related_request_id(asked.request_id());
-  reply.header().server(server_id);
-  reply.header().contract_version(wire::CONTRACT_VERSION);
-  if (once && reply.header().result() == wire::RESULT_OK) memory.remember(id, reply);
-  return reply;
-}
-
-/// One operation: its DDS reader, and the worker threads that take requests, answer them and send the replies. The DDS
-/// listener only wakes the workers.
+/// One operation and its DDS reader. The DDS listener takes each request out of the reader at once, so that none is
+/// pushed out by others, and queues it or has it answered RESULT_BUSY.
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:
-  using Request = typename Operation::Request::type;
-  using Reply = typename Operation::Reply::type;
+  using Request = wire::Received<typename Operation::Request::type>;
 
-  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, int workers) {
-    std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core));
-    const auto request_topic = wire::make_request_topic<Operation>(core.participant);
+  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lanes lanes) {
+    const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
     const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
-    endpoint->reply_topic_ = *reply_topic;
     core.channels.add_topic(*reply_topic);
+    std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core, lanes, (*reply_topic)->get_name()));
+    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
     endpoint->reader_ = core.subscriber.create_datareader(*request_topic, wire::call_reader_qos(wire::kRequestDepth),
-                                                          endpoint.get(), wire::dds::StatusMask::data_available());
+                                                          endpoint.get(), heard);
     if (endpoint->reader_ == nullptr) {
       return failure(ErrorCode::kInternal, "cannot create the reader of {} requests", Operation::kName);
-    }
-    for (int i = 0; i < workers; ++i) {
-      endpoint->workers_.emplace_back([e = endpoint.get()](const std::stop_token& stop) { e->work(stop); });
     }
     return endpoint;
   }
 
-  const char* name() const override { return Operation::kName; }
-  std::optional<std::uint64_t> unseen() const override {
-    const std::uint64_t looked = looked_;
-    if (arrivals_ == looked || idle_ == 0) return std::nullopt;
-    return looked;
-  }
+  ~RequestEndpoint() override { close(); }
 
-  ~RequestEndpoint() override {
-    for (std::jthread& worker : workers_) worker.request_stop();
-    workers_.clear();
+  void close() override {
     if (reader_ != nullptr) core_.subscriber.delete_datareader(reader_);
+    reader_ = nullptr;
   }
 
  private:
-  static constexpr std::size_t kRepliesRemembered = 1024;
-  static constexpr std::size_t kLately = 32;  // kept replies; those with many targets are large
-  /// Whether an answer takes long to compute. Then a repeat gets the kept reply.
-  static constexpr bool kComputes =
-      std::is_same_v<Operation, wire::PredictError> || std::is_same_v<Operation, wire::CorrectTarget>;
+  /// How long a request waits for its turn whose client does not say how long it waits.
+  static constexpr std::chrono::milliseconds kPatience{5000};
 
-  explicit RequestEndpoint(ServiceCore& core) : core_(core), memory_(kRepliesRemembered), lately_(kLately) {}
+  RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
+      : core_(core),
+        lanes_(lanes),
+        context_{core.server_id, std::move(reply_topic), core.handlers, core.channels, core.counts} {}
 
-  void on_data_available(wire::dds::DataReader*) override {
-    {
-      const MutexLock lock(mutex_);
-      ++arrivals_;
-    }
-    arrived_.notify_one();
-  }
-
-  void work(const std::stop_token& stop) {
-    ::pthread_setname_np(::pthread_self(), "requests");
-    Request request;
+  void on_data_available(wire::dds::DataReader* reader) override {
     wire::dds::SampleInfo info;
-    while (!stop.stop_requested()) {
-      MutexLock lock(mutex_);
-      const std::uint64_t seen = arrivals_;
-      lock.unlock();
-      while (!stop.stop_requested() && take(request, info)) {
-        if (info.valid_data) serve(request, info.sample_identity.writer_guid(), stop);
-      }
-      ++idle_;
-      lock.lock();
-      arrived_.wait(lock, stop, [&] { return arrivals_ != seen; });
-      --idle_;
+    auto request = std::make_unique<Request>();
+    while (take(*reader, *request, info)) {
+      if (!info.valid_data) continue;
+      receive(std::move(request), info.sample_identity.writer_guid());
+      request = std::make_unique<Request>();
     }
   }
 
-  bool take(Request& request, wire::dds::SampleInfo& info) {
-    const WorkUnderWay::Piece piece = core_.taking.begin();
-    looked_ = arrivals_.load();
-    return reader_->take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+  void on_sample_lost(wire::dds::DataReader*, const wire::dds::SampleLostStatus& status) override {
+    core_.counts.lost += static_cast<std::uint64_t>(status.total_count_change);
   }
 
-  void serve(const Request& request, const eprosima::fastrtps::rtps::GUID_t& writer, const std::stop_token& stop) {
-    const std::string wanted = request.header().server().to_string();
+  bool take(wire::dds::DataReader& reader, Request& request, wire::dds::SampleInfo& info) {
+    const WorkUnderWay::Piece piece = core_.taking.begin();
+    return reader.take_next_sample(&request, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+  }
+
+  /// In the thread that receives all requests: it must not wait, nor write.
+  void receive(std::unique_ptr<Request> request, const eprosima::fastrtps::rtps::GUID_t& writer) {
+    const std::string wanted = request->header().server().to_string();
     if (!wanted.empty() && wanted != core_.server_id) return;
-    // Keyed by the DDS writer of the sample, not by the id in the request: clients may reuse their ids.
-    const std::string sent = wire::participant_of(writer) +
+    const ReplyAddress to{wire::participant_of(writer), request->header().reply_partition().to_string(),
+                          context_.reply_topic};
+    auto expectation = core_.channels.expect(to.participant, to.partition);
+    if (!expectation) {
+      ++core_.counts.misdirected;
+      return;
+    }
+    if (!request->fault) request->fault = fault_of_identity(request->header(), writer);
+    const std::string sent = to.participant +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
-                             request_id_text(request.header().request_id());
-    UnderWay::Piece answering(under_way_, sent);
-    if (!answering.is_first()) return;
-    std::optional<Reply> known = lately_.find(sent);
-    Reply reply =
-        known ? std::move(*known) : reply_to<Request, Reply>(request, core_.handlers, memory_, core_.server_id);
-    if (kComputes && !known && reply.header().result() == wire::RESULT_OK) lately_.remember(sent, reply);
-    ++core_.requests;
-    if (reply.header().result() != wire::RESULT_OK) ++core_.refused;
-    const WorkUnderWay::Piece piece = core_.replying.begin();
-    const std::string partition = request.header().reply_partition().to_string();
-    do {
-      if (!core_.channels.send(partition, reply_topic_, &reply, stop)) ++core_.unheard;
-    } while (answering.has_repeat());
+                             request_id_text(request->header().request_id());
+    Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
+    Ask ask = ask_of(*request, to.participant);
+    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
+    if (!call->is_first()) return;
+    if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
+  }
+
+  [[nodiscard]] Ask ask_of(const Request& request, const std::string& participant) const {
+    const std::string& cell = request.about().cell();
+    const bool is_served = core_.trainer.cells().contains(cell);
+    Ask ask{participant};
+    if (is_served) ask.cell = cell;
+    if (is_served) ask.work = work_of(request, cell, Operation::kName);
+    ask.items = items_of(request);
+    ask.bytes = bytes_of_request(request);
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::milliseconds deadline(request.header().deadline_ms());
+    ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
+    if (deadline.count() > 0) ask.finish_by = ask.start_by;
+    return ask;
   }
 
   ServiceCore& core_;
-  wire::dds::Topic* reply_topic_ = nullptr;
+  const Lanes lanes_;
+  CallContext<Operation> context_;
   wire::dds::DataReader* reader_ = nullptr;
-  ReplyMemory<Reply> memory_;  // replies of operations that change something
-  ReplyMemory<Reply> lately_;  // replies of long computations
-  UnderWay under_way_;
-  Mutex mutex_;  // no arrival may fall between the check of arrivals_ and the wait
-  Condition arrived_;
-  std::atomic<std::uint64_t> arrivals_{0};  // counted under mutex_
-  std::atomic<std::uint64_t> looked_{0};    // value of arrivals_ when a worker last began to take
-  std::atomic<int> idle_{0};                // workers that wait for arrivals
-  std::vector<std::jthread> workers_;
 };
 
 }  // namespace trammel

@@ -5,7 +5,7 @@
 namespace trammel {
 namespace {
 
-/// Limit of readers noted between two calls of wait(). Clients beyond it get their channel with their first request.
+/// Limit of readers noted between two calls of wait(); they are some milliseconds apart.
 constexpr std::size_t kMaxReaders = 4096;
 
 }  // namespace
@@ -18,23 +18,43 @@ void ServiceEvents::status_changed() {
   changed_.notify_one();
 }
 
-std::vector<ReplyReader> ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
+std::vector<ReaderEvent> ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
   MutexLock lock(mutex_);
-  changed_.wait_for(lock, stop, limit,
-                    [this]() TRAMMEL_REQUIRES(mutex_) { return status_changed_ || !readers_.empty(); });
+  changed_.wait_for(lock, stop, limit, [this]() TRAMMEL_REQUIRES(mutex_) {
+    return status_changed_ || !readers_.empty() || !left_.empty();
+  });
   status_changed_ = false;
-  return std::exchange(readers_, {});
+  std::vector<ReaderEvent> events = std::exchange(readers_, {});
+  // Last: no participant comes back under the same name.
+  for (const std::string& participant : std::exchange(left_, {})) {
+    events.push_back({ReaderEvent::Kind::kLeft, {participant, {}, {}}});
+  }
+  return events;
 }
 
 void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
                                             eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
-  if (info.status != eprosima::fastrtps::rtps::ReaderDiscoveryInfo::DISCOVERED_READER) return;
+  using Info = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
+  if (info.status != Info::DISCOVERED_READER && info.status != Info::REMOVED_READER) return;
   const std::string topic = info.info.topicName().to_string();
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
   if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
+  const auto kind = info.status == Info::REMOVED_READER ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
   {
     const MutexLock lock(mutex_);
-    if (readers_.size() < kMaxReaders) readers_.push_back({topic, partitions.front()});
+    if (readers_.size() >= kMaxReaders) return;
+    readers_.push_back({kind, {wire::participant_of(info.info.guid()), partitions.front(), topic}});
+  }
+  changed_.notify_one();
+}
+
+void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
+                                             eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
+  if (info.status != Info::REMOVED_PARTICIPANT && info.status != Info::DROPPED_PARTICIPANT) return;
+  {
+    const MutexLock lock(mutex_);
+    left_.insert(wire::participant_of(info.info.m_guid));
   }
   changed_.notify_one();
 }

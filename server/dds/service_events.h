@@ -2,38 +2,44 @@
 
 #include <chrono>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
+#include "server/dds/schedule/channel_book.h"
 
 namespace trammel {
 
-/// A client's reader of replies, as discovery found it.
-struct ReplyReader {
-  std::string topic;
-  std::string partition;
+/// What discovery has found of a client. Of a participant that has left, only the participant is told.
+struct ReaderEvent {
+  enum class Kind { kFound, kLost, kLeft } kind;
+  ReplyReader reader;
 };
 
-/// What the status thread of a service waits for. As the participant's listener it notes reply readers and nothing
-/// else. Thread-safe.
+/// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
+/// the participants that have left, and nothing else. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
+  /// The status thread has something to do.
   void status_changed();
-  /// Waits until the status has changed or readers have been found, at most `limit`. Returns the readers found since
-  /// the last call.
-  [[nodiscard]] std::vector<ReplyReader> wait(const std::stop_token& stop, std::chrono::milliseconds limit);
+  /// Waits until the status has changed or discovery has found something, at most `limit`. Returns what has been found
+  /// since the last call.
+  [[nodiscard]] std::vector<ReaderEvent> wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
  private:
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+  void on_participant_discovery(wire::dds::DomainParticipant* participant,
+                                eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
 
   Mutex mutex_;
   Condition changed_;
   bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
-  std::vector<ReplyReader> readers_ TRAMMEL_GUARDED_BY(mutex_);
+  std::vector<ReaderEvent> readers_ TRAMMEL_GUARDED_BY(mutex_);
+  std::set<std::string> left_ TRAMMEL_GUARDED_BY(mutex_);  // participants
 };
 
 }  // namespace trammel

@@ -1,13 +1,38 @@
+#include <utility>
+
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 
 namespace trammel {
+namespace {
+
+/// What a training of each kind is not told.
+Status check_training(const wire::TrainRequest& request) {
+  if (request.kind() == wire::TRAIN_BATCHES) {
+    if (request.csv().empty()) return {};
+    return failure(ErrorCode::kUsage, "a training is of stored batches").of("csv").next("submit the batch first");
+  }
+  if (request.batch_ids().size() > 1) {
+    return failure(ErrorCode::kUsage, "{} batches to diagnose, limit 1", request.batch_ids().size())
+        .of("batch_ids")
+        .beyond(request.batch_ids().size(), 1);
+  }
+  for (const auto& [text, field] : {std::pair(request.level(), "level"), std::pair(request.bias(), "bias")}) {
+    if (text.empty()) continue;
+    return failure(ErrorCode::kUsage, "what a diagnosis finds is trained beside what the model in force has").of(field);
+  }
+  return {};
+}
+
+}  // namespace
 
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
-  const auto job = trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
-                                   request_id_text(request.header().request_id()));
+  const auto job =
+      trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
+                      request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
+                                                              : request.change_id().to_string());
   if (!job) return tl::make_unexpected(job.error());
   wire::SubmitMeasurementsReply reply;
   reply.job(*job);
@@ -15,18 +40,34 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
 }
 
 Result<wire::TrainReply> Handlers::answer(const wire::TrainRequest& request) {
+  if (!request.batch_rule().empty()) return unsupported<wire::TrainReply>("batch_rule");
+  if (!request.prior().empty()) return unsupported<wire::TrainReply>("prior");
+  if (request.diagnosis() != 0) return unsupported<wire::TrainReply>("diagnosis");
+  if (request.change().expected_epoch() != 0) return unsupported<wire::TrainReply>("expected_epoch");
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  if (request.batch_ids().size() > wire::MAX_BATCHES) {
-    return failure(ErrorCode::kTooLarge, "{} batches in one request, limit {}", request.batch_ids().size(),
-                   wire::MAX_BATCHES)
-        .of("batch_ids")
-        .beyond(request.batch_ids().size(), wire::MAX_BATCHES);
-  }
-  const auto job = trainer_.retrain(request.about().cell(), request.batch_ids(), request.level(), request.bias());
+  const auto job = trained(request);
   if (!job) return tl::make_unexpected(job.error());
   wire::TrainReply reply;
   reply.job(*job);
   return reply;
+}
+
+Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
+  const std::string& cell = request.about().cell();
+  const auto& batches = request.batch_ids();
+  const bool diagnosed = request.kind() == wire::TRAIN_DIAGNOSED;
+  if (const Status sensible = check_training(request); !sensible) return tl::make_unexpected(sensible.error());
+  const auto expected = expected_version(request.change());
+  if (!expected) return tl::make_unexpected(expected.error());
+  const ChangeId id = change_id(
+      request.change().id().to_string(),
+      in_few_words(diagnosed ? "diagnose and train" : "train", cell,
+                   {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}));
+  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
+    return tl::make_unexpected(as_expected.error());
+  if (!diagnosed)
+    return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);
+  return trainer_.diagnose(cell, batches.empty() ? "" : batches.front(), request.csv(), true, id);
 }
 
 bool happens_once(const wire::SubmitMeasurementsRequest&) { return true; }

@@ -54,11 +54,17 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->dds.peer_ports, minimal.dds.peer_ports);
   EXPECT_EQ(shipped->dds.compute_workers, minimal.dds.compute_workers);
   EXPECT_EQ(shipped->dds.max_clients, minimal.dds.max_clients);
+  EXPECT_EQ(shipped->dds.client_requests, minimal.dds.client_requests);
+  EXPECT_EQ(shipped->dds.client_mb, minimal.dds.client_mb);
+  EXPECT_EQ(shipped->dds.queued_requests, minimal.dds.queued_requests);
+  EXPECT_EQ(shipped->dds.queued_mb, minimal.dds.queued_mb);
+  EXPECT_EQ(shipped->dds.cell_share, minimal.dds.cell_share);
   EXPECT_EQ(shipped->trainer.queue_capacity, minimal.trainer.queue_capacity);
   EXPECT_EQ(shipped->trainer.max_poses, minimal.trainer.max_poses);
   EXPECT_EQ(shipped->trainer.validation_share, minimal.trainer.validation_share);
   EXPECT_EQ(shipped->trainer.accept_ratio, minimal.trainer.accept_ratio);
   EXPECT_EQ(shipped->trainer.seed, minimal.trainer.seed);
+  EXPECT_EQ(shipped->models_in_memory, minimal.models_in_memory);
   EXPECT_EQ(shipped->log.level, minimal.log.level);
   EXPECT_EQ(shipped->log.file, minimal.log.file);
 }
@@ -81,18 +87,25 @@ TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
 
 TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
+      "models_in_memory_mb: 512\n"
       "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
-      "max_clients: 7}\n"
+      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9}\n"
       "log: {level: debug, file: trammel.log}\n");
   EXPECT_EQ(config.dds.server_id, "a");
   EXPECT_EQ(config.store, folder_.file("t.db")) << "relative to the file";
+  EXPECT_EQ(config.models_in_memory, std::size_t{512} << 20);
   EXPECT_EQ(config.dds.domain, 3u);
   EXPECT_EQ(config.dds.address, "127.0.0.2");
   EXPECT_EQ(config.dds.port, 18000);
   EXPECT_EQ(config.dds.peer_ports, (std::vector<std::uint16_t>{18002, 18004}));
   EXPECT_EQ(config.dds.compute_workers, 4);
   EXPECT_EQ(config.dds.max_clients, 7);
+  EXPECT_EQ(config.dds.client_requests, 8);
+  EXPECT_EQ(config.dds.client_mb, 90);
+  EXPECT_EQ(config.dds.queued_requests, 10);
+  EXPECT_EQ(config.dds.queued_mb, 110);
+  EXPECT_EQ(config.dds.cell_share, 0.75);
   EXPECT_EQ(config.trainer.queue_capacity, 2);
   EXPECT_EQ(config.trainer.max_poses, 300);
   EXPECT_EQ(config.trainer.validation_share, 0.3);

@@ -62,11 +62,12 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     participant_ = wire::make_participant({"raw client", domain, "127.0.0.1", 0, {port}}).value();
     wire::dds::TypeSupport type(new AnyBytesType(typename Operation::Request().getName()));
     type.register_type(participant_.get());
-    auto* requests = participant_->create_topic(fmt::format("{}_Request", Operation::kName), type.get_type_name(),
+    auto* requests = participant_->create_topic(wire::topic_name(Operation::kName, "_Request"), type.get_type_name(),
                                                 wire::dds::TOPIC_QOS_DEFAULT);
     auto* replies = wire::make_reply_topic<Operation>(*participant_).value();
     participant_->create_subscriber(wire::subscriber_qos(partition_))
-        ->create_datareader(replies, wire::call_reader_qos(1000), this, wire::dds::StatusMask::data_available());
+        ->create_datareader(replies, wire::call_reader_qos(1000), this,
+                            wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched());
     writer_ = participant_->create_publisher(wire::publisher_qos({}))
                   ->create_datawriter(requests, wire::call_writer_qos(1000), this,
                                       wire::dds::StatusMask::publication_matched());
@@ -79,13 +80,35 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kLimit, [this] { return matched_ > 0; });
   }
+  /// Until the server listens to the requests and its replies are matched too, as idl/README.md asks.
+  [[nodiscard]] bool wait_until_matched() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kLimit, [this] { return matched_ > 0 && answers_ > 0; });
+  }
+  [[nodiscard]] bool is_matched() {
+    const std::lock_guard lock(mutex_);
+    return matched_ > 0 && answers_ > 0;
+  }
   void send(Bytes bytes) { writer_->write(&bytes); }
+  void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
+    header.request_id().writer_guid(wire::octets_of(writer_->guid()));
+    header.request_id().sequence_number(sequence_number);
+    header.reply_partition(partition_);
+    header.contract_version(wire::CONTRACT_VERSION);
+  }
+  /// As a client that listens in `partition`.
+  void send_for(const std::string& partition, Request request, std::int64_t sequence_number) {
+    fill_in(request.header(), sequence_number);
+    request.header().reply_partition(partition);
+    send(to_bytes<typename Operation::Request>(std::move(request)));
+  }
   /// With its header filled in.
   void send(Request request, std::int64_t sequence_number) {
-    request.header().request_id().sequence_number(sequence_number);
-    request.header().reply_partition(partition_);
-    request.header().contract_version(wire::CONTRACT_VERSION);
-    send(to_bytes<typename Operation::Request>(std::move(request)));
+    send_for(partition_, std::move(request), sequence_number);
+  }
+  [[nodiscard]] std::size_t replies() {
+    const std::lock_guard lock(mutex_);
+    return replies_.size();
   }
   /// Until at least `count` have come.
   [[nodiscard]] std::vector<Reply> wait_for_replies(std::size_t count) {
@@ -104,6 +127,13 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     }
     changed_.notify_all();
   }
+  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
+    {
+      const std::lock_guard lock(mutex_);
+      answers_ = status.current_count;
+    }
+    changed_.notify_all();
+  }
   void on_data_available(wire::dds::DataReader* reader) override {
     Reply reply;
     wire::dds::SampleInfo info;
@@ -119,7 +149,8 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
   wire::dds::DataWriter* writer_ = nullptr;
   std::mutex mutex_;
   std::condition_variable changed_;
-  int matched_ = 0;             // guarded by mutex_
+  int matched_ = 0;             // guarded by mutex_: readers of our requests
+  int answers_ = 0;             // guarded by mutex_: writers of replies to us
   std::vector<Reply> replies_;  // guarded by mutex_
 };
 

@@ -53,6 +53,11 @@ Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector
 }
 
 Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns, Target& target) {
+  Result<PoseContext> comes = columns.commanded.circumstances(table, row);
+  if (!comes) return tl::make_unexpected(comes.error());
+  target.direction = std::move(comes->direction);
+  target.temperature = comes->temperature;
+  target.time = comes->time;
   target.joint_target = columns.pose.empty();
   if (!columns.commanded.joint_types().empty() &&
       (target.joint_target || !columns.commanded.joints_empty(table, row))) {
@@ -101,6 +106,14 @@ Result<TargetFile> read_targets_csv(const std::string& path) {
 Status check_targets(const TargetFile& file, const Chain& robot) {
   if (!file.joint_types.empty()) {
     if (const Status joints = check_joint_columns(file.joint_types, robot, file.where); !joints) return joints;
+  }
+  for (const TargetRow& row : file.rows) {
+    const auto directions = static_cast<int>(row.target.direction.size());
+    if (directions == 0 || directions == robot.size()) continue;
+    return refused("{} direction columns, robot {} has {} joints", directions, robot.name(), robot.size())
+        .in(file.where)
+        .of(fmt::format("dir{}", directions))
+        .beyond(directions, robot.size());
   }
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {

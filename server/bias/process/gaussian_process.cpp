@@ -28,6 +28,10 @@ constexpr double kClosely = 0.01;          // of the standard deviation of a mea
 constexpr double kRoughly = 0.03;
 constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
 
+bool is_by_regions(VarianceForm form) {
+  return form == VarianceForm::kRegional || form == VarianceForm::kRegionalOnly || form == VarianceForm::kRough;
+}
+
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
 void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
                         const VectorXd& noise_shape, const MatrixXd& y, AlignedMatrix* matrix) {
@@ -182,8 +186,7 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
   gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
   gp.finish(form);
-  const bool by_regions = form == VarianceForm::kRegional || form == VarianceForm::kRough;
-  if (by_regions && !gp.compressed_ && n >= kFewestToCompress) {
+  if (is_by_regions(form) && !gp.compressed_ && n >= kFewestToCompress) {
     const double tolerance = form == VarianceForm::kRough ? kRoughly : kClosely;
     gp.regional_ = std::make_shared<RegionalVariance>(gp.kernel_, gp.parameters_, q, gp.noise_, tolerance);
   }
@@ -198,8 +201,20 @@ void GaussianProcess::finish(VarianceForm form) {
   kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
   leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
-  if (form == VarianceForm::kCompressed) compress(kMostKeptPoints);
-  if (form == VarianceForm::kRegional || form == VarianceForm::kRough) compress(kMostBeforeRegions);
+  if (form != VarianceForm::kExact) compress(is_by_regions(form) ? kMostBeforeRegions : kMostKeptPoints);
+  const bool only = form != VarianceForm::kCompressed && form != VarianceForm::kRegional;
+  if (only && compressed_) exact_ = {};
+}
+
+std::vector<double> GaussianProcess::root_rows(Index more) const {
+  if (exact_.size() == size_) return exact_.rows(more);
+  AlignedMatrix matrix = augmented_storage(size_, 1);
+  AlignedMatrix work(numerics().work_size(size_ + 1), 1);
+  assemble_augmented(*kernel_, parameters_, features_, 1.0, noise_, y_, &matrix);
+  double log_det = 0;
+  const bool positive = numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
+  TRAMMEL_CHECK(positive);  // it was before
+  return VarianceTable(features_.copy(), size_, std::move(matrix)).rows(more);
 }
 
 void GaussianProcess::compress(Index at_most) {

@@ -88,9 +88,14 @@ enum class VarianceForm {
   /// much that the standard deviation of a measurement is too large by less than 1 % at most targets, and by 2 % where
   /// it is noticed: there the exact variance takes over.
   kRegional,
-  /// As kRegional with 3 % and 6 %: for figures that decide nothing.
+  /// As kRegional, and as kCompressedOnly where it is compressed.
+  kRegionalOnly,
+  /// As kRegionalOnly with 3 % and 6 %: for figures that decide nothing.
   kRough,
   kExact,
+  /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of the points and is
+  /// for with(), without() and left_out_error() alone is computed anew when one of them is called.
+  kCompressedOnly,
 };
 
 /// One output, conditioned on its data (eq. 3.17). Immutable, thread-safe.
@@ -147,6 +152,8 @@ class GaussianProcess {
   // Computes what follows from data, weights, inverse diagonal and root; not VarianceForm::kRegional.
   void finish(VarianceForm form);
   void compress(Eigen::Index at_most);
+  // Of the exact variance table; VarianceTable::rows().
+  [[nodiscard]] std::vector<double> root_rows(Eigen::Index more) const;
 
   std::shared_ptr<const Kernel> kernel_;
   Eigen::VectorXd parameters_;
@@ -157,7 +164,7 @@ class GaussianProcess {
   AlignedMatrix weights_;             // M⁻¹ y
   Eigen::VectorXd inverse_diagonal_;  // of M⁻¹
   double log_det_ = 0;                // of M
-  VarianceTable exact_;               // of all points
+  VarianceTable exact_;               // of all points; empty where only the compressed one is kept
   std::optional<VarianceTable> compressed_;
   std::shared_ptr<const RegionalVariance> regional_;
   double signal_variance_ = 0;

@@ -21,6 +21,12 @@ constexpr Index kMostOfAnExpert =
     1200;  // neighbours: twice as many take twice the time and leave a tenth less (DECISIONS.md)
 constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
 
+VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
+  if (experts == 1) return wanted;
+  if (wanted == VarianceForm::kRegionalOnly || wanted == VarianceForm::kRough) return VarianceForm::kCompressedOnly;
+  return wanted == VarianceForm::kRegional ? VarianceForm::kCompressed : wanted;
+}
+
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());
   return halved(joints_as_seen_by(kernel, parameters, q), kMostOfAnExpert);
@@ -35,9 +41,8 @@ std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const 
   local.size_ = q.rows();
   local.members_ = neighbourhoods(*kernel, hyperparameters.kernel, q);
   for (const std::vector<Index>& points : local.members_) {
-    auto expert =
-        GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points), hyperparameters,
-                                   local.members_.size() == 1 ? form : VarianceForm::kCompressed);
+    auto expert = GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points),
+                                             hyperparameters, form_of(form, local.members_.size()));
     if (!expert) return std::nullopt;
     local.experts_.push_back(*std::move(expert));
   }

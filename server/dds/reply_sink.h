@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+namespace trammel {
+
+/// Where a reply goes.
+struct ReplyAddress {
+  std::string participant;  ///< that sent the request
+  std::string partition;    ///< where it listens, as it says
+  std::string topic;
+};
+
+/// Takes replies. Never waits for whoever reads them. Thread-safe.
+class ReplySink {
+ public:
+  virtual ~ReplySink() = default;
+  /// Sends the reply, at once where that is possible. `reply` is a sample of the topic's type, of about so many bytes.
+  virtual void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;
+  /// The same for threads that must not write: another one does.
+  virtual void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) = 0;
+};
+
+}  // namespace trammel

@@ -1,0 +1,226 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "idl/transport.h"
+#include "server/base/mutex.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+#include "server/dds/reply_memory.h"
+#include "server/dds/reply_sink.h"
+#include "server/dds/request_weight.h"
+#include "server/dds/schedule/job.h"
+
+namespace trammel {
+
+/// What all operations of a service count.
+struct CallCounts {
+  std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
+  std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
+  std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY: there was no time or no room
+  std::atomic<std::uint64_t> lost{0};      ///< by a DDS reader, before anybody saw them
+  /// Not answered: another client listens where the reply was to go.
+  std::atomic<std::uint64_t> misdirected{0};
+};
+
+/// Of a request that claims to be of another DDS writer than the one that sent it.
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
+                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
+  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
+                     "request_id must hold the GUID of the writer that sends it",
+                     {},
+                     "writer_guid",
+                     {},
+                     {}};
+}
+
+/// What the calls of one operation share. Outlives them.
+template <typename Operation>
+struct CallContext {
+  using Reply = typename Operation::Reply::type;
+  static constexpr std::size_t kRepliesRemembered = 1024;
+  static constexpr std::size_t kLately = 32;  // kept replies; those with many targets are large
+
+  std::string server_id;
+  std::string reply_topic;
+  Handlers& handlers;
+  ReplySink& replies;
+  CallCounts& counts;
+  ReplyMemory<Reply> memory{kRepliesRemembered};  ///< of operations that change something, by request id
+  ReplyMemory<Reply> lately{kLately};             ///< of long computations, by writer and request id
+  UnderWay under_way = {};
+};
+
+/// A request from its arrival to its reply.
+template <typename Operation>
+class Call final : public Job {
+ public:
+  using Request = wire::Received<typename Operation::Request::type>;
+  using Reply = typename Operation::Reply::type;
+  /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
+  static constexpr bool kComputes = AsksForTargets<Request> || AsksForJoints<Request>;
+
+  /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids. `while_under_way`
+  /// is kept until the call is over.
+  Call(CallContext<Operation>& context, std::unique_ptr<Request> request, ReplyAddress to, const std::string& sent,
+       std::shared_ptr<void> while_under_way)
+      : context_(context),
+        request_(std::move(request)),
+        to_(std::move(to)),
+        sent_(sent),
+        while_under_way_(std::move(while_under_way)),
+        answering_(context.under_way, sent) {}
+
+  /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for it.
+  [[nodiscard]] bool is_first() const { return answering_.is_first(); }
+
+  std::size_t begin() override {
+    if (request_->fault) {
+      refuse(*request_->fault);
+      return 0;
+    }
+    if (find_known()) return 0;
+    if constexpr (!kComputes) return 1;
+    guarded([this] { begin_portions(); });
+    return portions_ ? portions_->items() : 0;
+  }
+
+  void compute(std::size_t first, std::size_t count) override {
+    guarded([&] {
+      if constexpr (kComputes) {
+        portions_->compute(first, count);
+      } else {
+        accept(context_.handlers.answer(*request_));
+      }
+    });
+  }
+
+  void finish() override {
+    if constexpr (kComputes) {
+      if (portions_ && !is_refused()) reply_ = portions_->take();
+    }
+    const bool is_good = reply_.header().result() == wire::RESULT_OK;
+    if (!is_known_) remember(is_good);
+    const std::uint64_t times = answer(&ReplySink::send);
+    context_.counts.requests += times;
+    if (!is_good) context_.counts.refused += times;
+  }
+
+  void shed(const Shed& shed) override {
+    const bool is_over = shed.too_late && request_->header().deadline_ms() > 0;
+    refuse(wire::Fault{is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY,
+                       fmt::format("{}; try again in {} ms", shed.why, shed.retry_after.count()),
+                       {},
+                       is_over ? "deadline_ms" : "",
+                       {},
+                       {}});
+    reply_.header().retry_after_ms(static_cast<std::uint32_t>(shed.retry_after.count()));
+    put_identity();
+    context_.counts.shed += answer(&ReplySink::post);
+  }
+
+ private:
+  using Send = void (ReplySink::*)(const ReplyAddress&, std::shared_ptr<void>, std::size_t);
+
+  [[nodiscard]] bool find_known() {
+    auto known = context_.lately.find(sent_);
+    if (!known && happens_once(*request_))
+      known = context_.memory.find(request_id_text(request_->header().request_id()));
+    if (!known) return false;
+    reply_ = std::move(*known);
+    is_known_ = true;
+    return true;
+  }
+
+  void begin_portions() {
+    if constexpr (kComputes) {
+      auto begun = context_.handlers.begin(*request_);
+      if (begun) {
+        portions_ = std::move(*begun);
+      } else {
+        accept(Result<Reply>(tl::make_unexpected(begun.error())));
+      }
+    }
+  }
+
+  void accept(Result<Reply> answer) {
+    if (answer) {
+      reply_ = std::move(*answer);
+    } else {
+      refuse(answer.error());
+    }
+  }
+
+  /// `why`: an Error or a wire::Fault.
+  template <typename Why>
+  void refuse(const Why& why) {
+    const MutexLock lock(mutex_);
+    reply_ = Reply();
+    put_error(why, reply_.header());
+    refused_ = true;
+  }
+
+  [[nodiscard]] bool is_refused() {
+    const MutexLock lock(mutex_);
+    return refused_;
+  }
+
+  template <typename Work>
+  void guarded(const Work& work) {
+    try {
+      work();
+    } catch (const std::exception& failed) {
+      refuse(wire::Fault{wire::RESULT_UNKNOWN_EXCEPTION, failed.what(), {}, {}, {}, {}});
+    }
+  }
+
+  void put_identity() {
+    reply_.header().related_request_id(request_->header().request_id());
+    reply_.header().server(context_.server_id);
+    reply_.header().contract_version(wire::CONTRACT_VERSION);
+    reply_.header().trace_id(request_->header().trace_id());
+  }
+
+  void remember(bool is_good) {
+    put_identity();
+    if (!is_good) return;
+    if (kComputes) context_.lately.remember(sent_, reply_);
+    if (happens_once(*request_)) {
+      context_.memory.remember(request_id_text(request_->header().request_id()), reply_);
+    }
+  }
+
+  /// Returns how many were answered: with the repeats that have come meanwhile.
+  std::uint64_t answer(Send send) {
+    const auto reply = std::make_shared<Reply>(std::move(reply_));
+    const std::size_t bytes = bytes_of_reply(*reply);
+    std::uint64_t times = 0;
+    do {
+      (context_.replies.*send)(to_, reply, bytes);
+      ++times;
+    } while (answering_.has_repeat());
+    return times;
+  }
+
+  CallContext<Operation>& context_;
+  const std::unique_ptr<Request> request_;
+  const ReplyAddress to_;
+  const std::string sent_;
+  const std::shared_ptr<void> while_under_way_;
+  UnderWay::Piece answering_;
+  std::unique_ptr<PortionedAnswer<Reply>> portions_;
+  Mutex mutex_;  // refused_ and reply_ while several threads compute
+  bool refused_ = false;
+  bool is_known_ = false;
+  Reply reply_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <string>
+
+#include "idl/topics.h"
+
+/// What the schedule is told of a request: how much it asks for, and how much memory it takes.
+namespace trammel {
+
+template <typename Request>
+concept AsksForTargets = requires(const Request& request) {
+  request.targets();
+};
+template <typename Request>
+concept AsksForJoints = requires(const Request& request) {
+  request.poses();
+};
+template <typename Request>
+concept HasAction = requires(const Request& request) {
+  request.action();
+};
+
+/// Items that are computed apart from each other.
+template <typename Request>
+[[nodiscard]] std::size_t items_of(const Request& request) {
+  if constexpr (AsksForTargets<Request>) {
+    return request.targets().size();
+  } else if constexpr (AsksForJoints<Request>) {
+    return request.poses().size();
+  } else {
+    return 1;
+  }
+}
+
+/// Bytes that a request takes in memory until it is answered, about.
+template <typename Request>
+[[nodiscard]] std::size_t bytes_of_request(const Request& request) {
+  constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
+  std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
+  if constexpr (requires { request.model_text(); }) bytes += request.model_text().size();
+  if constexpr (requires { request.csv(); }) bytes += request.csv().size();
+  return bytes;
+}
+
+/// Bytes that a reply takes in memory, about.
+template <typename Reply>
+[[nodiscard]] std::size_t bytes_of_reply(const Reply& reply) {
+  constexpr std::size_t kAnswered = 512;  // of one item
+  std::size_t bytes = sizeof(Reply) + reply.header().message().size();
+  if constexpr (requires { reply.corrections(); }) bytes += kAnswered * reply.corrections().size();
+  if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
+  if constexpr (requires { reply.models(); }) bytes += kAnswered * reply.models().size();
+  if constexpr (requires { reply.jobs(); }) bytes += kAnswered * (reply.jobs().size() + reply.batches().size());
+  if constexpr (requires { reply.text(); }) bytes += reply.text().size() + reply.page_html().size();
+  return bytes;
+}
+
+/// Requests that cost alike: of one cell, with the same action.
+template <typename Request>
+[[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
+  std::string work = cell + '/' + operation;
+  if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
+  if constexpr (requires { request.what(); }) work += '/' + std::to_string(static_cast<int>(request.what()));
+  return work;
+}
+
+}  // namespace trammel

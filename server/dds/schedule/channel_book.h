@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/dds/schedule/job.h"
+
+namespace trammel {
+
+/// A client's reader of replies, as discovery found it.
+struct ReplyReader {
+  std::string participant;
+  std::string partition;
+  std::string topic;
+};
+
+/// Who listens where, and which clients have a reply channel. Only the participant that was the first to listen in a
+/// partition gets replies there. When there are more clients than channels, those take turns that do nothing: the one
+/// whose last request is longest ago makes room for the one that has waited longest, a client that asked first. Whoever
+/// had a channel for nothing waits longer each time. Not thread-safe.
+class ChannelBook {
+ public:
+  /// `grace`: nobody loses a channel sooner than this after it was opened or used.
+  ChannelBook(std::size_t capacity, SteadyTime::duration grace) : capacity_(capacity), grace_(grace) {}
+
+  void found(const ReplyReader& reader, SteadyTime now);
+  void lost(const ReplyReader& reader);
+  void left(const std::string& participant);
+
+  /// Whether the participant may be answered in the partition: it listens there, or nobody does yet.
+  [[nodiscard]] bool may_listen(const std::string& participant, const std::string& partition) const;
+  [[nodiscard]] bool listens(const std::string& participant, const std::string& partition) const;
+  /// A request of this client has come.
+  void asked(const std::string& partition, SteadyTime now);
+  /// The request has been answered. Between the two the client keeps its channel.
+  void answered(const std::string& partition, SteadyTime now);
+
+  /// What is to be done now. The caller does it.
+  struct Change {
+    enum class Kind { kOpen, kClose } kind;
+    std::string partition;
+    std::string topic;             ///< of kOpen: one of those that the client listens to
+    std::string participant = {};  ///< of kOpen: the client's
+  };
+  [[nodiscard]] std::vector<Change> changes(SteadyTime now);
+  /// Whether clients wait for a channel.
+  [[nodiscard]] bool somebody_waits() const { return open_ < clients_.size(); }
+  [[nodiscard]] std::size_t open() const { return open_; }
+
+ private:
+  struct Client {
+    std::string participant;
+    std::set<std::string> topics;  // that it listens to
+    std::set<std::string> opened;  // topics with a writer
+    bool is_open = false;
+    bool was_useful = false;   // since it was opened
+    bool asks = false;         // since it has no channel
+    int at_work = 0;           // requests that are not answered
+    SteadyTime last_used{};    // or opened
+    SteadyTime waits_since{};  // may lie ahead: it waits its turn
+    SteadyTime::duration penalty{0};
+  };
+  using Clients = std::map<std::string, Client>;
+  [[nodiscard]] Clients::iterator first_waiting(SteadyTime now);
+  [[nodiscard]] Clients::iterator least_useful(SteadyTime now);
+  void open(Client& client, SteadyTime now);
+  void close(Clients::iterator client, SteadyTime now, std::vector<Change>* changes);
+  void drop(Clients::iterator client);
+
+  const std::size_t capacity_;
+  const SteadyTime::duration grace_;
+  Clients clients_;                        // by partition
+  std::map<std::string, int> partitions_;  // of a participant
+  std::vector<Change> closings_;           // of clients that have left
+  std::size_t open_ = 0;
+};
+
+}  // namespace trammel

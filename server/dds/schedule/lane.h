@@ -1,0 +1,72 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/base/mutex.h"
+#include "server/dds/schedule/job.h"
+#include "server/dds/schedule/room.h"
+#include "server/dds/schedule/turns.h"
+
+namespace trammel {
+
+/// Requests of one kind and the workers that carry them out in turns: see Turns. A worker goes on to the next client
+/// after one portion; the portions of one request go to all workers that have nothing better to do. Thread-safe.
+class Lane {
+ public:
+  using Clock = std::function<SteadyTime()>;
+
+  /// `room` outlives it. `nice` is added to the priority value of the workers.
+  Lane(
+      const TurnLimits& limits, Room& room, int nice = 0, Clock now = [] { return std::chrono::steady_clock::now(); });
+  ~Lane();  ///< stops as stop()
+
+  /// Starts the workers.
+  void start();
+  /// Lets the portions under way end, and sheds all other requests. Nothing is taken in afterwards.
+  void stop();
+  /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what is not taken in.
+  [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
+  /// Works on one portion in the calling thread. False: there was nothing to do.
+  [[nodiscard]] bool step();
+
+  [[nodiscard]] std::size_t requests() const;
+  /// For the watchdog: a number while a request could be worked on and an idle worker has not taken it up; else empty.
+  /// The number is how many portions were taken up before. Takes no lock.
+  [[nodiscard]] std::optional<std::uint64_t> unseen() const;
+
+ private:
+  void work(const std::stop_token& stop);
+  /// Next portion, after the one before has been settled.
+  [[nodiscard]] std::optional<Turns::Portion> next() TRAMMEL_REQUIRES(mutex_);
+  void run(const Turns::Portion& portion);
+  [[nodiscard]] Turns::Done work_on(const Turns::Portion& portion);
+  /// Whether there is something to compute.
+  [[nodiscard]] bool begin(Turns::Entry& entry);
+  /// Items of the request until the portion that began at `begun` is over.
+  void compute(Turns::Entry& entry, SteadyTime begun, Turns::Done* done);
+
+  const TurnLimits limits_;
+  Room& room_;
+  const int nice_;
+  const Clock now_;
+  mutable Mutex mutex_;
+  Condition arrived_;
+  Turns turns_ TRAMMEL_GUARDED_BY(mutex_);
+  bool stopped_ TRAMMEL_GUARDED_BY(mutex_) = false;
+  bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;  // something may be workable
+  std::atomic<bool> workable_{false};              // the same, for the watchdog
+  std::atomic<int> idle_{0};                       // workers that wait
+  std::atomic<std::uint64_t> taken_up_{0};         // portions
+  std::vector<std::jthread> workers_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,229 @@
+// A service under load: what each client gets beside clients that flood, do not listen, or are too many.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/session/session.h"
+#include "server/dds/dds_service.h"
+#include "tests/dds/backend.h"
+#include "tests/dds/raw_client.h"
+
+namespace trammel {
+namespace {
+
+using Corrector = test::RawClient<wire::CorrectTarget>;
+const std::vector<double> kJoints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+
+wire::CorrectTargetRequest corrections(std::size_t targets) {
+  wire::CorrectTargetRequest request;
+  request.about().cell("cell-7");
+  wire::Target target;
+  target.kind(wire::TARGET_JOINTS);
+  target.joints_rad(kJoints);
+  request.targets(std::vector<wire::Target>(targets, target));
+  return request;
+}
+
+class LoadTest : public testing::Test {
+ protected:
+  explicit LoadTest(DdsOptions options = test::test_dds_options()) : options_(std::move(options)) {
+    if (!backend_.trainer->take_up()) throw std::runtime_error("cannot take up");
+    backend_.serve(1);
+  }
+  void start() {
+    if (const Status started = service().start(); !started) throw std::runtime_error(started.error().message);
+  }
+  DdsService& service() {
+    if (!service_) {
+      service_ = std::make_unique<DdsService>(options_, *backend_.trainer, *backend_.store, backend_.registry);
+    }
+    return *service_;
+  }
+  std::unique_ptr<Corrector> corrector(const std::string& partition) const {
+    return std::make_unique<Corrector>(options_.domain, options_.port, partition);
+  }
+
+  DdsOptions options_;
+  test::Backend backend_;
+  std::unique_ptr<DdsService> service_;
+};
+
+/// How many of the replies have each code.
+template <typename Reply>
+std::map<wire::ResultCode, std::size_t> codes(const std::vector<Reply>& replies) {
+  std::map<wire::ResultCode, std::size_t> counted;
+  for (const Reply& reply : replies) ++counted[reply.header().result()];
+  return counted;
+}
+
+TEST_F(LoadTest, EightClientsThatAskForMoreThanCanBeDoneAreAllAnsweredOrToldSo) {
+  constexpr std::size_t kSent = 150;
+  start();
+  std::vector<std::unique_ptr<Corrector>> clients;
+  for (int k = 0; k < 8; ++k) {
+    clients.push_back(corrector("raw-" + std::to_string(k)));
+    ASSERT_TRUE(clients.back()->wait_until_matched());
+  }
+  for (std::size_t i = 0; i < kSent; ++i) {
+    for (auto& client : clients) client->send(corrections(500), static_cast<std::int64_t>(i));
+  }
+  std::size_t busy = 0;
+  for (auto& client : clients) {
+    const auto replies = client->wait_for_replies(kSent);
+    auto counted = codes(replies);
+    EXPECT_EQ(counted[wire::RESULT_OK] + counted[wire::RESULT_BUSY], kSent);
+    EXPECT_GE(counted[wire::RESULT_OK], 32U) << "one client was served, another not";
+    busy += counted[wire::RESULT_BUSY];
+    std::set<std::int64_t> numbers;
+    for (const auto& reply : replies) numbers.insert(reply.header().related_request_id().sequence_number());
+    EXPECT_EQ(numbers.size(), kSent) << "one was answered twice, another not at all";
+  }
+  EXPECT_GT(busy, 0U);
+}
+
+TEST_F(LoadTest, AnHonestClientAmongSixteenFloodersTakesTurnsWithThem) {
+  start();
+  std::vector<std::unique_ptr<Corrector>> flooders;
+  for (int k = 0; k < 16; ++k) {
+    flooders.push_back(corrector("flooder-" + std::to_string(k)));
+    ASSERT_TRUE(flooders.back()->wait_until_matched());
+  }
+  auto honest = corrector("honest");
+  ASSERT_TRUE(honest->wait_until_matched());
+  for (int i = 0; i < 60; ++i) {
+    for (auto& flooder : flooders) flooder->send(corrections(200), i);
+  }
+  const auto answered = [&] {
+    std::size_t all = 0;
+    for (auto& flooder : flooders) all += flooder->replies();
+    return all;
+  };
+  std::size_t before = answered();
+  std::size_t most = 0;
+  for (int i = 0; i < 5; ++i) {
+    honest->send(corrections(1), i);
+    ASSERT_EQ(honest->wait_for_replies(static_cast<std::size_t>(i) + 1).size(), static_cast<std::size_t>(i) + 1);
+    const std::size_t now = answered();
+    most = std::max(most, now - before);
+    before = now;
+  }
+  EXPECT_EQ(codes(honest->wait_for_replies(5))[wire::RESULT_OK], 5U);
+  EXPECT_LT(most, 16U * 60U / 4) << "it waited behind the requests of the others";
+}
+
+TEST_F(LoadTest, RepliesThatNobodyReadsCostNobodyElseAnything) {
+  start();
+  auto hostile = corrector("hostile");
+  auto honest = corrector("honest");
+  ASSERT_TRUE(hostile->wait_until_matched());
+  ASSERT_TRUE(honest->wait_until_matched());
+  constexpr std::int64_t kInvented = 40;
+  for (std::int64_t i = 0; i < kInvented; ++i) hostile->send_for(fmt::format("nobody-{}", i), corrections(1), i);
+  for (std::int64_t i = 0; i < 20; ++i) {
+    honest->send(corrections(1), i);
+    ASSERT_EQ(honest->wait_for_replies(static_cast<std::size_t>(i) + 1).size(), static_cast<std::size_t>(i) + 1);
+  }
+  hostile->send(corrections(1), kInvented);
+  EXPECT_EQ(hostile->wait_for_replies(1).size(), 1U) << "its own channel has not been taken away";
+}
+
+TEST_F(LoadTest, ARequestThatNamesAnotherClientsPartitionIsNotAnsweredThere) {
+  start();
+  auto victim = corrector("victim");
+  auto thief = corrector("thief");
+  ASSERT_TRUE(victim->wait_until_matched());
+  ASSERT_TRUE(thief->wait_until_matched());
+  thief->send_for("victim", corrections(3), 1);
+  thief->send(corrections(2), 2);
+  ASSERT_EQ(thief->wait_for_replies(1).size(), 1U);
+  victim->send(corrections(1), 1);
+  const auto replies = victim->wait_for_replies(1);
+  ASSERT_EQ(replies.size(), 1U);
+  EXPECT_EQ(replies[0].corrections().size(), 1U);
+}
+
+TEST_F(LoadTest, ARepeatOfARequestThatWaitsIsAnsweredFromTheSameWork) {
+  start();
+  auto client = corrector("raw-1");
+  ASSERT_TRUE(client->wait_until_matched());
+  for (std::int64_t i = 0; i < 5; ++i) client->send(corrections(wire::MAX_TARGETS / 2), i);
+  client->send(corrections(10), 5);
+  client->send(corrections(10), 5);
+  client->send(corrections(10), 5);
+  const auto replies = client->wait_for_replies(8);
+  ASSERT_EQ(replies.size(), 8U);
+  std::map<std::int64_t, std::size_t> times;
+  for (const auto& reply : replies) {
+    EXPECT_EQ(reply.header().result(), wire::RESULT_OK) << reply.header().message();
+    ++times[reply.header().related_request_id().sequence_number()];
+  }
+  EXPECT_EQ(times[5], 3U);
+}
+
+TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {
+  start();
+  using Manager = test::RawClient<wire::ManageModels>;
+  Manager slow(options_.domain, options_.port, "slow");
+  Manager other(options_.domain, options_.port, "other");
+  test::RawClient<wire::ReadModels> reader(options_.domain, options_.port, "reader");
+  ASSERT_TRUE(slow.wait_until_matched());
+  ASSERT_TRUE(other.wait_until_matched());
+  ASSERT_TRUE(reader.wait_until_matched());
+  wire::ManageModelsRequest import;
+  import.about().cell("cell-7");
+  import.change().expected_version(-1);
+  import.action(wire::MANAGE_IMPORT);
+  std::string text = "[";
+  for (int i = 0; i < 500000; ++i) text += "0.125,";
+  import.model_text(text + "1]");
+  constexpr std::size_t kImports = 12;
+  for (std::size_t i = 0; i < kImports; ++i) slow.send(import, static_cast<std::int64_t>(i));
+  wire::ReadModelsRequest list;
+  list.about().cell("cell-7");
+  reader.send(list, 1);
+  wire::ManageModelsRequest rollback;
+  rollback.about().cell("cell-8");
+  rollback.change().expected_version(-1);
+  rollback.action(wire::MANAGE_ROLLBACK);
+  other.send(rollback, 2);
+  ASSERT_EQ(reader.wait_for_replies(1).size(), 1U);
+  ASSERT_EQ(other.wait_for_replies(1).size(), 1U);
+  EXPECT_LT(slow.replies(), kImports) << "they waited behind the imports";
+  EXPECT_EQ(slow.wait_for_replies(kImports).size(), kImports);
+}
+
+class CrowdTest : public LoadTest {
+ protected:
+  static DdsOptions two_channels() {
+    DdsOptions options = test::test_dds_options();
+    options.max_clients = 2;
+    return options;
+  }
+  CrowdTest() : LoadTest(two_channels()) {}
+};
+
+TEST_F(CrowdTest, AClientThatWaitsToBeMatchedIsServedThoughThereAreTooMany) {
+  start();
+  std::vector<std::unique_ptr<Corrector>> clients;
+  for (const char* name : {"raw-1", "raw-2", "raw-3", "raw-4"}) {
+    clients.push_back(corrector(name));
+    ASSERT_TRUE(clients.back()->wait_until_matched()) << name << " waits for ever";
+    clients.back()->send(corrections(1), 1);
+    EXPECT_EQ(clients.back()->wait_for_replies(1).size(), 1U) << name;
+  }
+  for (auto& client : clients) {
+    ASSERT_TRUE(client->wait_until_matched()) << "lost its channel for ever";
+    client->send(corrections(1), 2);
+    EXPECT_EQ(client->wait_for_replies(2).size(), 2U);
+  }
+}
+
+}  // namespace
+}  // namespace trammel
