@@ -62,6 +62,7 @@ RoomLimits room_limits(const DdsOptions& options) {
 TurnLimits compute_limits(const DdsOptions& options) {
   TurnLimits limits;
   limits.workers = static_cast<std::size_t>(options.compute_workers);
+  limits.express_workers = 1;
   limits.client_requests = static_cast<std::size_t>(options.client_requests);
   limits.requests = static_cast<std::size_t>(options.queued_requests);
   limits.cell_share = options.cell_share;
@@ -72,6 +73,7 @@ TurnLimits compute_limits(const DdsOptions& options) {
 TurnLimits limits_of_reads(const DdsOptions& options) {
   TurnLimits limits = compute_limits(options);
   limits.workers = 4;
+  limits.express_workers = 0;
   limits.client_workers = 2;
   return limits;
 }
@@ -80,6 +82,7 @@ TurnLimits limits_of_reads(const DdsOptions& options) {
 TurnLimits limits_of_changes(const DdsOptions& options) {
   TurnLimits limits = compute_limits(options);
   limits.workers = 8;
+  limits.express_workers = 0;
   limits.client_workers = 4;
   limits.cell_workers = 1;
   return limits;

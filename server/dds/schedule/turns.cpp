@@ -94,19 +94,26 @@ bool Turns::may_run(const Entry& entry) const {
   return entry.state_ == Entry::State::kOpen && !entry.given_up_ && entry.next_ < entry.items_;
 }
 
-std::shared_ptr<Turns::Entry> Turns::workable(const Client& client) const {
+bool Turns::is_short(const Entry& entry) const {
+  constexpr std::size_t kFew = 4;  // items, of unknown cost
+  return entry.state_ == Entry::State::kWaits && entry.left_ <= limits_.portion &&
+         (entry.left_ > Cost(0) || entry.ask_.items <= kFew);
+}
+
+std::shared_ptr<Turns::Entry> Turns::workable(const Client& client, Which which) const {
   if (client.running >= limits_.client_workers) return nullptr;
-  const auto found =
-      std::find_if(client.entries.begin(), client.entries.end(), [this](const auto& entry) { return may_run(*entry); });
+  const auto found = std::find_if(client.entries.begin(), client.entries.end(), [&](const auto& entry) {
+    return may_run(*entry) && (which == Which::kAll || is_short(*entry));
+  });
   return found == client.entries.end() ? nullptr : *found;
 }
 
-std::optional<Turns::Portion> Turns::next(SteadyTime now) {
+std::optional<Turns::Portion> Turns::next(SteadyTime now, Which which) {
   Client* best = nullptr;
   std::shared_ptr<Entry> entry;
   for (auto& [name, client] : clients_) {
     if (best != nullptr && std::pair(client.had, client.turn) >= std::pair(best->had, best->turn)) continue;
-    if (auto work = workable(client)) {
+    if (auto work = workable(client, which)) {
       best = &client;
       entry = std::move(work);
     }
