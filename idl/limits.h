@@ -18,11 +18,12 @@ inline constexpr std::chrono::milliseconds kAnnouncement{200};
 inline constexpr std::chrono::milliseconds kStatusPeriod{1000};
 inline constexpr std::chrono::milliseconds kStatusLost{3500};
 
-/// Largest serialized samples, bytes; larger ones are dropped unread. A hostile length field in a sequence of
-/// structures can make a reader reserve a hundred times the size of the sample, so these samples have a lower limit.
-inline constexpr std::size_t kMaxComputeSample = 4u << 20;  ///< requests and replies of targets
-inline constexpr std::size_t kMaxTextSample = 32u << 20;    ///< batches and models
+/// Largest serialized samples, bytes.
+inline constexpr std::size_t kMaxComputeSample = 8u << 20;  ///< requests and replies of targets
+inline constexpr std::size_t kMaxTextSample = 32u << 20;    ///< batches, models, findings
 inline constexpr std::size_t kMaxStateSample = 1u << 20;
+/// Largest text of a file in a sample, bytes: the rest is for everything else.
+inline constexpr std::size_t kMaxText = kMaxTextSample - 65536;
 
 /// kRequestDepth requests wait at a server for each operation. kReplyDepth replies are kept for each client and
 /// operation: a client may have at most as many requests unanswered.

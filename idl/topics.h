@@ -7,12 +7,19 @@
 #include "idl/limits.h"
 #include "manage_modelsPubSubTypes.h"
 #include "predict_errorPubSubTypes.h"
+#include "read_modelsPubSubTypes.h"
+#include "release_batchesPubSubTypes.h"
 #include "statePubSubTypes.h"
 #include "trainingPubSubTypes.h"
 
-/// Every topic: its name, its type, its largest sample (bytes). An operation has the topics `<name>_Request` and
-/// `<name>_Reply`; a client reads the latter in its own partition only.
+/// Every topic: its name, its type, its largest sample (bytes). An operation has the topics `<name>_2_Request` and
+/// `<name>_2_Reply`, a state the topic `<name>_2`: the number is that of the contract (transport.h). A client reads
+/// replies in its own partition only. Permissions are given by topic: who may read (PredictError, CorrectTarget,
+/// ReadModels), submit (SubmitMeasurements, Diagnose, CheckHealth), change (Train, ManageModels), release
+/// (ReleaseBatches).
 namespace trammel::wire {
+
+using namespace v2;
 
 struct PredictError {
   using Request = PredictErrorRequestPubSubType;
@@ -36,7 +43,7 @@ struct Train {
   using Request = TrainRequestPubSubType;
   using Reply = TrainReplyPubSubType;
   static constexpr const char* kName = "Train";
-  static constexpr std::size_t kMaxSample = kMaxStateSample;
+  static constexpr std::size_t kMaxSample = kMaxTextSample;
 };
 struct Diagnose {
   using Request = DiagnoseRequestPubSubType;
@@ -44,11 +51,29 @@ struct Diagnose {
   static constexpr const char* kName = "Diagnose";
   static constexpr std::size_t kMaxSample = kMaxTextSample;
 };
+struct CheckHealth {
+  using Request = CheckHealthRequestPubSubType;
+  using Reply = CheckHealthReplyPubSubType;
+  static constexpr const char* kName = "CheckHealth";
+  static constexpr std::size_t kMaxSample = kMaxTextSample;
+};
+struct ReadModels {
+  using Request = ReadModelsRequestPubSubType;
+  using Reply = ReadModelsReplyPubSubType;
+  static constexpr const char* kName = "ReadModels";
+  static constexpr std::size_t kMaxSample = kMaxTextSample;
+};
 struct ManageModels {
   using Request = ManageModelsRequestPubSubType;
   using Reply = ManageModelsReplyPubSubType;
   static constexpr const char* kName = "ManageModels";
   static constexpr std::size_t kMaxSample = kMaxTextSample;
+};
+struct ReleaseBatches {
+  using Request = ReleaseBatchesRequestPubSubType;
+  using Reply = ReleaseBatchesReplyPubSubType;
+  static constexpr const char* kName = "ReleaseBatches";
+  static constexpr std::size_t kMaxSample = kMaxStateSample;
 };
 
 struct ModelStatusTopic {

@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/log/Log.hpp>
@@ -74,7 +75,8 @@ void set_call_history(Qos& qos, int depth) {
   qos.resource_limits().max_samples_per_instance = depth;
   qos.resource_limits().allocated_samples = 1;
   qos.data_sharing().off();
-  qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  // A sample's memory goes with it: histories that keep it would hold as many of the largest ones as they are deep.
+  qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
 }
 
 template <typename Qos>
@@ -198,8 +200,31 @@ dds::DataWriterQos service_status_writer_qos() {
   return qos;
 }
 
+Result<dds::Topic*> make_topic(dds::DomainParticipant& participant, const std::string& name, dds::TopicDataType* type,
+                               const std::string& type_name) {
+  if (!type_name.empty()) type->setName(type_name.c_str());
+  dds::TypeSupport support(type);
+  dds::Topic* topic = nullptr;
+  if (support.register_type(&participant) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+    topic = participant.create_topic(name, support.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+  }
+  if (topic == nullptr) return failure(ErrorCode::kInternal, "cannot create the topic {}", name);
+  return topic;
+}
+
+std::string topic_name(const char* name, const char* part) {
+  return fmt::format("{}_{}{}", name, CONTRACT_VERSION, part);
+}
+
 std::string participant_of(const rtps::GUID_t& guid) {
   return {reinterpret_cast<const char*>(guid.guidPrefix.value), rtps::GuidPrefix_t::size};
+}
+
+std::array<std::uint8_t, 16> octets_of(const rtps::GUID_t& guid) {
+  std::array<std::uint8_t, 16> octets{};
+  const auto rest = std::copy_n(guid.guidPrefix.value, rtps::GuidPrefix_t::size, octets.begin());
+  std::copy_n(guid.entityId.value, rtps::EntityId_t::size, rest);
+  return octets;
 }
 
 }  // namespace trammel::wire

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <cstdint>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
@@ -58,41 +60,45 @@ using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDelete
 /// because replicas write the same keys.
 [[nodiscard]] dds::DataWriterQos state_writer_qos();
 [[nodiscard]] dds::DataReaderQos state_reader_qos();
-/// TrainingProgress is volatile instead: earlier progress is asked for with MANAGE_JOB.
+/// TrainingProgress is volatile instead: earlier progress is asked for with READ_JOB.
 [[nodiscard]] dds::DataWriterQos progress_writer_qos();
 [[nodiscard]] dds::DataReaderQos progress_reader_qos();
 /// ServiceStatus is also written every kStatusPeriod, and its liveliness is lost after kStatusLost.
 [[nodiscard]] dds::DataWriterQos service_status_writer_qos();
 
-/// A topic of a type that survives hostile samples. Owned by the participant.
-template <typename PubSubType>
+/// A topic of this type, under the name that the type has itself or, if given, `type_name`. Owned by the participant.
 [[nodiscard]] Result<dds::Topic*> make_topic(dds::DomainParticipant& participant, const std::string& name,
-                                             std::size_t max_sample) {
-  dds::TypeSupport type(new SafeType<PubSubType>(max_sample));
-  dds::Topic* topic = nullptr;
-  if (type.register_type(&participant) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-    topic = participant.create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
-  }
-  if (topic == nullptr) return failure(ErrorCode::kInternal, "cannot create the topic {}", name);
-  return topic;
-}
+                                             dds::TopicDataType* type, const std::string& type_name = {});
+
+/// The name of a topic of this contract: `PredictError_2_Request`, `ServiceStatus_2`. `part`: `_Request`, `_Reply` or
+/// empty.
+[[nodiscard]] std::string topic_name(const char* name, const char* part = "");
 
 template <typename Operation>
 [[nodiscard]] Result<dds::Topic*> make_request_topic(dds::DomainParticipant& participant) {
-  return make_topic<typename Operation::Request>(participant, fmt::format("{}_Request", Operation::kName),
-                                                 Operation::kMaxSample);
+  return make_topic(participant, topic_name(Operation::kName, "_Request"),
+                    new SafeType<typename Operation::Request>(Operation::kMaxSample));
+}
+/// The same for the side that receives: its samples are Received. `unreadable` counts those that are dropped.
+template <typename Operation>
+[[nodiscard]] Result<dds::Topic*> make_received_topic(dds::DomainParticipant& participant,
+                                                      const std::shared_ptr<std::atomic<std::uint64_t>>& unreadable) {
+  return make_topic(participant, topic_name(Operation::kName, "_Request"),
+                    new ReceivedType<typename Operation::Request>(Operation::kMaxSample, unreadable));
 }
 template <typename Operation>
 [[nodiscard]] Result<dds::Topic*> make_reply_topic(dds::DomainParticipant& participant) {
-  return make_topic<typename Operation::Reply>(participant, fmt::format("{}_Reply", Operation::kName),
-                                               Operation::kMaxSample);
+  return make_topic(participant, topic_name(Operation::kName, "_Reply"),
+                    new SafeType<typename Operation::Reply>(Operation::kMaxSample));
 }
 template <typename State>
 [[nodiscard]] Result<dds::Topic*> make_state_topic(dds::DomainParticipant& participant) {
-  return make_topic<typename State::Type>(participant, State::kName, State::kMaxSample);
+  return make_topic(participant, topic_name(State::kName), new SafeType<typename State::Type>(State::kMaxSample));
 }
 
 /// The participant that an endpoint belongs to: its first 12 octets.
 [[nodiscard]] std::string participant_of(const eprosima::fastrtps::rtps::GUID_t& guid);
+/// As SampleIdentity::writer_guid has it.
+[[nodiscard]] std::array<std::uint8_t, 16> octets_of(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 }  // namespace trammel::wire

@@ -6,6 +6,7 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -51,9 +52,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (caller->reader_ == nullptr || caller->writer_ == nullptr) {
       return failure(ErrorCode::kInternal, "cannot create the endpoints of {}", Operation::kName);
     }
-    const auto& guid = caller->writer_->guid();
-    const auto rest = std::copy_n(guid.guidPrefix.value, guid.guidPrefix.size, caller->guid_.begin());
-    std::copy_n(guid.entityId.value, guid.entityId.size, rest);
+    caller->guid_ = wire::octets_of(caller->writer_->guid());
     return caller;
   }
 
@@ -63,7 +62,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
   /// Sends the request to a server whose reader and writer are matched. If that server leaves, or is silent for half of
-  /// the time, the request is sent once more with the same id. kUnreachable: no answer by `deadline`.
+  /// the time, the request is sent once more with the same id. While the server says that it is busy, the request is
+  /// sent again when it says. kUnreachable: no answer by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route, Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
     request.header().reply_partition(partition_);
@@ -76,9 +76,10 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
                      wire::kReplyDepth);
     }
     id.sequence_number(++last_sequence_);
+    request.header().trace_id(fmt::format("{}-{}", partition_.substr(partition_.size() - kTraceBytes), last_sequence_));
     waiting_.try_emplace(last_sequence_);
     lock.unlock();
-    auto answer = attempt_twice(request, route, deadline);
+    auto answer = attempt_until_done(request, route, deadline);
     lock.lock();
     waiting_.erase(id.sequence_number());
     room_.notify_one();
@@ -86,6 +87,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
  private:
+  static constexpr std::size_t kTraceBytes = 8;  // of the partition's name
+
   /// A call under way. An element of waiting_, guarded by the same mutex.
   struct Waiting {
     Condition changed;
@@ -94,6 +97,19 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
 
   Caller(wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, std::string partition, ServerWatch& watch)
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
+
+  Result<Reply> attempt_until_done(Request& request, const Route& route, Clock::time_point deadline) {
+    while (true) {
+      auto answer = attempt_twice(request, route, deadline);
+      if (!answer || answer->header().result() != wire::RESULT_BUSY) return answer;
+      const std::chrono::milliseconds wait(answer->header().retry_after_ms());
+      const auto again = Clock::now() + wait;
+      if (wait.count() == 0 || again >= deadline) return answer;
+      MutexLock lock(mutex_);
+      Waiting& waiting = waiting_.at(request.header().request_id().sequence_number());
+      waiting.changed.wait_until(lock, again, [&]() TRAMMEL_REQUIRES(mutex_) { return waiting.reply.has_value(); });
+    }
+  }
 
   Result<Reply> attempt_twice(Request& request, const Route& route, Clock::time_point deadline) {
     const auto now = Clock::now();
@@ -108,6 +124,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       if (!server) continue;
       asked = server->id();
       request.header().server(asked);
+      request.header().deadline_ms(milliseconds_until(deadline));
       if (!writer_->write(&request)) {
         return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
       }
@@ -116,11 +133,18 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       waiting.changed.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
         return waiting.reply || !readers_.contains(server->participant);
       });
-      if (waiting.reply) return std::move(*waiting.reply);
+      if (waiting.reply) return *std::exchange(waiting.reply, std::nullopt);
     }
+    if (const auto other = watch_.other_contract(); asked.empty() && other) return tl::make_unexpected(*other);
     return asked.empty()
                ? failure(ErrorCode::kUnreachable, "{}: no server found in time", Operation::kName)
                : failure(ErrorCode::kUnreachable, "{}: server {} did not answer in time", Operation::kName, asked);
+  }
+
+  /// At least one: zero would be no deadline.
+  static std::uint32_t milliseconds_until(Clock::time_point deadline) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(left, 1, std::numeric_limits<std::uint32_t>::max()));
   }
 
   [[nodiscard]] bool reachable(const std::string& participant, bool and_back) const {

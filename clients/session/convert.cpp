@@ -1,8 +1,7 @@
 #include "clients/session/convert.h"
 
-#include <nlohmann/json.hpp>
-
-#include "server/base/json_guard.h"
+#include <cmath>
+#include <limits>
 
 namespace trammel::client {
 namespace {
@@ -55,8 +54,57 @@ const char* text(wire::JobStage stage) {
       return "done";
     case wire::JOB_FAILED:
       return "failed";
+    case wire::JOB_CANCELLED:
+      return "cancelled";
   }
   return "failed";
+}
+
+const char* text(wire::JobVerdict verdict) {
+  switch (verdict) {
+    case wire::VERDICT_NONE:
+      return "none";
+    case wire::VERDICT_IN_FORCE:
+      return "in_force";
+    case wire::VERDICT_NOT_IN_FORCE:
+      return "not_in_force";
+    case wire::VERDICT_UNDECIDED:
+      return "undecided";
+    case wire::VERDICT_NO_MODEL:
+      return "no_model";
+    case wire::VERDICT_QUARANTINED:
+      return "quarantined";
+    case wire::VERDICT_FAILED:
+      return "failed";
+    case wire::VERDICT_CANCELLED:
+      return "cancelled";
+  }
+  return "none";
+}
+
+const char* text(wire::JobKind kind) {
+  switch (kind) {
+    case wire::JOB_TRAINING_OF_BATCHES:
+      return "train";
+    case wire::JOB_DIAGNOSIS:
+      return "diagnose";
+    case wire::JOB_CHECK:
+      return "check";
+  }
+  return "train";
+}
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+std::optional<double> if_known(double value) { return std::isnan(value) ? std::nullopt : std::optional(value); }
+std::optional<std::int64_t> if_known(std::int64_t unix_s) { return unix_s < 0 ? std::nullopt : std::optional(unix_s); }
+
+wire::Approach to_wire(const Approach& approach) {
+  wire::Approach result;
+  result.directions().assign(approach.directions.begin(), approach.directions.end());
+  result.temperature_c(approach.temperature_c.value_or(kUnknown));
+  result.time_s(approach.time_s.value_or(kUnknown));
+  return result;
 }
 
 ErrorCode from_wire(wire::ResultCode code) {
@@ -67,6 +115,8 @@ ErrorCode from_wire(wire::ResultCode code) {
       return ErrorCode::kUsage;
     case wire::RESULT_REFUSED:
     case wire::RESULT_WRONG_CONTRACT:
+    case wire::RESULT_WRONG_IDENTITY:
+    case wire::RESULT_MALFORMED:
       return ErrorCode::kRefused;
     case wire::RESULT_NOT_FOUND:
       return ErrorCode::kNotFound;
@@ -76,6 +126,7 @@ ErrorCode from_wire(wire::ResultCode code) {
       return ErrorCode::kTooLarge;
     case wire::RESULT_OUT_OF_RESOURCES:
     case wire::RESULT_BUSY:
+    case wire::RESULT_DEADLINE_MISSED:
       return ErrorCode::kBusy;
     case wire::RESULT_OK:
     case wire::RESULT_UNKNOWN_EXCEPTION:
@@ -97,6 +148,13 @@ wire::Context to_wire(const CallContext& context) {
   return result;
 }
 
+wire::CommandedJoints to_wire(const CommandedJoints& pose) {
+  wire::CommandedJoints result;
+  result.joints_rad(pose.q_rad);
+  result.approach(to_wire(pose.approach));
+  return result;
+}
+
 wire::Target to_wire(const TargetMm& target) {
   wire::Target result;
   if (target.joint_target) {
@@ -107,6 +165,7 @@ wire::Target to_wire(const TargetMm& target) {
   result.pose(to_wire(target.pose));
   result.joints_rad(target.seed_rad);
   result.conf(target.conf.value_or(0));
+  result.approach(to_wire(target.approach));
   return result;
 }
 
@@ -119,9 +178,12 @@ ModelInfo from_wire(const wire::ModelInfo& info) {
   result.batch_id = info.batch_id();
   result.version = info.version();
   result.trained_at_unix_s = info.trained_at_unix_s();
-  result.data_age_s = info.data_age_s();
+  result.batch_hash = info.batch_hash();
+  result.training_age_s = info.training_age_s();
+  result.measured_at_unix_s = if_known(info.measured_at_unix_s());
+  result.data_age_s = if_known(info.data_age_s());
   result.training_poses = info.training_poses();
-  result.validation_rms_mm = info.validation_rms_mm();
+  result.validation_rms_mm = if_known(info.validation_rms_mm());
   result.in_force = info.in_force();
   return result;
 }
@@ -137,6 +199,19 @@ PredictedError from_wire(const wire::PredictedError& prediction) {
   result.sy_mm = prediction.sy_mm();
   result.sz_mm = prediction.sz_mm();
   result.in_domain = prediction.in_domain();
+  result.rx_rad = prediction.rx_rad();
+  result.ry_rad = prediction.ry_rad();
+  result.rz_rad = prediction.rz_rad();
+  result.slx_mm = prediction.slx_mm();
+  result.sly_mm = prediction.sly_mm();
+  result.slz_mm = prediction.slz_mm();
+  result.cxy_mm2 = prediction.cxy_mm2();
+  result.cxz_mm2 = prediction.cxz_mm2();
+  result.cyz_mm2 = prediction.cyz_mm2();
+  result.srx_rad = prediction.srx_rad();
+  result.sry_rad = prediction.sry_rad();
+  result.srz_rad = prediction.srz_rad();
+  result.bias_share = prediction.bias_share();
   return result;
 }
 
@@ -150,11 +225,41 @@ CorrectedTarget from_wire(const wire::CorrectedTarget& correction) {
   result.sigma_mm = correction.sigma_mm();
   result.iterations = correction.iterations();
   result.message = correction.message();
+  result.sigma_measured_mm = correction.sigma_measured_mm();
+  result.turn_before_rad = correction.turn_before_rad();
+  result.turn_after_rad = correction.turn_after_rad();
   return result;
 }
 
-JobStatus from_wire(const wire::Job& job) {
-  return {job.number(), job.cell(), text(job.stage()), job.what(), job.share(), job.model_version(), job.in_force()};
+JobStatus status_of(const wire::Job& job) {
+  JobStatus status{job.number(), job.cell(),          text(job.stage()), job.what(),
+                   job.share(),  job.model_version(), job.in_force()};
+  const wire::JobOutcome& outcome = job.outcome();
+  status.verdict = text(outcome.verdict());
+  status.judged_on = outcome.judged_on();
+  status.before_mm = if_known(outcome.before_mm());
+  status.after_mm = if_known(outcome.after_mm());
+  status.limit_mm = if_known(outcome.limit_mm());
+  status.u95_mm = if_known(outcome.u95_mm());
+  status.why = outcome.why();
+  status.next = outcome.next();
+  return status;
+}
+
+DatedJob from_wire(const wire::Job& job, const std::string& server) {
+  DatedJob dated;
+  dated.status = status_of(job);
+  dated.server = server;
+  dated.kind = text(job.kind());
+  dated.batches = job.batch_ids();
+  dated.created_unix_s = job.created_unix_s();
+  dated.started_unix_s = if_known(job.started_unix_s());
+  dated.finished_unix_s = if_known(job.finished_unix_s());
+  return dated;
+}
+
+QuarantinedBatch from_wire(const wire::BatchInfo& batch) {
+  return {batch.cell(), batch.id(), batch.quarantine(), batch.poses()};
 }
 
 ServerStatus from_wire(const wire::ServiceStatus& status) {
@@ -165,72 +270,39 @@ ServerStatus from_wire(const wire::ServiceStatus& status) {
   result.cells = status.cells();
   result.requests = status.requests();
   result.refused = status.refused();
+  result.shed = status.shed();
+  result.unheard = status.unheard();
+  result.misdirected = status.misdirected();
+  result.unreadable = status.unreadable();
   result.uptime_s = status.uptime_s();
   result.queued_jobs = status.queued_jobs();
   return result;
 }
 
-Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json) {
-  static const std::string kWhat = "the server's list of batches in quarantine";
-  if (const Status small = check_json_limits(json, kWhat); !small) return tl::make_unexpected(small.error());
-  const auto list = nlohmann::json::parse(json, nullptr, false);
-  if (!list.is_array()) return failure(ErrorCode::kInternal, "{} is none", kWhat);
-  std::vector<QuarantinedBatch> batches;
-  try {
-    for (const auto& one : list) {
-      batches.push_back(
-          {one.value("cell", ""), one.value("batch", ""), one.value("reason", ""), one.value("poses", 0)});
-    }
-  } catch (const nlohmann::json::exception& error) {
-    return failure(ErrorCode::kInternal, "{} is none: {}", kWhat, error.what());
-  }
-  return batches;
-}
-
-std::string release_text(const std::vector<std::string>& batch_ids, const std::string& level, const std::string& bias) {
-  return nlohmann::ordered_json({{"batches", batch_ids}, {"level", level}, {"bias", bias}})
-      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
 namespace {
 
-DatedJob job_from(const nlohmann::json& one, const std::string& server) {
-  const auto time = [&](const char* key) -> std::optional<std::int64_t> {
-    if (!one.contains(key) || !one[key].is_number_integer()) return std::nullopt;
-    return one[key].get<std::int64_t>();
-  };
-  DatedJob job;
-  job.server = server;
-  job.kind = one.value("kind", "");
-  job.batches = one.value("batches", std::vector<std::string>());
-  job.status = {one.value("job", std::int64_t{0}),
-                one.value("cell", ""),
-                one.value("stage", ""),
-                one.value("what", ""),
-                one.value("share", 0.0),
-                one.value("model_version", 0),
-                one.value("in_force", false)};
-  job.created_unix_s = time("created_unix_s").value_or(0);
-  job.started_unix_s = time("started_unix_s");
-  job.finished_unix_s = time("finished_unix_s");
-  return job;
+Error error_of(const wire::Problem& problem) {
+  Error error;
+  error.code = from_wire(problem.code());
+  error.message = problem.what();
+  error.file = problem.file();
+  if (problem.row() > 0) error.row = static_cast<long>(problem.row());
+  error.field = problem.field();
+  if (problem.has_value()) error.value = problem.value();
+  if (problem.has_limit()) error.limit = problem.limit();
+  error.text = problem.text();
+  error.next = problem.next();
+  return error;
 }
 
 }  // namespace
 
-Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::string& server) {
-  try {
-    std::vector<DatedJob> jobs;
-    const auto list = nlohmann::json::parse(json);
-    for (const auto& one : list.at("jobs")) jobs.push_back(job_from(one, server));
-    return jobs;
-  } catch (const nlohmann::json::exception& error) {
-    return failure(ErrorCode::kInternal, "the list of jobs of server {} is none: {}", server, error.what());
-  }
-}
-
 Error error_of(const wire::ReplyHeader& header) {
-  return failure(from_wire(header.result()), "{}", header.message()).value();
+  std::vector<Error> problems;
+  for (const wire::Problem& problem : header.problems()) problems.push_back(error_of(problem));
+  if (problems.empty()) return failure(from_wire(header.result()), "{}", header.message()).value();
+  problems.front().code = from_wire(header.result());
+  return together(std::move(problems));
 }
 
 }  // namespace trammel::client

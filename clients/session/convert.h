@@ -10,20 +10,16 @@
 namespace trammel::client {
 
 [[nodiscard]] wire::Context to_wire(const CallContext& context);
+[[nodiscard]] wire::CommandedJoints to_wire(const CommandedJoints& pose);
 [[nodiscard]] wire::Target to_wire(const TargetMm& target);
 
 [[nodiscard]] ModelInfo from_wire(const wire::ModelInfo& info);
 [[nodiscard]] PredictedError from_wire(const wire::PredictedError& prediction);
 [[nodiscard]] CorrectedTarget from_wire(const wire::CorrectedTarget& correction);
-[[nodiscard]] JobStatus from_wire(const wire::Job& job);
+[[nodiscard]] JobStatus status_of(const wire::Job& job);
 [[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
-/// Parses the answer to MANAGE_QUARANTINE. Refuses a text that is no such list.
-[[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine_from(const std::string& json);
-/// The text of a MANAGE_RELEASE_AND_TRAIN request.
-[[nodiscard]] std::string release_text(const std::vector<std::string>& batch_ids, const std::string& level,
-                                       const std::string& bias);
-/// Parses the answer to MANAGE_JOBS. Refuses a text that is no such list.
-[[nodiscard]] Result<std::vector<DatedJob>> jobs_from(const std::string& json, const std::string& server);
+[[nodiscard]] DatedJob from_wire(const wire::Job& job, const std::string& server);
+[[nodiscard]] QuarantinedBatch from_wire(const wire::BatchInfo& batch);
 /// The error in a reply that is not RESULT_OK.
 [[nodiscard]] Error error_of(const wire::ReplyHeader& header);
 

@@ -24,6 +24,13 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
                                                          double) { self->on_status(sample, writer); });
   if (!status) return tl::make_unexpected(status.error());
   watch->status_reader_ = std::move(*status);
+  auto old_status = StateReader<wire::OldServiceStatusTopic>::open(
+      wire::make_old_status_topic(participant), subscriber, wire::state_reader_qos(),
+      [self](const contract_1::ServiceStatus* sample, const std::string& writer, double) {
+        self->on_old_status(sample, writer);
+      });
+  if (!old_status) return tl::make_unexpected(old_status.error());
+  watch->old_status_reader_ = std::move(*old_status);
   auto model =
       StateReader<wire::ModelStatusTopic>::open(participant, subscriber, wire::state_reader_qos(),
                                                 [self](const wire::ModelStatus* sample, const std::string& writer,
@@ -38,12 +45,34 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
   return watch;
 }
 
+std::optional<Error> ServerWatch::other_contract() const {
+  const MutexLock lock(mutex_);
+  if (others_.empty() || !servers_.empty()) return std::nullopt;
+  const OtherServer& other = others_.begin()->second;
+  return refused("server {} ({}) speaks contract {} of the wire, this program speaks contract {}", other.id,
+                 other.program_version, other.contract, wire::CONTRACT_VERSION)
+      .of("contract_version")
+      .beyond(other.contract, wire::CONTRACT_VERSION)
+      .next(other.contract < wire::CONTRACT_VERSION ? "update the server" : "update this program")
+      .value();
+}
+
+bool ServerWatch::in_vain() const {
+  return servers_.empty() && !others_.empty() && Clock::now() - *others_since_ > wire::kStatusPeriod;
+}
+
+template <typename Found>
+void ServerWatch::wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found) {
+  // The others' status comes every period and wakes this up.
+  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return found() || in_vain(); });
+}
+
 std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
                                                         Clock::time_point deadline,
                                                         const std::function<bool(const KnownServer&)>& reachable) {
   MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
-  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
+  wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
     chosen = choose(cell, avoid, reachable);
     return chosen != nullptr;
   });
@@ -73,7 +102,7 @@ void ServerWatch::wake() {
 
 std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock::time_point deadline) {
   MutexLock lock(mutex_);
-  changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
+  wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
   changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
                       [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count; });
   std::vector<KnownServer> servers;
@@ -97,7 +126,9 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   std::map<std::string, wire::ModelInfo> newest;
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
-    model.data_age_s(model.data_age_s() + std::max(0.0, unix_time_s() - known.written_unix_s));
+    const double since_s = std::max(0.0, unix_time_s() - known.written_unix_s);
+    model.data_age_s(model.data_age_s() + since_s);
+    model.training_age_s(model.training_age_s() + since_s);
     const auto [entry, added] = newest.emplace(key.second, model);
     if (!added && model.version() > entry->second.version()) entry->second = model;
   }
@@ -119,6 +150,20 @@ std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& serve
     return news.has_value();
   });
   return news;
+}
+
+void ServerWatch::on_old_status(const contract_1::ServiceStatus* status, const std::string& participant) {
+  {
+    const MutexLock lock(mutex_);
+    if (status == nullptr) {
+      others_.erase(participant);
+    } else if (status->contract_version() != wire::CONTRACT_VERSION) {
+      others_[participant] = {status->server().to_string(), status->program_version(), status->contract_version()};
+      if (!others_since_) others_since_ = Clock::now();
+    }
+    if (others_.empty()) others_since_.reset();
+  }
+  changed_.notify_all();
 }
 
 void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant) {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/contract_1.h"
 #include "idl/transport.h"
 #include "server/base/mutex.h"
 
@@ -31,7 +32,12 @@ class StateReader final : private wire::dds::DataReaderListener {
                                                                  wire::dds::Subscriber& subscriber,
                                                                  const wire::dds::DataReaderQos& qos,
                                                                  Listener listener) {
-    const auto topic = wire::make_state_topic<State>(participant);
+    return open(wire::make_state_topic<State>(participant), subscriber, qos, std::move(listener));
+  }
+  [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(const Result<wire::dds::Topic*>& topic,
+                                                                 wire::dds::Subscriber& subscriber,
+                                                                 const wire::dds::DataReaderQos& qos,
+                                                                 Listener listener) {
     if (!topic) return tl::make_unexpected(topic.error());
     std::unique_ptr<StateReader> result(new StateReader(subscriber, std::move(listener)));
     const auto mask = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched();
@@ -78,6 +84,12 @@ struct KnownServer {
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
 
+/// A server of another contract.
+struct OtherServer {
+  std::string id, program_version;
+  std::uint32_t contract = 0;
+};
+
 /// A model in force, and when a server described it so.
 struct KnownModel {
   wire::ModelInfo model;
@@ -91,10 +103,13 @@ class ServerWatch {
                                                                  wire::dds::Subscriber& subscriber);
 
   /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
-  /// status lately, then one that is not `avoid`. Waits until `deadline` for the first server.
+  /// status lately, then one that is not `avoid`. Waits until `deadline` for the first server, less long where all that
+  /// are there speak another contract.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
                                                            Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
+  /// Why no server is found, where the only ones that are there speak another contract than this program.
+  [[nodiscard]] std::optional<Error> other_contract() const;
   /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 
@@ -112,6 +127,12 @@ class ServerWatch {
 
  private:
   ServerWatch() = default;
+  void on_old_status(const contract_1::ServiceStatus* status, const std::string& participant);
+  /// Whether waiting for a server is in vain: those that are there speak another contract, and have been for a while.
+  [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
+  /// Waits until `found`, and gives up at `deadline` or when it is in vain.
+  template <typename Found>
+  void wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found) TRAMMEL_REQUIRES(mutex_);
   void on_status(const wire::ServiceStatus* status, const std::string& participant);
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
   void on_progress(const wire::TrainingProgress* progress);
@@ -121,8 +142,10 @@ class ServerWatch {
   /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
-  Mutex mutex_;
+  mutable Mutex mutex_;
   Condition changed_;
+  std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
+  std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell
@@ -130,6 +153,7 @@ class ServerWatch {
       TRAMMEL_GUARDED_BY(mutex_);  // by number, then by server
   std::uint64_t progress_count_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<StateReader<wire::ServiceStatusTopic>> status_reader_;
+  std::unique_ptr<StateReader<wire::OldServiceStatusTopic>> old_status_reader_;
   std::unique_ptr<StateReader<wire::ModelStatusTopic>> model_reader_;
   std::unique_ptr<StateReader<wire::TrainingProgressTopic>> progress_reader_;
 };

@@ -9,7 +9,6 @@
 #include "clients/session/parts.h"
 #include "clients/session/server_watch.h"
 #include "idl/limits.h"
-#include "idl/manage_text.h"
 
 namespace trammel::client {
 namespace {
@@ -18,13 +17,20 @@ namespace {
 /// is far below.
 constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
-/// Room for everything but the text in the largest sample.
-constexpr std::size_t kMaxText = wire::kMaxTextSample - 65536;
 
 /// A unique name, also across hosts: 128 random bits.
-std::string make_partition() {
+std::string make_name(const char* what) {
   std::random_device random;
-  return fmt::format("client-{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
+  return fmt::format("{}-{:08x}{:08x}{:08x}{:08x}", what, random(), random(), random(), random());
+}
+
+std::string change_id(const ChangeOptions& options) { return options.id.empty() ? make_name("change") : options.id; }
+
+wire::Change to_wire(const ChangeOptions& options) {
+  wire::Change change;
+  change.id(change_id(options));
+  change.expected_version(options.expected_version.value_or(-1));
+  return change;
 }
 
 /// Refuses a text with a NUL: strings on the wire end there, and the rest would be lost silently.
@@ -33,13 +39,13 @@ Status check_text(const std::string& what, const std::string& text) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(nul), '\n');
     return refused("a NUL byte, not text").in(what).at_row(line);
   }
-  if (text.size() <= kMaxText) return {};
-  return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), kMaxText)
+  if (text.size() <= wire::kMaxText) return {};
+  return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), wire::kMaxText)
       .in(what)
-      .beyond(text.size(), kMaxText);
+      .beyond(text.size(), wire::kMaxText);
 }
 
-bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed"; }
+bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled"; }
 
 template <typename Caller>
 Status open_caller(std::unique_ptr<Caller>& caller, wire::dds::DomainParticipant& participant,
@@ -63,7 +69,9 @@ struct Session::Participant {
   std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
   std::unique_ptr<Caller<wire::Train>> train;
   std::unique_ptr<Caller<wire::Diagnose>> diagnose;
+  std::unique_ptr<Caller<wire::ReadModels>> read_models;
   std::unique_ptr<Caller<wire::ManageModels>> manage_models;
+  std::unique_ptr<Caller<wire::ReleaseBatches>> release_batches;
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
@@ -89,26 +97,66 @@ struct Session::Participant {
     return reply;
   }
 
-  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageModelsRequest request) {
+  [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action,
+                                                       const ChangeOptions& change,
+                                                       wire::ManageModelsRequest request = {}) {
     request.about().cell(cell);
-    const bool looks_only = request.action() == wire::MANAGE_LIST || request.action() == wire::MANAGE_EXPORT;
-    return call<wire::ManageModels>(*manage_models, std::move(request), {cell, {}, !looks_only});
+    request.action(action);
+    request.change(to_wire(change));
+    return call<wire::ManageModels>(*manage_models, std::move(request), {cell, {}, true});
   }
 
-  /// What `server` (empty: any) knows of the job.
-  [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number) {
-    wire::ManageModelsRequest request;
-    request.action(wire::MANAGE_JOB);
-    request.job(number);
-    auto reply = call<wire::ManageModels>(*manage_models, std::move(request), {{}, server, false});
+  [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
+                                             const ChangeOptions& change, wire::ReleaseBatchesRequest request) {
+    request.about().cell(cell);
+    request.batch_ids(batch_ids);
+    request.change(to_wire(change));
+    const auto reply = call<wire::ReleaseBatches>(*release_batches, std::move(request), {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
 
+  /// From `server`; empty: any.
+  [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell, const std::string& server,
+                                                   wire::ReadKind what, wire::ReadModelsRequest request = {}) {
+    request.about().cell(cell);
+    request.what(what);
+    return call<wire::ReadModels>(*read_models, std::move(request), {cell, server, false});
+  }
+
+  /// From every server.
+  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what) {
+    const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
+    if (known.empty()) return tl::make_unexpected(no_server());
+    std::vector<wire::ReadModelsReply> replies;
+    for (const KnownServer& server : known) {
+      auto reply = read(cell, server.id(), what);
+      if (!reply) return tl::make_unexpected(reply.error());
+      replies.push_back(std::move(*reply));
+    }
+    return replies;
+  }
+
+  [[nodiscard]] Error no_server() const {
+    if (auto other = watch->other_contract()) return *other;
+    return failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value();
+  }
+
+  /// What `server` (empty: any) knows of the job.
+  [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number) {
+    wire::ReadModelsRequest request;
+    request.job(number);
+    auto reply = read({}, server, wire::READ_JOB, std::move(request));
+    if (!reply) return tl::make_unexpected(reply.error());
+    if (reply->jobs().size() != 1) return failure(ErrorCode::kInternal, "server {} answered no job", server);
+    return reply->jobs().front();
+  }
+
   /// The server that has the job, and its present state.
   [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
-    Error last = failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value();
-    for (const KnownServer& server : watch->wait_for_servers(options.server_ports.size(), deadline())) {
+    const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
+    Error last = no_server();
+    for (const KnownServer& server : known) {
       auto found = job(server.id(), number);
       if (found) return std::pair(server.id(), std::move(*found));
       last = found.error();
@@ -149,7 +197,7 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
   if (!participant) return tl::make_unexpected(participant.error());
   inside->participant = std::move(*participant);
 
-  const std::string partition = make_partition();
+  const std::string partition = make_name("client");
   wire::dds::Publisher* requests = inside->participant->create_publisher(wire::publisher_qos({}));
   wire::dds::Subscriber* replies = inside->participant->create_subscriber(wire::subscriber_qos(partition));
   wire::dds::Subscriber* states = inside->participant->create_subscriber(wire::subscriber_qos({}));
@@ -166,8 +214,9 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
      ...);
     return opened;
   };
-  const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
-                                 inside->train, inside->diagnose, inside->manage_models);
+  const Status opened =
+      open_all(inside->predict_error, inside->correct_target, inside->submit_measurements, inside->train,
+               inside->diagnose, inside->read_models, inside->manage_models, inside->release_batches);
   if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
@@ -179,9 +228,21 @@ Session::~Session() = default;
 Result<Answer<PredictedError>> Session::predict_error(const CallContext& context,
                                                       const std::vector<std::vector<double>>& joints_rad,
                                                       const ShareListener& progress) {
+  std::vector<CommandedJoints> poses;
+  poses.reserve(joints_rad.size());
+  for (const auto& q_rad : joints_rad) poses.push_back({q_rad});
+  return predict_error_at(context, poses, progress);
+}
+
+Result<Answer<PredictedError>> Session::predict_error_at(const CallContext& context,
+                                                         const std::vector<CommandedJoints>& poses,
+                                                         const ShareListener& progress) {
+  std::vector<wire::CommandedJoints> items;
+  items.reserve(poses.size());
+  for (const CommandedJoints& pose : poses) items.push_back(to_wire(pose));
   return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      *participant_->predict_error, context, joints_rad, progress,
-      [](wire::PredictErrorRequest & request) -> auto& { return request.joints_rad(); },
+      *participant_->predict_error, context, items, progress,
+      [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
       [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
 }
 
@@ -201,6 +262,7 @@ Result<std::int64_t> Session::submit_measurements(const std::string& cell, const
                                                   const std::string& csv) {
   if (const Status fits = check_text("batch " + batch_id, csv); !fits) return tl::make_unexpected(fits.error());
   wire::SubmitMeasurementsRequest request;
+  request.change_id(make_name("change"));
   request.about().cell(cell);
   request.batch_id(batch_id);
   request.csv(csv);
@@ -211,9 +273,10 @@ Result<std::int64_t> Session::submit_measurements(const std::string& cell, const
 }
 
 Result<std::int64_t> Session::train(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                    const std::string& level, const std::string& bias) {
+                                    const std::string& level, const std::string& bias, const ChangeOptions& change) {
   wire::TrainRequest request;
   request.about().cell(cell);
+  request.change(to_wire(change));
   request.batch_ids(batch_ids);
   request.level(level);
   request.bias(bias);
@@ -222,15 +285,37 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   return reply->job();
 }
 
+namespace {
+
+wire::TrainRequest training_of_diagnosis(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                         const ChangeOptions& change) {
+  wire::TrainRequest request;
+  request.about().cell(cell);
+  request.change(to_wire(change));
+  request.kind(wire::TRAIN_DIAGNOSED);
+  if (!batch_id.empty()) request.batch_ids({batch_id});
+  request.csv(csv);
+  return request;
+}
+
+}  // namespace
+
 Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id, const std::string& csv,
-                                       bool apply) {
+                                       bool apply, const ChangeOptions& change) {
   if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  const Route route{cell, {}, true};
+  if (apply) {
+    const auto reply = participant_->call<wire::Train>(*participant_->train,
+                                                       training_of_diagnosis(cell, batch_id, csv, change), route);
+    if (!reply) return tl::make_unexpected(reply.error());
+    return reply->job();
+  }
   wire::DiagnoseRequest request;
   request.about().cell(cell);
+  request.change_id(change_id(change));
   request.batch_id(batch_id);
   request.csv(csv);
-  request.apply(apply);
-  const auto reply = participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), {cell, {}, true});
+  const auto reply = participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), route);
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -238,94 +323,83 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
 Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
-  wire::DiagnoseRequest request;
-  request.about().cell(cell);
+  wire::ReadModelsRequest request;
   request.job(job);
   request.page(page);
-  auto reply =
-      participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), {cell, found->first, false});
+  auto reply = participant_->read(cell, found->first, wire::READ_FINDINGS, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
-  return DiagnosisAnswer{std::move(reply->findings_json()), std::move(reply->page_html()), from_wire(reply->model())};
+  return DiagnosisAnswer{std::move(reply->text()), std::move(reply->page_html()), from_wire(reply->in_force())};
 }
 
 Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cell) {
-  const auto known = servers();
-  if (!known) return tl::make_unexpected(known.error());
+  const auto replies = participant_->read_all(cell, wire::READ_QUARANTINE);
+  if (!replies) return tl::make_unexpected(replies.error());
   std::vector<QuarantinedBatch> batches;
-  for (const ServerStatus& server : *known) {
-    wire::ManageModelsRequest request;
-    request.about().cell(cell);
-    request.action(wire::MANAGE_QUARANTINE);
-    const auto reply = participant_->call<wire::ManageModels>(*participant_->manage_models, std::move(request),
-                                                              {cell, server.server_id, false});
-    if (!reply) return tl::make_unexpected(reply.error());
-    auto listed = quarantine_from(reply->text());
-    if (!listed) return listed;
-    batches.insert(batches.end(), listed->begin(), listed->end());
+  for (const wire::ReadModelsReply& reply : *replies) {
+    for (const wire::BatchInfo& batch : reply.batches()) batches.push_back(from_wire(batch));
   }
   return batches;
 }
 
-Status Session::release(const std::string& cell, const std::string& batch_id) {
-  const auto reply = participant_->manage(cell, wire::release_of_batch(batch_id));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return {};
+Status Session::release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
+  return participant_->release(cell, {batch_id}, change, {}).map([](std::int64_t) {});
 }
 
 Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                                const std::string& level, const std::string& bias) {
-  const auto reply = participant_->manage(cell, wire::release_and_train_of(release_text(batch_ids, level, bias)));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return reply->job().number();
+                                                const std::string& level, const std::string& bias,
+                                                const ChangeOptions& change) {
+  wire::ReleaseBatchesRequest request;
+  request.action(wire::RELEASE_AND_TRAIN);
+  request.level(level);
+  request.bias(bias);
+  return participant_->release(cell, batch_ids, change, std::move(request));
 }
 
 Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
-  const auto known = servers();
-  if (!known) return tl::make_unexpected(known.error());
+  const auto replies = participant_->read_all(cell, wire::READ_JOBS);
+  if (!replies) return tl::make_unexpected(replies.error());
   std::vector<DatedJob> jobs;
-  for (const ServerStatus& server : *known) {
-    wire::ManageModelsRequest request;
-    request.about().cell(cell);
-    request.action(wire::MANAGE_JOBS);
-    const auto reply = participant_->call<wire::ManageModels>(*participant_->manage_models, std::move(request),
-                                                              {cell, server.server_id, false});
-    if (!reply) return tl::make_unexpected(reply.error());
-    auto listed = jobs_from(reply->text(), server.server_id);
-    if (!listed) return listed;
-    jobs.insert(jobs.end(), listed->begin(), listed->end());
+  for (const wire::ReadModelsReply& reply : *replies) {
+    for (const wire::Job& job : reply.jobs()) jobs.push_back(from_wire(job, reply.header().server().to_string()));
   }
   return jobs;
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
-  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_LIST));
+  const auto reply = participant_->read(cell, {}, wire::READ_MODELS);
   if (!reply) return tl::make_unexpected(reply.error());
   std::vector<ModelInfo> models;
   for (const wire::ModelInfo& model : reply->models()) models.push_back(from_wire(model));
   return models;
 }
 
-Result<int> Session::activate(const std::string& cell, int version) {
-  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_ACTIVATE, version));
+Result<int> Session::activate(const std::string& cell, int version, const ChangeOptions& change) {
+  wire::ManageModelsRequest request;
+  request.version(version);
+  const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }
 
-Result<int> Session::rollback(const std::string& cell) {
-  const auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_ROLLBACK));
+Result<int> Session::rollback(const std::string& cell, const ChangeOptions& change) {
+  const auto reply = participant_->manage(cell, wire::MANAGE_ROLLBACK, change);
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }
 
 Result<std::string> Session::export_model(const std::string& cell, int version) {
-  auto reply = participant_->manage(cell, wire::manage_version(wire::MANAGE_EXPORT, version));
+  wire::ReadModelsRequest request;
+  request.version(version);
+  auto reply = participant_->read(cell, {}, wire::READ_MODEL, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return std::move(reply->text());
 }
 
-Result<int> Session::import_model(const std::string& cell, const std::string& text) {
+Result<int> Session::import_model(const std::string& cell, const std::string& text, const ChangeOptions& change) {
   if (const Status fits = check_text("the model", text); !fits) return tl::make_unexpected(fits.error());
-  const auto reply = participant_->manage(cell, wire::import_of_model(text));
+  wire::ManageModelsRequest request;
+  request.model_text(text);
+  const auto reply = participant_->manage(cell, wire::MANAGE_IMPORT, change, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
 }
@@ -333,9 +407,7 @@ Result<int> Session::import_model(const std::string& cell, const std::string& te
 Result<std::vector<ServerStatus>> Session::servers() {
   const auto& options = participant_->options;
   const auto known = participant_->watch->wait_for_servers(options.server_ports.size(), participant_->deadline());
-  if (known.empty()) {
-    return failure(ErrorCode::kUnreachable, "no server found ({})", participant_->where_it_looked());
-  }
+  if (known.empty()) return tl::make_unexpected(participant_->no_server());
   std::vector<ServerStatus> servers;
   for (const KnownServer& server : known) servers.push_back(from_wire(server.status));
   return servers;
@@ -354,7 +426,7 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
   const std::string& server = found->first;
-  JobStatus status = from_wire(found->second);
+  JobStatus status = status_of(found->second);
   std::uint64_t seen = 0;
   while (true) {
     if (listener) listener(status);
@@ -372,7 +444,7 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
       else if (asked.error().code != ErrorCode::kUnreachable)
         return tl::make_unexpected(asked.error());
     }
-    status = from_wire(*news);
+    status = status_of(*news);
   }
 }
 

@@ -23,7 +23,7 @@ struct SessionOptions {
 /// One DDS participant with its own reply partition. Thread-safe; calls from several threads overlap. Errors:
 /// kUnreachable when no server answered in time, else the error of the server. A request without an answer is sent once
 /// more with the same id, preferably to another server. A request that changes something goes to the same server again,
-/// which recognises the repeat.
+/// which recognises the repeat, also after a restart. A server of another contract is kRefused (contract_version).
 class Session {
  public:
   /// Does not wait for a server. One session per process is enough.
@@ -37,6 +37,10 @@ class Session {
   [[nodiscard]] Result<Answer<PredictedError>> predict_error(const CallContext& context,
                                                              const std::vector<std::vector<double>>& joints_rad,
                                                              const ShareListener& progress = {});
+  /// The same, with what is known of how the arm comes there.
+  [[nodiscard]] Result<Answer<PredictedError>> predict_error_at(const CallContext& context,
+                                                                const std::vector<CommandedJoints>& poses,
+                                                                const ShareListener& progress = {});
   /// Any number, as predict_error().
   [[nodiscard]] Result<Answer<CorrectedTarget>> correct_targets(const CallContext& context,
                                                                 const std::vector<TargetMm>& targets,
@@ -45,29 +49,32 @@ class Session {
   [[nodiscard]] Result<std::int64_t> submit_measurements(const std::string& cell, const std::string& batch_id,
                                                          const std::string& csv);
   [[nodiscard]] Result<std::int64_t> train(const std::string& cell, const std::vector<std::string>& batch_ids,
-                                           const std::string& level, const std::string& bias);
+                                           const std::string& level, const std::string& bias,
+                                           const ChangeOptions& change = {});
   /// Queues a diagnosis of a stored batch (empty: the newest) or of `csv`. With `apply` a model with the causes found
   /// is trained, and put in force if better. Returns the job; when that is done, diagnosis() returns the findings.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
-                                              const std::string& csv, bool apply);
+                                              const std::string& csv, bool apply, const ChangeOptions& change = {});
   [[nodiscard]] Result<DiagnosisAnswer> diagnosis(const std::string& cell, std::int64_t job, bool page);
   /// From every server, for one cell or (empty) for all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
-  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
   /// As train(), from batches in quarantine. They are released only if the training is accepted.
   [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
                                                        const std::vector<std::string>& batch_ids,
-                                                       const std::string& level, const std::string& bias);
+                                                       const std::string& level, const std::string& bias,
+                                                       const ChangeOptions& change = {});
   /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
   /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
-  [[nodiscard]] Result<int> activate(const std::string& cell, int version);
-  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeOptions& change = {});
   /// The model file's text. version 0 = in force.
   [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version);
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text,
+                                         const ChangeOptions& change = {});
 
   /// The servers that are there, by their last status. Waits up to the timeout for the first.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers();

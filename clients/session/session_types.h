@@ -22,22 +22,43 @@ struct PoseMm {
   double qw = 1, qx = 0, qy = 0, qz = 0;
 };
 
-/// Which model answered.
+/// Which model answered. Ages count from when it answered.
 struct ModelInfo {
   std::string cell, id, hash, level, batch_id;
+  std::string batch_hash;  ///< empty: not recorded
   int version = 0;
   std::int64_t trained_at_unix_s = 0;
-  double data_age_s = 0;  ///< of its newest measurement, now
+  double training_age_s = 0;
+  std::optional<std::int64_t> measured_at_unix_s = {};  ///< of its newest measurement; empty: not recorded
+  std::optional<double> data_age_s = {};                ///< of that measurement
   int training_poses = 0;
-  double validation_rms_mm = 0;
+  std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
   bool in_force = false;
+};
+
+/// How the arm comes to a pose; what is not known is neutral.
+struct Approach {
+  std::vector<int> directions = {};  ///< of each joint: -1, 0, +1; empty: not known
+  std::optional<double> temperature_c = {};
+  std::optional<double> time_s = {};
+};
+
+/// A pose to predict the error at.
+struct CommandedJoints {
+  std::vector<double> q_rad;
+  Approach approach = {};
 };
 
 struct PredictedError {
   PoseMm nominal, predicted;  ///< X_BT
   double dx_mm = 0, dy_mm = 0, dz_mm = 0;
-  double sx_mm = 0, sy_mm = 0, sz_mm = 0;
+  double sx_mm = 0, sy_mm = 0, sz_mm = 0;  ///< stddev of one measurement
   bool in_domain = false;
+  double rx_rad = 0, ry_rad = 0, rz_rad = 0;     ///< rotation vector from nominal to predicted
+  double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error
+  double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement
+  double srx_rad = 0, sry_rad = 0, srz_rad = 0;  ///< stddev of one measured orientation; NaN: none was learned
+  double bias_share = 0;                         ///< of the learned residual that is taken
 };
 
 struct TargetMm {
@@ -45,6 +66,7 @@ struct TargetMm {
   std::vector<double> seed_rad;  ///< empty when `conf` says the branch
   std::optional<int> conf;
   bool joint_target = false;
+  Approach approach = {};
 };
 
 struct CorrectedTarget {
@@ -54,6 +76,8 @@ struct CorrectedTarget {
   double error_before_mm = 0, error_after_mm = 0, sigma_mm = 0;
   int iterations = 0;
   std::string message;
+  double sigma_measured_mm = 0;                    ///< of one measurement
+  double turn_before_rad = 0, turn_after_rad = 0;  ///< expected orientation error
 };
 
 template <typename T>
@@ -68,6 +92,20 @@ struct JobStatus {
   double share = 0;
   int model_version = 0;
   bool in_force = false;
+  /// How it ended: `none in_force not_in_force undecided no_model quarantined failed cancelled`.
+  std::string verdict = "none";
+  int judged_on = 0;  ///< poses held out
+  /// rms on them of what was in force, and of the new model; what that must not exceed; two standard uncertainties of
+  /// the difference. Empty: not judged.
+  std::optional<double> before_mm = {}, after_mm = {}, limit_mm = {}, u95_mm = {};
+  std::string why = {};   ///< of a job that made no model
+  std::string next = {};  ///< what to do, as one clause
+};
+
+/// What a change takes for granted.
+struct ChangeOptions {
+  std::optional<int> expected_version = {};  ///< in force, 0: none; with another one nothing changes (kConflict)
+  std::string id = {};  ///< unique for ever: the change happens once under it; empty: the session makes one
 };
 
 /// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
@@ -95,7 +133,9 @@ struct QuarantinedBatch {
 struct ServerStatus {
   std::string server_id, version, state;
   std::vector<std::string> cells;
-  std::uint64_t requests = 0, refused = 0;
+  std::uint64_t requests = 0, refused = 0;        ///< answered; of them with an error
+  std::uint64_t shed = 0, unheard = 0;            ///< of them: busy or too late; to nobody, the client had left
+  std::uint64_t misdirected = 0, unreadable = 0;  ///< dropped: sent in another client's name; not even a header
   double uptime_s = 0;
   int queued_jobs = 0;
 };

@@ -87,8 +87,17 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
                      has_blocks ? "its kernel" : "the learned bias");
 }
 
+/// Of one measurement where the true position has this stddev an axis.
+double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
+
 /// rms of an error of this mean whose true value spreads by this stddev.
 double rms(const Vector3& mean, const Vector3& stddev) { return std::sqrt(mean.squaredNorm() + stddev.squaredNorm()); }
+
+/// The same of a rotation vector, rad; `stddev` is of one measurement by an instrument of this sigma.
+double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, double sigma) {
+  if (!stddev) return mean.norm();
+  return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
+}
 
 }  // namespace
 
@@ -146,6 +155,9 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   PoseContext context;
   context.tool = tool;
   context.payload = payload;
+  context.direction = target.direction;
+  context.temperature = target.temperature;
+  context.time = target.time;
   context.served = true;
   Correction result;
   const auto end = [&](CorrectionStatus status, std::string message) {
@@ -174,6 +186,12 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
       rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
   result.error_after = result.error_before;
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
+  const auto turn = [&](const Vector3& mean, const ErrorPrediction& at) {
+    return turn_rms(mean, at.rotation_stddev_B, cell().tracker.sigma_rotation);
+  };
+  result.turn_before = turn(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(), before);
+  result.turn_after = result.turn_before;
   if (start->status != InverseStatus::kOk) return not_reached(*start);
 
   // The weight is that at the target: a correction moves too little to change it.
@@ -192,6 +210,8 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   const ErrorPrediction after = found.iterations > 0 ? predict(context, bias_weight) : before;
   result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
+  result.turn_after = turn(found.missing.tail<3>(), after);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
   return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
 }

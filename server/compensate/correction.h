@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/robot/chain.h"
 
@@ -20,6 +21,10 @@ struct Target {
   std::optional<JointVector> seed;  ///< joints near the wanted branch, rad
   std::optional<int> conf;          ///< or the branch, 0..7, see inverse_kinematics.h
   bool joint_target = false;        ///< X_BT is not set: the nominal pose at `seed` is wanted
+  /// How the arm comes there, as in PoseContext; neutral where it is not known.
+  std::vector<int> direction = {};
+  std::optional<double> temperature = {};  ///< degrees Celsius
+  std::optional<double> time = {};         ///< s
 };
 
 /// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
@@ -33,7 +38,12 @@ struct Correction {
   double error_before = kNothingToSay;     ///< m, to expect without correction
   double error_after = kNothingToSay;      ///< m, to expect with it; the same where the target is not corrected
   double stddev = kNothingToSay;           ///< m, of the true position: root mean square of the three axes
-  double left = 0;                         ///< m, what the iteration left over; part of error_after
+  double measured_stddev = kNothingToSay;  ///< m, likewise of one measurement of it, the instrument's noise included
+  /// rad, angle to expect between the wanted orientation and the true one. Where the model learned no orientations,
+  /// what the error sources say.
+  double turn_before = kNothingToSay;
+  double turn_after = kNothingToSay;
+  double left = 0;  ///< m, what the iteration left over; part of error_after
   int iterations = 0;
   std::string message;  ///< why not ok
 

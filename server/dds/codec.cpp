@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "server/base/check.h"
 #include "server/base/units.h"
@@ -11,10 +13,25 @@ namespace trammel {
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-3;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t kNoTime = -1;
+constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, where nobody knows better
 
 double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
   return static_cast<double>(std::max<std::int64_t>(0, now_unix_s - since_unix_s));
 }
+
+/// The times of a model, and what follows from them.
+void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measured_at, std::int64_t now_unix_s,
+               wire::ModelInfo& info) {
+  info.trained_at_unix_s(trained_at);
+  info.training_age_s(age_s(trained_at, now_unix_s));
+  info.measured_at_unix_s(measured_at.value_or(kNoTime));
+  info.data_age_s(measured_at ? age_s(*measured_at, now_unix_s) : kUnknown);
+  info.valid_until_unix_s(kNoTime);
+}
+
+double mm_or_unknown(const std::optional<double>& length) { return length ? to_mm(*length) : kUnknown; }
 
 }  // namespace
 
@@ -71,6 +88,29 @@ Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, co
   return q;
 }
 
+Status read_approach(const wire::Approach& approach, const Chain& chain, const std::string& where,
+                     PoseContext& context) {
+  const auto& directions = approach.directions();
+  if (!directions.empty() && static_cast<int>(directions.size()) != chain.size()) {
+    return refused("{} directions, the robot {} has {} joints", directions.size(), chain.name(), chain.size())
+        .in(where)
+        .of("directions")
+        .beyond(directions.size(), chain.size());
+  }
+  for (const std::int16_t direction : directions) {
+    if (direction < -1 || direction > 1)
+      return refused("direction {} is not one of -1, 0, 1", direction).in(where).of("directions").with_value(direction);
+  }
+  for (const auto& [value, field] :
+       {std::pair(approach.temperature_c(), "temperature_c"), std::pair(approach.time_s(), "time_s")}) {
+    if (std::isinf(value)) return refused("{} is not finite", field).in(where).of(field).with_value(value);
+  }
+  context.direction.assign(directions.begin(), directions.end());
+  if (!std::isnan(approach.temperature_c())) context.temperature = approach.temperature_c();
+  if (!std::isnan(approach.time_s())) context.time = approach.time_s();
+  return {};
+}
+
 wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s) {
   const ModelProvenance& provenance = served.model.provenance();
   const auto& validation = served.model.parts().validation;
@@ -79,12 +119,12 @@ wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t n
   info.id(provenance.id);
   info.hash(provenance.hash);
   info.level(provenance.level);
-  info.batch_id(provenance.batch_id);
+  info.batch_id(cut(provenance.batch_id, wire::MAX_SENTENCE));
+  info.batch_hash(provenance.batch_hash);
   info.version(served.version);
-  info.trained_at_unix_s(provenance.trained_at);
-  info.data_age_s(age_s(provenance.measured_at.value_or(provenance.trained_at), now_unix_s));
+  put_times(provenance.trained_at, provenance.measured_at, now_unix_s, info);
   info.training_poses(provenance.training_poses);
-  info.validation_rms_mm(validation ? to_mm(validation->compensated.rms) : 0);
+  info.validation_rms_mm(validation ? to_mm(validation->compensated.rms) : kUnknown);
   info.in_force(in_force);
   return info;
 }
@@ -95,15 +135,56 @@ wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s) {
   info.id(stored.id);
   info.hash(stored.hash);
   info.level(stored.level);
-  info.batch_id(stored.batch_id);
+  info.batch_id(cut(stored.batch_id, wire::MAX_SENTENCE));
   info.version(stored.version);
-  info.trained_at_unix_s(stored.trained_at);
-  info.data_age_s(age_s(stored.measured_at.value_or(stored.trained_at), now_unix_s));
+  put_times(stored.trained_at, stored.measured_at, now_unix_s, info);
   info.training_poses(stored.training_poses);
-  info.validation_rms_mm(to_mm(stored.validation_rms));
+  info.validation_rms_mm(stored.validation_rms > 0 ? to_mm(stored.validation_rms) : kUnknown);
   info.in_force(stored.in_force);
   return info;
 }
+
+namespace {
+
+wire::JobVerdict to_wire(JobVerdict verdict) {
+  switch (verdict) {
+    case JobVerdict::kNone:
+      return wire::VERDICT_NONE;
+    case JobVerdict::kInForce:
+      return wire::VERDICT_IN_FORCE;
+    case JobVerdict::kNotInForce:
+      return wire::VERDICT_NOT_IN_FORCE;
+    case JobVerdict::kUndecided:
+      return wire::VERDICT_UNDECIDED;
+    case JobVerdict::kNoModel:
+      return wire::VERDICT_NO_MODEL;
+    case JobVerdict::kQuarantined:
+      return wire::VERDICT_QUARANTINED;
+    case JobVerdict::kFailed:
+      return wire::VERDICT_FAILED;
+    case JobVerdict::kCancelled:
+      return wire::VERDICT_CANCELLED;
+  }
+  TRAMMEL_CHECK(false);
+}
+
+wire::JobOutcome to_wire(const JobOutcome& outcome) {
+  wire::JobOutcome result;
+  result.verdict(to_wire(outcome.verdict));
+  result.judged_on(outcome.judged_on);
+  result.before_mm(mm_or_unknown(outcome.before));
+  result.after_mm(mm_or_unknown(outcome.after));
+  result.limit_mm(mm_or_unknown(outcome.limit));
+  result.u95_mm(mm_or_unknown(outcome.u95));
+  if (outcome.why) {
+    result.code(trammel::to_wire(outcome.why->code));
+    result.why(cut(sentence(*outcome.why), wire::MAX_SENTENCE));
+  }
+  result.next(cut(outcome.next, wire::MAX_SENTENCE));
+  return result;
+}
+
+}  // namespace
 
 wire::Job to_wire(const JobProgress& progress) {
   wire::Job job;
@@ -126,11 +207,36 @@ wire::Job to_wire(const JobProgress& progress) {
       job.stage(wire::JOB_FAILED);
       break;
   }
-  job.what(progress.what);
+  job.what(cut(progress.what, wire::MAX_SENTENCE));
   job.share(progress.share);
   job.model_version(progress.model_version);
   job.in_force(progress.in_force);
+  job.outcome(to_wire(progress.outcome));
+  job.created_unix_s(kNoTime);
+  job.started_unix_s(kNoTime);
+  job.finished_unix_s(kNoTime);
   return job;
+}
+
+wire::Job to_wire(const Trainer::DatedJob& dated) {
+  wire::Job job = to_wire(dated.progress);
+  job.kind(dated.asked.kind == JobKind::kDiagnose ? wire::JOB_DIAGNOSIS : wire::JOB_TRAINING_OF_BATCHES);
+  job.batch_ids(dated.asked.batch_ids);
+  job.created_unix_s(dated.asked.created_at);
+  job.started_unix_s(dated.asked.started_at.value_or(kNoTime));
+  job.finished_unix_s(dated.asked.finished_at.value_or(kNoTime));
+  return job;
+}
+
+wire::BatchInfo to_wire(const StoredBatch& batch) {
+  wire::BatchInfo info;
+  info.cell(batch.cell);
+  info.id(batch.id);
+  info.hash(batch.hash);
+  info.poses(batch.poses);
+  info.accepted_at_unix_s(batch.accepted_at);
+  info.quarantine(cut(batch.quarantine, wire::MAX_SENTENCE));
+  return info;
 }
 
 wire::TargetStatus to_wire(CorrectionStatus status) {
@@ -172,6 +278,54 @@ wire::ResultCode to_wire(ErrorCode code) {
       return wire::RESULT_INTERNAL;
   }
   TRAMMEL_CHECK(false);
+}
+
+namespace {
+
+wire::Problem to_wire(const Error& error) {
+  wire::Problem problem;
+  problem.code(trammel::to_wire(error.code));
+  problem.what(cut(error.message, wire::MAX_SENTENCE));
+  problem.file(cut(error.file, wire::MAX_ID));
+  problem.row(error.row.value_or(0));
+  problem.field(cut(error.field, wire::MAX_ID));
+  problem.has_value(error.value.has_value());
+  problem.value(error.value.value_or(0));
+  problem.has_limit(error.limit.has_value());
+  problem.limit(error.limit.value_or(0));
+  problem.text(cut(error.text, wire::MAX_ID));
+  problem.next(cut(error.next, wire::MAX_SENTENCE));
+  return problem;
+}
+
+}  // namespace
+
+void put_error(const Error& error, wire::ReplyHeader& header) {
+  header.result(to_wire(error.code));
+  header.message(cut(sentence(error), wire::MAX_SENTENCE));
+  if (error.code == ErrorCode::kBusy) header.retry_after_ms(kRetryAfterMs);
+  for (const Error& one : apart(error)) {
+    if (header.problems().size() < wire::MAX_ERRORS) header.problems().push_back(to_wire(one));
+  }
+}
+
+void put_error(const wire::Fault& fault, wire::ReplyHeader& header) {
+  Error error;
+  error.message = fault.what;
+  error.file = fault.where;
+  error.field = fault.field;
+  error.value = fault.value;
+  error.limit = fault.limit;
+  put_error(error, header);
+  header.result(fault.code);
+  header.problems().front().code(fault.code);
+}
+
+std::string cut(const std::string& text, std::size_t most_bytes) {
+  if (text.size() <= most_bytes) return text;
+  std::size_t end = most_bytes;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end);
 }
 
 std::string request_id_text(const wire::SampleIdentity& id) {

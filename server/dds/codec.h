@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -19,11 +20,32 @@ namespace trammel {
 /// Refuses non-finite numbers and a number of joints that is not the robot's. `where` names the vector in the error.
 [[nodiscard]] Result<JointVector> from_wire(const wire::Joints& joints, const Chain& chain, const std::string& where);
 
+/// Refuses directions that are not one of -1, 0, +1 for each joint, and infinite numbers. What is not known stays so.
+[[nodiscard]] Status read_approach(const wire::Approach& approach, const Chain& chain, const std::string& where,
+                                   PoseContext& context);
+
 [[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s);
 [[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);
+/// As it is published: without its batches and times, which to_wire(DatedJob) has.
 [[nodiscard]] wire::Job to_wire(const JobProgress& progress);
+[[nodiscard]] wire::Job to_wire(const Trainer::DatedJob& job);
+[[nodiscard]] wire::BatchInfo to_wire(const StoredBatch& batch);
 [[nodiscard]] wire::TargetStatus to_wire(CorrectionStatus status);
 [[nodiscard]] wire::ResultCode to_wire(ErrorCode code);
+
+/// The error in the header of a reply: code, sentence and data.
+void put_error(const Error& error, wire::ReplyHeader& header);
+void put_error(const wire::Fault& fault, wire::ReplyHeader& header);
+/// Of what this server knows, and does not do.
+template <typename Reply>
+[[nodiscard]] Reply unsupported(const std::string& field) {
+  Reply reply;
+  put_error(wire::Fault{wire::RESULT_UNSUPPORTED, "this server does not do that", {}, field, {}, {}}, reply.header());
+  return reply;
+}
+
+/// Cut to so many bytes, between two characters.
+[[nodiscard]] std::string cut(const std::string& text, std::size_t most_bytes);
 
 /// `<writer GUID in hex>:<sequence number>`.
 [[nodiscard]] std::string request_id_text(const wire::SampleIdentity& id);

@@ -20,6 +20,12 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
     if (!X_BT) return tl::make_unexpected(X_BT.error());
     target.X_BT = *X_BT;
   }
+  PoseContext comes;
+  if (const Status known = read_approach(wanted.approach(), chain, where, comes); !known)
+    return tl::make_unexpected(known.error());
+  target.direction = std::move(comes.direction);
+  target.temperature = comes.temperature;
+  target.time = comes.time;
   if (wanted.kind() == wire::TARGET_POSE_ON_BRANCH) {
     if (wanted.conf() < 0 || wanted.conf() > kMaxConf) {
       return refused("branch {} is not one of 0 to {}", wanted.conf(), kMaxConf)
@@ -44,8 +50,11 @@ wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) 
   item.error_before_mm(to_mm(correction.error_before));
   item.error_after_mm(to_mm(correction.error_after));
   item.sigma_mm(to_mm(correction.stddev));
+  item.sigma_measured_mm(to_mm(correction.measured_stddev));
+  item.turn_before_rad(correction.turn_before);
+  item.turn_after_rad(correction.turn_after);
   item.iterations(correction.iterations);
-  item.message(correction.message.substr(0, kMaxMessage));
+  item.message(cut(correction.message, kMaxMessage));
   return item;
 }
 
@@ -77,10 +86,6 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
 
 Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& request) {
   const auto& wanted = request.targets();
-  if (wanted.size() > wire::MAX_TARGETS) {
-    return failure(ErrorCode::kTooLarge, "{} targets in one request, limit {}", wanted.size(), wire::MAX_TARGETS)
-        .beyond(wanted.size(), wire::MAX_TARGETS);
-  }
   auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());
   const Chain& chain = subject->served->model.cell().robot;

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -16,6 +17,7 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/old_contract.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
@@ -147,6 +149,7 @@ class DdsService::Running {
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
+    old_contract_.reset();
   }
 
   Running(const Running&) = delete;
@@ -183,14 +186,14 @@ class DdsService::Running {
         topics_(topics),
         echo_(std::move(echo)),
         channels_(
-            *participant_, static_cast<std::size_t>(options.max_clients),
-            [events = events_.get()] { events->status_changed(); }, replying_),
+            *participant_, static_cast<std::size_t>(options.max_clients), [events = events_.get()] { events->wake(); },
+            replying_),
         room_(room_limits(options)),
         predictions_(compute_limits(options), room_),
         corrections_(compute_limits(options), room_),
         reads_(limits_of_reads(options), room_, kBehindComputing),
         changes_(limits_of_changes(options), room_, kBehindComputing),
-        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {
+        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_, events_->owners()} {
     for (const auto& [name, cell] : trainer.cells()) publishing_[name];
   }
 
@@ -207,8 +210,15 @@ class DdsService::Running {
     if (opened) opened = open(wire::SubmitMeasurements(), others);
     if (opened) opened = open(wire::Train(), others);
     if (opened) opened = open(wire::Diagnose(), others);
+    if (opened) opened = open(wire::CheckHealth(), others);
+    if (opened) opened = open(wire::ReadModels(), others);
     if (opened) opened = open(wire::ManageModels(), others);
-    return opened;
+    if (opened) opened = open(wire::ReleaseBatches(), others);
+    if (!opened) return opened;
+    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_, core_.owners);
+    if (!old) return tl::make_unexpected(old.error());
+    old_contract_ = std::move(*old);
+    return {};
   }
 
   [[nodiscard]] std::array<Lane*, 4> lanes() { return {&predictions_, &corrections_, &reads_, &changes_}; }
@@ -216,12 +226,19 @@ class DdsService::Running {
   void tell_status(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "status");
     bool clients_wait = false;
+    ServiceEvents::News news{true, {}};
+    Clock::time_point told;
     while (!stop.stop_requested()) {
-      publish_status(wire::SERVICE_SERVING);
-      ++status_steps_;
-      channels_.heard(events_->wait(stop, clients_wait ? wire::kAnnouncement : wire::kStatusPeriod));
+      if (news.status_changed || Clock::now() - told >= wire::kStatusPeriod) {
+        publish_status(wire::SERVICE_SERVING);
+        told = Clock::now();
+      }
       ++status_steps_;
       clients_wait = channels_.tend();
+      ++status_steps_;
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
+      news = events_->wait(stop, clients_wait ? std::min(left, wire::kAnnouncement) : left);
+      channels_.heard(news.readers);
     }
   }
 
@@ -248,8 +265,13 @@ class DdsService::Running {
     status.state(state);
     for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
     status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
-    status.requests(core_.counts.requests + core_.counts.shed);
-    status.refused(core_.counts.refused + core_.counts.shed);
+    const CallCounts& counts = core_.counts;
+    status.requests(counts.requests + counts.shed);
+    status.refused(counts.refused + counts.shed);
+    status.shed(counts.shed);
+    status.unheard(channels_.unheard());
+    status.misdirected(counts.misdirected);
+    status.unreadable(*core_.unreadable + counts.lost);
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -272,6 +294,7 @@ class DdsService::Running {
   ServiceCore core_;
   std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
+  std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::jthread replies_thread_;
   std::jthread status_thread_;

@@ -59,20 +59,27 @@ class Handlers {
   /// Accepted means stored: see Trainer::submit.
   [[nodiscard]] Result<wire::SubmitMeasurementsReply> answer(const wire::SubmitMeasurementsRequest& request);
   [[nodiscard]] Result<wire::TrainReply> answer(const wire::TrainRequest& request);
-  /// Queues a diagnosis, or returns the findings of one: see Trainer::diagnose.
+  /// Queues a diagnosis: see Trainer::diagnose.
   [[nodiscard]] Result<wire::DiagnoseReply> answer(const wire::DiagnoseRequest& request);
+  [[nodiscard]] Result<wire::CheckHealthReply> answer(const wire::CheckHealthRequest& request);
+  [[nodiscard]] Result<wire::ReadModelsReply> answer(const wire::ReadModelsRequest& request);
   [[nodiscard]] Result<wire::ManageModelsReply> answer(const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
 
  private:
-  [[nodiscard]] Result<wire::ManageModelsReply> answer_of_cell(const std::string& cell,
-                                                               const wire::ManageModelsRequest& request);
-  [[nodiscard]] Result<wire::ManageModelsReply> job_of(std::int64_t job) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> models_of(const std::string& cell) const;
+  [[nodiscard]] Result<std::int64_t> train_from_batches(const wire::TrainRequest& request);
+  [[nodiscard]] Result<std::int64_t> train_diagnosed(const wire::TrainRequest& request);
+  /// The version activated, gone back to or imported.
+  [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
+  [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
+                                                   const wire::ReadModelsRequest& request) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
-  [[nodiscard]] Result<wire::ManageModelsReply> exported(const std::string& cell, int version) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> quarantine_of(const std::string& cell) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> jobs_of(const std::string& cell) const;
-  [[nodiscard]] Result<wire::ManageModelsReply> release_and_train(const std::string& cell, const std::string& text);
+  [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> quarantine_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
 
   Trainer& trainer_;
   Store& store_;
@@ -94,6 +101,9 @@ template <typename Reply>
 [[nodiscard]] bool happens_once(const wire::SubmitMeasurementsRequest& request);
 [[nodiscard]] bool happens_once(const wire::TrainRequest& request);
 [[nodiscard]] bool happens_once(const wire::DiagnoseRequest& request);
+[[nodiscard]] bool happens_once(const wire::CheckHealthRequest& request);
+[[nodiscard]] bool happens_once(const wire::ReadModelsRequest& request);
 [[nodiscard]] bool happens_once(const wire::ManageModelsRequest& request);
+[[nodiscard]] bool happens_once(const wire::ReleaseBatchesRequest& request);
 
 }  // namespace trammel

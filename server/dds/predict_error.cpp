@@ -1,3 +1,4 @@
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,8 @@
 namespace trammel {
 namespace {
 
+constexpr double kNotLearned = std::numeric_limits<double>::quiet_NaN();
+
 wire::PredictedError to_wire(const ErrorPrediction& prediction) {
   wire::PredictedError item;
   item.nominal(trammel::to_wire(prediction.X_BT_nominal));
@@ -16,62 +19,81 @@ wire::PredictedError to_wire(const ErrorPrediction& prediction) {
   item.dx_mm(to_mm(prediction.error_B.x()));
   item.dy_mm(to_mm(prediction.error_B.y()));
   item.dz_mm(to_mm(prediction.error_B.z()));
+  const Vector3 turn = pose_difference(prediction.X_BT_predicted, prediction.X_BT_nominal).tail<3>();
+  item.rx_rad(turn.x());
+  item.ry_rad(turn.y());
+  item.rz_rad(turn.z());
   item.sx_mm(to_mm(prediction.stddev_B.x()));
   item.sy_mm(to_mm(prediction.stddev_B.y()));
   item.sz_mm(to_mm(prediction.stddev_B.z()));
+  item.slx_mm(to_mm(prediction.true_stddev_B.x()));
+  item.sly_mm(to_mm(prediction.true_stddev_B.y()));
+  item.slz_mm(to_mm(prediction.true_stddev_B.z()));
+  const Matrix3 covariance_mm2 = to_mm(1) * to_mm(1) * prediction.covariance_B;
+  item.cxy_mm2(covariance_mm2(0, 1));
+  item.cxz_mm2(covariance_mm2(0, 2));
+  item.cyz_mm2(covariance_mm2(1, 2));
+  const Vector3 rotation = prediction.rotation_stddev_B.value_or(Vector3::Constant(kNotLearned));
+  item.srx_rad(rotation.x());
+  item.sry_rad(rotation.y());
+  item.srz_rad(rotation.z());
+  item.bias_share(prediction.bias_weight);
   item.in_domain(prediction.in_domain);
   return item;
 }
 
-/// Its joints are checked, its model is taken.
+/// The pose as the model is asked for it; refuses what the cell's arm cannot do.
+Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject, const std::string& where) {
+  const Cell& cell = subject.served->model.cell();
+  auto q = from_wire(wanted.joints_rad(), cell.robot, where);
+  if (!q) return tl::make_unexpected(q.error());
+  PoseContext pose;
+  pose.q = std::move(*q);
+  pose.tool = subject.tool;
+  pose.payload = subject.payload;
+  pose.served = true;
+  if (const Status known = read_approach(wanted.approach(), cell.robot, where, pose); !known)
+    return tl::make_unexpected(known.error());
+  if (const Status possible = check_pose(pose, cell); !possible) return Failure(possible.error()).in(where);
+  return pose;
+}
+
+/// Its poses are checked, its model is taken.
 class PortionedPredictions final : public PortionedAnswer<wire::PredictErrorReply> {
  public:
-  PortionedPredictions(Subject subject, std::vector<JointVector> joints)
-      : subject_(std::move(subject)), joints_(std::move(joints)) {
+  PortionedPredictions(Subject subject, std::vector<PoseContext> poses)
+      : subject_(std::move(subject)), poses_(std::move(poses)) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
-    reply_.predictions().resize(joints_.size());
+    reply_.predictions().resize(poses_.size());
   }
-  std::size_t items() const override { return joints_.size(); }
+  std::size_t items() const override { return poses_.size(); }
   void compute(std::size_t first, std::size_t count) override {
     const CompensatedModel& model = subject_.served->model;
     for (std::size_t i = first; i < first + count; ++i) {
-      reply_.predictions()[i] = to_wire(model.predict(joints_[i], subject_.tool, subject_.payload));
+      reply_.predictions()[i] = to_wire(model.predict_all({poses_[i]}).front());
     }
   }
   wire::PredictErrorReply take() override { return std::move(reply_); }
 
  private:
   const Subject subject_;
-  const std::vector<JointVector> joints_;
+  const std::vector<PoseContext> poses_;
   wire::PredictErrorReply reply_;
 };
 
 }  // namespace
 
 Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& request) {
-  const auto& wanted = request.joints_rad();
-  if (wanted.size() > wire::MAX_TARGETS) {
-    return failure(ErrorCode::kTooLarge, "{} joint vectors in one request, limit {}", wanted.size(), wire::MAX_TARGETS)
-        .beyond(wanted.size(), wire::MAX_TARGETS);
-  }
   auto subject = subjects_.find(request.about());
   if (!subject) return tl::make_unexpected(subject.error());
-  const Cell& cell = subject->served->model.cell();
-
-  std::vector<JointVector> joints;
-  joints.reserve(wanted.size());
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const auto q = from_wire(wanted[i], cell.robot, fmt::format("joint vector {}", i + 1));
-    if (!q) return tl::make_unexpected(q.error());
-    PoseContext pose;
-    pose.q = *q;
-    pose.tool = subject->tool;
-    pose.payload = subject->payload;
-    const Status possible = check_pose(pose, cell);
-    if (!possible) return Failure(possible.error()).in(fmt::format("joint vector {}", i + 1));
-    joints.push_back(*q);
+  std::vector<PoseContext> poses;
+  poses.reserve(request.poses().size());
+  for (std::size_t i = 0; i < request.poses().size(); ++i) {
+    auto pose = context_of(request.poses()[i], *subject, fmt::format("joint vector {}", i + 1));
+    if (!pose) return tl::make_unexpected(pose.error());
+    poses.push_back(std::move(*pose));
   }
-  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(joints));
+  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses));
 }
 
 Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {

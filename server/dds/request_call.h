@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "idl/safe_type.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -23,9 +24,19 @@ namespace trammel {
 struct CallCounts {
   std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
   std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
-  std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY: there was no time or no room
-  std::atomic<std::uint64_t> lost{0};      ///< by a DDS reader, before anybody saw them
+  /// Answered with RESULT_BUSY or RESULT_DEADLINE_MISSED: there was no time or no room.
+  std::atomic<std::uint64_t> shed{0};
+  std::atomic<std::uint64_t> misdirected{0};  ///< not answered: the reply partition is another client's
+  std::atomic<std::uint64_t> lost{0};         ///< by a DDS reader, before anybody saw them
 };
+
+/// Whose answer it is, and to which request.
+inline void put_identity(const wire::RequestHeader& asked, const std::string& server_id, wire::ReplyHeader& reply) {
+  reply.related_request_id(asked.request_id());
+  reply.server(server_id);
+  reply.contract_version(wire::CONTRACT_VERSION);
+  reply.trace_id(asked.trace_id());
+}
 
 /// What the calls of one operation share. Outlives them.
 template <typename Operation>
@@ -48,10 +59,10 @@ struct CallContext {
 template <typename Operation>
 class Call final : public Job {
  public:
-  using Request = typename Operation::Request::type;
+  using Request = wire::Received<typename Operation::Request::type>;
   using Reply = typename Operation::Reply::type;
   /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
-  static constexpr bool kComputes = AsksForTargets<Request> || AsksForJoints<Request>;
+  static constexpr bool kComputes = AsksForTargets<Request> || AsksForPoses<Request>;
 
   /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids. `while_under_way`
   /// is kept until the call is over.
@@ -69,9 +80,8 @@ class Call final : public Job {
 
   std::size_t begin() override {
     if (find_known()) return 0;
-    if (request_->header().contract_version() != wire::CONTRACT_VERSION) {
-      refuse(wire::RESULT_WRONG_CONTRACT, fmt::format("the request is of contract {}, this server speaks {}",
-                                                      request_->header().contract_version(), wire::CONTRACT_VERSION));
+    if (request_->fault) {
+      refuse(*request_->fault);
       return 0;
     }
     if constexpr (!kComputes) return 1;
@@ -101,8 +111,10 @@ class Call final : public Job {
   }
 
   void shed(const Shed& shed) override {
-    refuse(wire::RESULT_BUSY, fmt::format("{}; try again in {} ms", shed.why, shed.retry_after.count()));
-    put_identity();
+    const auto code = shed.is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY;
+    refuse(wire::Fault{code, shed.why, {}, {}, {}, {}});
+    reply_.header().retry_after_ms(static_cast<std::uint32_t>(shed.retry_after.count()));
+    put_identity(request_->header(), context_.server_id, reply_.header());
     context_.counts.shed += answer(&ReplySink::post);
   }
 
@@ -125,7 +137,7 @@ class Call final : public Job {
       if (begun) {
         portions_ = std::move(*begun);
       } else {
-        accept(Result<Reply>(tl::make_unexpected(begun.error())));
+        refuse(begun.error());
       }
     }
   }
@@ -134,15 +146,16 @@ class Call final : public Job {
     if (answer) {
       reply_ = std::move(*answer);
     } else {
-      refuse(to_wire(answer.error().code), sentence(answer.error()));
+      refuse(answer.error());
     }
   }
 
-  void refuse(wire::ResultCode code, const std::string& message) {
+  /// An Error or a wire::Fault.
+  template <typename Why>
+  void refuse(const Why& why) {
     const MutexLock lock(mutex_);
     reply_ = Reply();
-    reply_.header().result(code);
-    reply_.header().message(message);
+    put_error(why, reply_.header());
     refused_ = true;
   }
 
@@ -156,20 +169,14 @@ class Call final : public Job {
     try {
       work();
     } catch (const std::exception& failed) {
-      refuse(wire::RESULT_UNKNOWN_EXCEPTION, failed.what());
+      refuse(wire::Fault{wire::RESULT_UNKNOWN_EXCEPTION, failed.what(), {}, {}, {}, {}});
     }
   }
 
-  void put_identity() {
-    reply_.header().related_request_id(request_->header().request_id());
-    reply_.header().server(context_.server_id);
-    reply_.header().contract_version(wire::CONTRACT_VERSION);
-  }
-
   void remember(bool is_good) {
-    put_identity();
+    put_identity(request_->header(), context_.server_id, reply_.header());
     if (!is_good) return;
-    if (kComputes) context_.lately.remember(sent_, reply_);
+    if constexpr (kComputes) context_.lately.remember(sent_, reply_);
     if (happens_once(*request_)) {
       context_.memory.remember(request_id_text(request_->header().request_id()), reply_);
     }

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "idl/transport.h"
+#include "server/dds/partition_owners.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_call.h"
 #include "server/dds/schedule/lane.h"
@@ -23,7 +27,10 @@ struct ServiceCore {
   const Trainer& trainer;  ///< knows which cells are served
   Handlers& handlers;
   ReplyChannels& channels;
+  const PartitionOwners& owners;
   CallCounts counts{};
+  /// Not answered: not even the header could be read.
+  std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
   WorkUnderWay taking{};  ///< takes of requests from DDS readers
 };
 
@@ -32,6 +39,18 @@ struct Lanes {
   Lane& changes;
   Lane& reads;
 };
+
+/// Of a request that claims to be of another DDS writer than the one that sent it.
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
+                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
+  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
+                     "request_id must hold the GUID of the writer that sends it",
+                     {},
+                     "writer_guid",
+                     {},
+                     {}};
+}
 
 class RequestEndpointBase {
  public:
@@ -45,10 +64,10 @@ class RequestEndpointBase {
 template <typename Operation>
 class RequestEndpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
  public:
-  using Request = typename Operation::Request::type;
+  using Request = wire::Received<typename Operation::Request::type>;
 
   [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lanes lanes) {
-    const auto request_topic = wire::make_request_topic<Operation>(core.participant);
+    const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
     const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
@@ -104,14 +123,20 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     if (!wanted.empty() && wanted != core_.server_id) return;
     const ReplyAddress to{wire::participant_of(writer), request->header().reply_partition().to_string(),
                           context_.reply_topic};
-    auto expectation = core_.channels.expect(to.participant, to.partition);
-    if (!expectation) return;
+    const auto expectation = core_.owners.may_use(to.partition, to.participant)
+                                 ? core_.channels.expect(to.participant, to.partition)
+                                 : nullptr;
+    if (!expectation) {
+      ++core_.counts.misdirected;
+      return;
+    }
+    if (!request->fault) request->fault = fault_of_identity(request->header(), writer);
     const std::string sent = to.participant +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request->header().request_id());
-    Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
+    Lane& lane = !request->fault && happens_once(*request) ? lanes_.changes : lanes_.reads;
     Ask ask = ask_of(*request, to.participant);
-    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
+    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, expectation);
     if (!call->is_first()) return;
     if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
   }
@@ -123,8 +148,11 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     if (is_served) ask.cell = cell;
     if (is_served) ask.work = work_of(request, cell, Operation::kName);
     ask.items = items_of(request);
-    ask.bytes = bytes_of_request(request);
-    ask.start_by = std::chrono::steady_clock::now() + kPatience;
+    ask.bytes = bytes_of_request(request, request.bytes);
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::milliseconds waits(request.header().deadline_ms());
+    if (waits.count() > 0) ask.finish_by = now + waits;
+    ask.start_by = waits.count() > 0 ? now + waits : now + kPatience;
     return ask;
   }
 

@@ -14,12 +14,16 @@ concept AsksForTargets = requires(const Request& request) {
   request.targets();
 };
 template <typename Request>
-concept AsksForJoints = requires(const Request& request) {
-  request.joints_rad();
+concept AsksForPoses = requires(const Request& request) {
+  request.poses();
 };
 template <typename Request>
 concept HasAction = requires(const Request& request) {
   request.action();
+};
+template <typename Request>
+concept IsQuestion = requires(const Request& request) {
+  request.what();
 };
 
 /// Items that are computed apart from each other.
@@ -27,21 +31,18 @@ template <typename Request>
 [[nodiscard]] std::size_t items_of(const Request& request) {
   if constexpr (AsksForTargets<Request>) {
     return request.targets().size();
-  } else if constexpr (AsksForJoints<Request>) {
-    return request.joints_rad().size();
+  } else if constexpr (AsksForPoses<Request>) {
+    return request.poses().size();
   } else {
     return 1;
   }
 }
 
-/// Bytes that a request takes in memory until it is answered, about.
+/// Bytes that a request with so many serialized bytes takes in memory until it is answered, about.
 template <typename Request>
-[[nodiscard]] std::size_t bytes_of_request(const Request& request) {
+[[nodiscard]] std::size_t bytes_of_request(const Request& request, std::size_t serialized) {
   constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
-  std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
-  if constexpr (requires { request.text(); }) bytes += request.text().size();
-  if constexpr (requires { request.csv(); }) bytes += request.csv().size();
-  return bytes;
+  return sizeof(Request) + serialized + kAskedAndAnswered * items_of(request);
 }
 
 /// Bytes that a reply takes in memory, about.
@@ -53,15 +54,17 @@ template <typename Reply>
   if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
   if constexpr (requires { reply.models(); }) bytes += kAnswered * reply.models().size();
   if constexpr (requires { reply.text(); }) bytes += reply.text().size();
-  if constexpr (requires { reply.findings_json(); }) bytes += reply.findings_json().size() + reply.page_html().size();
+  if constexpr (requires { reply.findings_json(); }) bytes += reply.findings_json().size();
+  if constexpr (requires { reply.page_html(); }) bytes += reply.page_html().size();
   return bytes;
 }
 
-/// Requests that cost alike: of one cell, with the same action.
+/// Requests that cost alike: of one cell, with the same action or question.
 template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
   std::string work = cell + '/' + operation;
   if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
+  if constexpr (IsQuestion<Request>) work += '/' + std::to_string(static_cast<int>(request.what()));
   return work;
 }
 

@@ -14,32 +14,48 @@ void ServiceEvents::status_changed() {
   {
     const MutexLock lock(mutex_);
     status_changed_ = true;
+    woken_ = true;
   }
   changed_.notify_one();
 }
 
-std::vector<ReaderEvent> ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
+void ServiceEvents::wake() {
+  {
+    const MutexLock lock(mutex_);
+    woken_ = true;
+  }
+  changed_.notify_one();
+}
+
+ServiceEvents::News ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
   MutexLock lock(mutex_);
-  changed_.wait_for(lock, stop, limit, [this]() TRAMMEL_REQUIRES(mutex_) {
-    return status_changed_ || !readers_.empty() || !left_.empty();
-  });
-  status_changed_ = false;
-  std::vector<ReaderEvent> events = std::exchange(readers_, {});
+  changed_.wait_for(lock, stop, limit,
+                    [this]() TRAMMEL_REQUIRES(mutex_) { return woken_ || !readers_.empty() || !left_.empty(); });
+  woken_ = false;
+  News news{std::exchange(status_changed_, false), std::exchange(readers_, {})};
   // Last: no participant comes back under the same name.
   for (const std::string& participant : std::exchange(left_, {})) {
-    events.push_back({ReaderEvent::Kind::kLeft, {participant, {}, {}}});
+    news.readers.push_back({ReaderEvent::Kind::kLeft, {participant, {}, {}}});
   }
-  return events;
+  return news;
 }
 
 void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
                                             eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
-  if (info.status != Info::DISCOVERED_READER && info.status != Info::REMOVED_READER) return;
   const std::string topic = info.info.topicName().to_string();
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
-  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
-  const auto kind = info.status == Info::REMOVED_READER ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
+  const bool is_gone = info.status == Info::REMOVED_READER;
+  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) {
+    return owners_.left(info.info.guid());
+  }
+  if (is_gone) {
+    owners_.left(info.info.guid());
+  } else {
+    owners_.found(info.info.guid(), partitions.front());
+  }
+  if (!is_gone && info.status != Info::DISCOVERED_READER) return;
+  const auto kind = is_gone ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
   {
     const MutexLock lock(mutex_);
     if (readers_.size() >= kMaxReaders) return;

@@ -1,19 +1,33 @@
 #include "server/dds/state_topics.h"
 
+#include "idl/contract_1.h"
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 
 namespace trammel {
 namespace {
 
-template <typename State>
-Status open_writer(wire::dds::DomainParticipant& participant, wire::dds::Publisher& publisher,
+Status open_writer(const Result<wire::dds::Topic*>& topic, wire::dds::Publisher& publisher,
                    const wire::dds::DataWriterQos& qos, wire::dds::DataWriter*& writer) {
-  const auto topic = wire::make_state_topic<State>(participant);
   if (!topic) return tl::make_unexpected(topic.error());
   writer = publisher.create_datawriter(*topic, qos);
-  if (writer == nullptr) return failure(ErrorCode::kInternal, "cannot create the writer of {}", State::kName);
+  if (writer == nullptr) return failure(ErrorCode::kInternal, "cannot create the writer of {}", (*topic)->get_name());
   return {};
+}
+
+/// As far as contract 1 has it.
+contract_1::ServiceStatus in_old_words(const wire::ServiceStatus& status) {
+  contract_1::ServiceStatus old;
+  old.server(status.server());
+  old.contract_version(status.contract_version());
+  old.program_version(status.program_version());
+  old.state(status.state());
+  old.cells(status.cells());
+  old.requests(status.requests());
+  old.refused(status.refused());
+  old.uptime_s(status.uptime_s());
+  old.queued_jobs(status.queued_jobs());
+  return old;
 }
 
 }  // namespace
@@ -22,25 +36,33 @@ Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant)
   wire::dds::Publisher* publisher = participant.create_publisher(wire::publisher_qos({}));
   if (publisher == nullptr) return failure(ErrorCode::kInternal, "cannot create the publisher of the state topics");
   StateTopics topics;
-  Status opened = open_writer<wire::ServiceStatusTopic>(participant, *publisher, wire::service_status_writer_qos(),
-                                                        topics.service_status_);
+  Status opened = open_writer(wire::make_state_topic<wire::ServiceStatusTopic>(participant), *publisher,
+                              wire::service_status_writer_qos(), topics.service_status_);
   if (opened) {
-    opened = open_writer<wire::TrainingProgressTopic>(participant, *publisher, wire::progress_writer_qos(),
-                                                      topics.training_progress_);
+    opened = open_writer(wire::make_old_status_topic(participant), *publisher, wire::service_status_writer_qos(),
+                         topics.old_service_status_);
   }
   if (opened) {
-    opened =
-        open_writer<wire::ModelStatusTopic>(participant, *publisher, wire::state_writer_qos(), topics.model_status_);
+    opened = open_writer(wire::make_state_topic<wire::TrainingProgressTopic>(participant), *publisher,
+                         wire::progress_writer_qos(), topics.training_progress_);
   }
   if (opened) {
-    opened = open_writer<wire::ModelSnapshotTopic>(participant, *publisher, wire::state_writer_qos(),
-                                                   topics.model_snapshot_);
+    opened = open_writer(wire::make_state_topic<wire::ModelStatusTopic>(participant), *publisher,
+                         wire::state_writer_qos(), topics.model_status_);
+  }
+  if (opened) {
+    opened = open_writer(wire::make_state_topic<wire::ModelSnapshotTopic>(participant), *publisher,
+                         wire::state_writer_qos(), topics.model_snapshot_);
   }
   if (!opened) return tl::make_unexpected(opened.error());
   return topics;
 }
 
-void StateTopics::publish(wire::ServiceStatus status) { service_status_->write(&status); }
+void StateTopics::publish(wire::ServiceStatus status) {
+  contract_1::ServiceStatus old = in_old_words(status);
+  old_service_status_->write(&old);
+  service_status_->write(&status);
+}
 
 void StateTopics::publish(wire::TrainingProgress progress) { training_progress_->write(&progress); }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/base/mutex.h"
+#include "server/store/job_outcome.h"
 #include "server/store/store.h"
 
 namespace trammel {
@@ -22,6 +23,7 @@ struct JobProgress {
   double share = 0;       ///< [0, 1]
   int model_version = 0;  ///< once done
   bool in_force = false;
+  JobOutcome outcome = {};  ///< once over
 };
 
 /// As the store has it; `in_force` is left false.

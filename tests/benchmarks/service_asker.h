@@ -57,6 +57,7 @@ class Asker final : private wire::dds::DataWriterListener, private wire::dds::Da
     auto& header = request.header();
     header.reply_partition(partition_);
     header.contract_version(wire::CONTRACT_VERSION);
+    header.request_id().writer_guid(wire::octets_of(writer_->guid()));
     {
       const std::lock_guard lock(mutex_);
       header.request_id().sequence_number(++sent_);

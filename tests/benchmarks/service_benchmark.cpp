@@ -38,6 +38,13 @@ double percentile(std::vector<double> values, double share) {
 
 // ---- payloads ------------------------------------------------------------------------------------------------------
 
+wire::Approach unknown_approach() {
+  wire::Approach approach;
+  approach.temperature_c(std::nan(""));
+  approach.time_s(std::nan(""));
+  return approach;
+}
+
 wire::CorrectTargetRequest corrections_of(const std::vector<std::vector<double>>& joints) {
   wire::CorrectTargetRequest request;
   request.about().cell("cell-7");
@@ -45,6 +52,7 @@ wire::CorrectTargetRequest corrections_of(const std::vector<std::vector<double>>
     wire::Target target;
     target.kind(wire::TARGET_JOINTS);
     target.joints_rad(q);
+    target.approach(unknown_approach());
     request.targets().push_back(target);
   }
   return request;
@@ -53,7 +61,12 @@ wire::CorrectTargetRequest corrections_of(const std::vector<std::vector<double>>
 wire::PredictErrorRequest predictions_of(const std::vector<std::vector<double>>& joints) {
   wire::PredictErrorRequest request;
   request.about().cell("cell-7");
-  for (const auto& q : joints) request.joints_rad().push_back(q);
+  for (const auto& q : joints) {
+    wire::CommandedJoints pose;
+    pose.joints_rad(q);
+    pose.approach(unknown_approach());
+    request.poses().push_back(pose);
+  }
   return request;
 }
 
@@ -64,7 +77,7 @@ void fill(const wire::CorrectTargetRequest& request, wire::CorrectTargetReply& r
 }
 
 void fill(const wire::PredictErrorRequest& request, wire::PredictErrorReply& reply) {
-  reply.predictions().resize(request.joints_rad().size());
+  reply.predictions().resize(request.poses().size());
 }
 
 // ---- the echo, a process of its own as the daemon is ----------------------------------------------------------------
@@ -78,7 +91,8 @@ int serve_echo(std::uint32_t domain, std::uint16_t port) {
   std::fflush(stdout);
   const std::stop_source never;
   while (true) {
-    for (const ReaderEvent& event : events.wait(never.get_token(), std::chrono::seconds(1))) {
+    const auto news = events.wait(never.get_token(), std::chrono::seconds(1));
+    for (const ReaderEvent& event : news.readers) {
       if (event.kind != ReaderEvent::Kind::kFound) continue;
       const std::string& partition = event.reader.partition;
       if (event.reader.topic == corrections.reply_topic() && !corrections.expects(partition))

@@ -24,6 +24,8 @@ client::CorrectedTarget corrected(const std::string& status) {
   target.error_before_mm = 1.5;
   target.error_after_mm = 1e-5;
   target.sigma_mm = .04;
+  target.sigma_measured_mm = .05;
+  target.turn_before_rad = kPi / 2;
   target.iterations = 3;
   target.message = status == "ok" ? "" : "because, so";
   return target;
@@ -34,8 +36,8 @@ const std::vector<JointType> kTypes = {JointType::kRevolute, JointType::kPrismat
 TEST(Answers, CorrectionsAreWrittenWithRowStatusPoseJointsAndErrors) {
   EXPECT_EQ(corrections_csv(targets(1), {"abc", kTypes, {corrected("ok")}}),
             "row,status,x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg,q2_mm,error_before_mm,error_after_mm,sigma_mm,iterations,"
-            "model_id,message\n"
-            "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,\n");
+            "model_id,message,sigma_measured_mm,turn_before_deg,turn_after_deg\n"
+            "2,ok,1,2,3,0.5,0.5,-0.5,0.5,90,250,1.5,1e-05,0.04,3,abc,,0.05,90,0\n");
 }
 
 /// The table that corrections of these targets are written as.
@@ -130,7 +132,7 @@ TEST(Answers, CovariancesAndTheTrueErrorsStddevAreAppendedWhereAskedFor) {
   prediction.true_stddev_B = Vector3(1e-4, 2e-4, 3e-4);
   JointList list;
   list.poses.push_back(CommandedPose{});
-  const Predictions with{"abc", {client::PredictedError{}}, {joint_uncertainty(prediction)}};
+  const Predictions with{"abc", {client::PredictedError{}}, {joint_uncertainty(to_wire(prediction))}};
   const CsvTable table = CsvTable::parse(predictions_csv(list, with), "p.csv").value();
   const std::string without = predictions_csv(list, {"abc", {client::PredictedError{}}});
   EXPECT_EQ(without.find("cxy_mm2"), std::string::npos) << "the pinned columns stand alone unless more is asked for";

@@ -37,9 +37,11 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   model.cell = "cell-7";
   model.version = 2;
   model.trained_at_unix_s = 1'700'000'000;
-  model.data_age_s = 86'400;
-  const std::string text = models_text({model}, 1'700'003'600);
-  EXPECT_NE(text.find("2023-11-14 22:13  2023-11-13 23:13"), std::string::npos) << text;
+  model.measured_at_unix_s = 1'699'917'200;
+  EXPECT_NE(models_text({model}).find("2023-11-14 22:13  2023-11-13 23:13"), std::string::npos) << models_text({model});
+  model.measured_at_unix_s.reset();
+  EXPECT_NE(models_text({model}).find("2023-11-14 22:13  -  "), std::string::npos) << "nobody recorded it";
+  EXPECT_TRUE(models_json({model})[0]["data_age_s"].is_null());
 }
 
 TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
@@ -48,8 +50,14 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   end.in_force = true;
   EXPECT_EQ(next_step(end), "");
   EXPECT_EQ(next_step({3, "cell-7", "done", "nothing", 1, 0, false}), "") << "a diagnosis";
-  EXPECT_NE(next_step({3, "cell-7", "failed", "batch b is in quarantine: another tool", 0, 0, false}).find("--release"),
-            std::string::npos);
+  client::JobStatus kept_out{3, "cell-7", "failed", "batch b: another tool", 0, 0, false};
+  kept_out.verdict = "quarantined";
+  EXPECT_NE(next_step(kept_out).find("--release"), std::string::npos);
+  client::JobStatus failed{3, "cell-7", "failed", "a file called quarantine.csv is missing", 0, 0, false};
+  failed.verdict = "failed";
+  EXPECT_EQ(next_step(failed), "") << "words decide nothing";
+  failed.next = "measure more poses";
+  EXPECT_EQ(next_step(failed), "next: measure more poses");
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
@@ -26,8 +25,20 @@ class HandlersTest : public testing::Test {
   wire::PredictErrorRequest predict_request(int count = 1) const {
     wire::PredictErrorRequest request;
     request.about().cell("cell-7");
-    request.joints_rad(std::vector<wire::Joints>(static_cast<std::size_t>(count), kJoints));
+    request.poses(std::vector<wire::CommandedJoints>(static_cast<std::size_t>(count), commanded(kJoints)));
     return request;
+  }
+  static wire::Approach unknown_approach() {
+    wire::Approach approach;
+    approach.temperature_c(kNaN);
+    approach.time_s(kNaN);
+    return approach;
+  }
+  static wire::CommandedJoints commanded(const wire::Joints& joints) {
+    wire::CommandedJoints pose;
+    pose.joints_rad(joints);
+    pose.approach(unknown_approach());
+    return pose;
   }
   wire::CorrectTargetRequest correct_request() const {
     wire::CorrectTargetRequest request;
@@ -35,6 +46,7 @@ class HandlersTest : public testing::Test {
     wire::Target target;
     target.kind(wire::TARGET_JOINTS);
     target.joints_rad(kJoints);
+    target.approach(unknown_approach());
     request.targets({target});
     return request;
   }
@@ -51,6 +63,20 @@ class HandlersTest : public testing::Test {
     request.about().cell("cell-7");
     request.action(action);
     request.version(version);
+    return request;
+  }
+  wire::ReadModelsRequest read_request(wire::ReadKind what, int version = 0) const {
+    wire::ReadModelsRequest request;
+    request.about().cell("cell-7");
+    request.what(what);
+    request.version(version);
+    return request;
+  }
+  wire::ReleaseBatchesRequest release_request(wire::ReleaseAction action, std::vector<std::string> batches) const {
+    wire::ReleaseBatchesRequest request;
+    request.about().cell("cell-7");
+    request.action(action);
+    request.batch_ids(std::move(batches));
     return request;
   }
   std::string request_payload() const {
@@ -75,7 +101,8 @@ TEST_F(HandlersTest, PredictAnswersFromTheModelInForceAndNamesIt) {
   EXPECT_EQ(reply->model().version(), 3);
   EXPECT_EQ(reply->model().hash(), served->model.provenance().hash);
   EXPECT_TRUE(reply->model().in_force());
-  EXPECT_GT(reply->model().data_age_s(), 0);
+  EXPECT_GT(reply->model().training_age_s(), 0);
+  EXPECT_TRUE(std::isnan(reply->model().data_age_s())) << "nobody recorded it";
 }
 
 TEST_F(HandlersTest, AnEmptyRequestIsAnsweredEmpty) {
@@ -109,7 +136,7 @@ TEST_F(HandlersTest, TheContextMustFit) {
 TEST_F(HandlersTest, JointsOutsideTheLimitsHaveNoPrediction) {
   backend_.serve(1);
   auto request = predict_request(2);
-  request.joints_rad()[1][2] = 1.5;  // limit 70 deg
+  request.poses()[1].joints_rad()[2] = 1.5;  // limit 70 deg
   EXPECT_EQ(refusal(request), Refusal("joint vector 2", {}, "q3_deg").beyond(85.9437, 70));
 }
 
@@ -156,12 +183,18 @@ TEST_F(HandlersTest, AStoredVersionAnswersWhenItIsNamed) {
 TEST_F(HandlersTest, WrongNumbersAreRefusedWithTheirPlace) {
   backend_.serve(1);
   auto request = predict_request(3);
-  request.joints_rad()[2] = {1, 2, 3};
+  request.poses()[2].joints_rad({1, 2, 3});
   EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "joints_rad").beyond(3, 6));
-  request.joints_rad()[2] = {1, 2, kNaN, 4, 5, 6};
+  request.poses()[2].joints_rad({1, 2, kNaN, 4, 5, 6});
   EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "joints_rad").value(kNaN));
-  EXPECT_EQ(refusal(predict_request(static_cast<int>(wire::MAX_TARGETS) + 1)),
-            Refusal().of(ErrorCode::kTooLarge).beyond(wire::MAX_TARGETS + 1, wire::MAX_TARGETS));
+  request.poses()[2] = commanded(kJoints);
+  request.poses()[2].approach().directions({1, 0});
+  EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "directions").beyond(2, 6));
+  request.poses()[2].approach().directions({1, 0, 0, 0, 2, 0});
+  EXPECT_EQ(refusal(request), Refusal("joint vector 3", {}, "directions").value(2));
+  request.poses()[2].approach().directions({});
+  request.poses()[2].approach().temperature_c(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(handlers_.answer(request).error().field, "temperature_c");
 
   auto correct = correct_request();
   correct.targets()[0].kind(wire::TARGET_POSE_NEAR_JOINTS);
@@ -190,7 +223,7 @@ TEST_F(HandlersTest, CorrectedTargetsLandWhereTheyWereWanted) {
   EXPECT_NEAR(corrected.error_after_mm(), stddev, 1e-4);
 
   wire::PredictErrorRequest check = predict_request();
-  check.joints_rad({kJoints, corrected.joints_rad()});
+  check.poses({commanded(kJoints), commanded(corrected.joints_rad())});
   const auto there = handlers_.answer(check);
   ASSERT_TRUE(there) << there.error().message;
   EXPECT_NEAR(there->predictions()[1].predicted().x_mm(), there->predictions()[0].nominal().x_mm(), 1e-3);
@@ -287,11 +320,13 @@ TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
   request.batch_ids({"lt-07"});
   const auto job = handlers_.answer(request);
   ASSERT_TRUE(job) << job.error().message;
-  auto look = manage_request(wire::MANAGE_JOB);
+  auto look = read_request(wire::READ_JOB);
   look.job(job->job());
   const auto state = handlers_.answer(look);
   ASSERT_TRUE(state) << state.error().message;
-  EXPECT_EQ(state->job().stage(), wire::JOB_QUEUED);
+  ASSERT_EQ(state->jobs().size(), 1u);
+  EXPECT_EQ(state->jobs().front().stage(), wire::JOB_QUEUED);
+  EXPECT_EQ(state->jobs().front().batch_ids(), std::vector<std::string>{"lt-07"});
   look.job(99);
   EXPECT_EQ(refusal(look), Refusal("", {}, "job").of(ErrorCode::kNotFound).value(99));
 }
@@ -312,24 +347,24 @@ TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->version(), 1);
 
-  const auto list = handlers_.answer(manage_request(wire::MANAGE_LIST));
+  const auto list = handlers_.answer(read_request(wire::READ_MODELS));
   ASSERT_TRUE(list);
   ASSERT_EQ(list->models().size(), 2u);
   EXPECT_TRUE(list->models()[0].in_force());
   EXPECT_FALSE(list->models()[1].in_force());
 
-  const auto exported = handlers_.answer(manage_request(wire::MANAGE_EXPORT, 2));
+  const auto exported = handlers_.answer(read_request(wire::READ_MODEL, 2));
   ASSERT_TRUE(exported) << exported.error().message;
-  const auto in_force = handlers_.answer(manage_request(wire::MANAGE_EXPORT));
+  const auto in_force = handlers_.answer(read_request(wire::READ_MODEL));
   ASSERT_TRUE(in_force);
   EXPECT_EQ(in_force->version(), 1);
   EXPECT_NE(in_force->text(), exported->text());
   auto import = manage_request(wire::MANAGE_IMPORT);
-  import.text(exported->text());
+  import.model_text(exported->text());
   const auto imported = handlers_.answer(import);
   ASSERT_TRUE(imported) << imported.error().message;
   EXPECT_EQ(imported->version(), 2);
-  import.text("{}");
+  import.model_text("{}");
   EXPECT_FALSE(handlers_.answer(import));
 }
 
@@ -340,52 +375,96 @@ TEST_F(HandlersTest, DiagnoseIsQueuedAndAnswersWhenItIsDone) {
   request.batch_id("lt-07");
   const auto queued = handlers_.answer(request);
   ASSERT_TRUE(queued) << queued.error().message;
-  EXPECT_TRUE(queued->findings_json().empty());
-  request.job(queued->job());
-  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kBusy);
+  auto fetch = read_request(wire::READ_FINDINGS);
+  fetch.job(queued->job());
+  EXPECT_EQ(handlers_.answer(fetch).error().code, ErrorCode::kBusy);
   ASSERT_TRUE(backend_.store->store_findings(queued->job(), "{}", "<html>"));
-  EXPECT_EQ(handlers_.answer(request)->findings_json(), "{}");
-  EXPECT_TRUE(handlers_.answer(request)->page_html().empty());
-  request.page(true);
-  EXPECT_EQ(handlers_.answer(request)->page_html(), "<html>");
-  request.about().cell("cell-8");
-  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(handlers_.answer(fetch)->text(), "{}");
+  EXPECT_TRUE(handlers_.answer(fetch)->page_html().empty());
+  fetch.page(true);
+  EXPECT_EQ(handlers_.answer(fetch)->page_html(), "<html>");
+  fetch.about().cell("cell-8");
+  EXPECT_EQ(handlers_.answer(fetch).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  wire::TrainRequest request;
+  request.about().cell("cell-7");
+  request.kind(wire::TRAIN_DIAGNOSED);
+  request.batch_ids({"lt-07"});
+  const auto queued = handlers_.answer(request);
+  ASSERT_TRUE(queued) << queued.error().message;
+  EXPECT_TRUE(backend_.store->diagnosis(queued->job())->apply);
+  request.batch_ids({"lt-07", "lt-08"});
+  EXPECT_EQ(refusal(request), Refusal("", {}, "batch_ids").of(ErrorCode::kUsage).beyond(2, 1));
+}
+
+TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
+  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  const auto is_unsupported = [](const auto& reply) {
+    return reply && reply->header().result() == wire::RESULT_UNSUPPORTED && reply->header().problems().size() == 1;
+  };
+  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_AUDIT,
+                          wire::READ_REPLAY}) {
+    EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
+  }
+  for (const auto action : {wire::MANAGE_CANCEL_JOB, wire::MANAGE_BACKUP})
+    EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(action)))) << action;
+  auto forced = manage_request(wire::MANAGE_ACTIVATE, 1);
+  forced.force(true);
+  EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
+  auto of_epoch = manage_request(wire::MANAGE_ACTIVATE, 1);
+  of_epoch.change().expected_epoch(3);
+  EXPECT_TRUE(is_unsupported(handlers_.answer(of_epoch)));
+  EXPECT_TRUE(is_unsupported(handlers_.answer(release_request(wire::RELEASE_DISCARD, {"lt-07"}))));
+  EXPECT_TRUE(is_unsupported(handlers_.answer(wire::CheckHealthRequest())));
+  wire::TrainRequest train;
+  train.batch_rule("last 3");
+  EXPECT_TRUE(is_unsupported(handlers_.answer(train)));
+  train.batch_rule("");
+  train.prior("fleet");
+  EXPECT_TRUE(is_unsupported(handlers_.answer(train)));
+  train.prior("");
+  train.diagnosis(4);
+  EXPECT_TRUE(is_unsupported(handlers_.answer(train)));
+  EXPECT_EQ(backend_.registry.in_force("cell-7"), nullptr);
 }
 
 TEST_F(HandlersTest, BatchesInQuarantineAreListedAndReleased) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   ASSERT_TRUE(backend_.store->set_quarantine("cell-7", "lt-07", "another tool"));
-  wire::ManageModelsRequest request;
-  request.action(wire::MANAGE_QUARANTINE);
-  const auto all = handlers_.answer(request);
+  auto look = read_request(wire::READ_QUARANTINE);
+  look.about().cell("");
+  const auto all = handlers_.answer(look);
   ASSERT_TRUE(all) << all.error().message;
-  EXPECT_NE(all->text().find("another tool"), std::string::npos) << all->text();
-  request.about().cell("cell-8");
-  EXPECT_EQ(handlers_.answer(request)->text(), "[]");
-  request.about().cell("cell-7");
-  request.action(wire::MANAGE_RELEASE);
-  request.text("lt-07");
-  EXPECT_TRUE(handlers_.answer(request));
-  request.action(wire::MANAGE_QUARANTINE);
-  EXPECT_EQ(handlers_.answer(request)->text(), "[]");
+  ASSERT_EQ(all->batches().size(), 1u);
+  EXPECT_EQ(all->batches().front().quarantine(), "another tool");
+  look.about().cell("cell-8");
+  EXPECT_TRUE(handlers_.answer(look)->batches().empty());
+  EXPECT_TRUE(handlers_.answer(release_request(wire::RELEASE_BATCHES, {"lt-07"})));
+  look.about().cell("cell-7");
+  EXPECT_TRUE(handlers_.answer(look)->batches().empty());
+  EXPECT_EQ(refusal(release_request(wire::RELEASE_BATCHES, {})),
+            Refusal("", {}, "batch_ids").of(ErrorCode::kUsage).beyond(0, 1));
 }
 
 TEST_F(HandlersTest, ABatchIsReleasedOnlyWithATrainingThatIsAccepted) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   ASSERT_TRUE(backend_.store->set_quarantine("cell-7", "lt-07", "another tool"));
-  auto request = manage_request(wire::MANAGE_RELEASE_AND_TRAIN);
-  for (const char* text : {R"({"batches": ["lt-07"], "level": "M9"})", R"({"batches": ["lt-07", "lt-99"]})",
-                           R"({"batches": []})", R"({"batches": "lt-07"})", R"({"level": 3})", "lt-07", "[", ""}) {
-    request.text(text);
-    EXPECT_FALSE(handlers_.answer(request)) << text;
-    EXPECT_EQ(backend_.trainer->quarantined("")->size(), 1u) << text;
-  }
-  request.text(R"({"batches": ["lt-07"], "level": "M1", "bias": "none"})");
+  auto request = release_request(wire::RELEASE_AND_TRAIN, {"lt-07"});
+  request.level("M9");
+  EXPECT_FALSE(handlers_.answer(request));
+  EXPECT_FALSE(handlers_.answer(release_request(wire::RELEASE_AND_TRAIN, {"lt-07", "lt-99"})));
+  EXPECT_FALSE(handlers_.answer(release_request(wire::RELEASE_AND_TRAIN, {})));
+  EXPECT_EQ(backend_.trainer->quarantined("")->size(), 1u);
+  request.level("M1");
+  request.bias("none");
   const auto accepted = handlers_.answer(request);
   ASSERT_TRUE(accepted) << accepted.error().message;
-  EXPECT_GT(accepted->job().number(), 0);
-  EXPECT_EQ(backend_.store->job(accepted->job().number())->level, "M1");
-  EXPECT_TRUE(*backend_.store->may_release(accepted->job().number()));
+  EXPECT_GT(accepted->job(), 0);
+  EXPECT_EQ(backend_.store->job(accepted->job())->level, "M1");
+  EXPECT_TRUE(*backend_.store->may_release(accepted->job()));
   EXPECT_EQ(backend_.trainer->quarantined("")->size(), 1u) << "until its model is put in force";
   EXPECT_TRUE(happens_once(request));
 }
@@ -398,20 +477,21 @@ TEST_F(HandlersTest, JobsAreListedWithStageReasonAndTimes) {
   ASSERT_TRUE(first) << first.error().message;
   ASSERT_TRUE(backend_.store->set_job_running(first->id));
   ASSERT_TRUE(backend_.store->set_job_failed(first->id, "too \"few\" rows"));
-  auto request = manage_request(wire::MANAGE_JOBS);
+  auto request = read_request(wire::READ_JOBS);
   const auto of_cell = handlers_.answer(request);
   ASSERT_TRUE(of_cell) << of_cell.error().message;
-  const auto job = nlohmann::json::parse(of_cell->text()).at("jobs").at(0);
-  EXPECT_EQ(job.at("job"), first->id);
-  EXPECT_EQ(job.at("stage"), "failed");
-  EXPECT_EQ(job.at("what"), "too \"few\" rows");
-  EXPECT_EQ(job.at("batches").at(0), "lt-07");
-  EXPECT_GE(job.at("finished_unix_s"), job.at("started_unix_s"));
-  EXPECT_GE(job.at("started_unix_s"), job.at("created_unix_s"));
+  ASSERT_EQ(of_cell->jobs().size(), 1u);
+  const wire::Job& job = of_cell->jobs().front();
+  EXPECT_EQ(job.number(), first->id);
+  EXPECT_EQ(job.stage(), wire::JOB_FAILED);
+  EXPECT_EQ(job.what(), "too \"few\" rows");
+  EXPECT_EQ(job.batch_ids(), std::vector<std::string>{"lt-07"});
+  EXPECT_GE(job.finished_unix_s(), job.started_unix_s());
+  EXPECT_GE(job.started_unix_s(), job.created_unix_s());
   request.about().cell("");
-  EXPECT_EQ(handlers_.answer(request)->text(), of_cell->text());
+  EXPECT_EQ(handlers_.answer(request)->jobs().size(), 1u);
   request.about().cell("cell-8");
-  EXPECT_EQ(handlers_.answer(request)->text(), R"({"jobs":[]})");
+  EXPECT_TRUE(handlers_.answer(request)->jobs().empty());
 }
 
 TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
@@ -424,13 +504,17 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
     const CompensatedModel model = CompensatedModel::make(parts).value();
     const int version = backend_.store->add_model("cell-7", model, 0, true, "").value();
     backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
-    const double listed = handlers_.answer(manage_request(wire::MANAGE_LIST))->models().back().data_age_s();
-    EXPECT_NEAR(handlers_.answer(predict_request())->model().data_age_s(), listed, 5);
-    EXPECT_EQ(handlers_.answer(manage_request(wire::MANAGE_LIST))->models().back().trained_at_unix_s(), now - 100);
-    return listed;
+    const wire::ModelInfo listed = handlers_.answer(read_request(wire::READ_MODELS))->models().back();
+    const wire::ModelInfo served = handlers_.answer(predict_request())->model();
+    EXPECT_EQ(listed.trained_at_unix_s(), now - 100);
+    EXPECT_NEAR(listed.training_age_s(), 100, 5);
+    EXPECT_EQ(served.measured_at_unix_s(), listed.measured_at_unix_s());
+    EXPECT_EQ(listed.measured_at_unix_s(), measured_at.value_or(-1));
+    EXPECT_EQ(std::isnan(served.data_age_s()), std::isnan(listed.data_age_s()));
+    return listed.data_age_s();
   };
   EXPECT_NEAR(age(now - 5000), 5000, 5);
-  EXPECT_NEAR(age(std::nullopt), 100, 5) << "of the training, where nobody recorded it";
+  EXPECT_TRUE(std::isnan(age(std::nullopt))) << "nobody recorded it";
 }
 
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
@@ -446,11 +530,24 @@ TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
   EXPECT_EQ(reply.header().server().to_string(), "server-a");
 }
 
-TEST_F(HandlersTest, AnotherContractIsRefusedUnread) {
+TEST_F(HandlersTest, AnErrorArrivesAsASentenceAndAsData) {
   test::Answered<wire::PredictError> calls(handlers_, "server-a");
-  auto request = predict_request();
-  request.header().contract_version(wire::CONTRACT_VERSION + 1);
-  EXPECT_EQ(calls.reply_to(request).header().result(), wire::RESULT_WRONG_CONTRACT);
+  backend_.serve(1);
+  auto request = predict_request(2);
+  request.poses()[1].joints_rad()[2] = 1.5;  // limit 70 deg
+  request.header().trace_id("job-17");
+  const auto reply = calls.reply_to(request);
+  EXPECT_EQ(reply.header().result(), wire::RESULT_REFUSED);
+  EXPECT_EQ(reply.header().trace_id().to_string(), "job-17");
+  EXPECT_NE(reply.header().message().find("joint vector 2"), std::string::npos);
+  ASSERT_EQ(reply.header().problems().size(), 1u);
+  const wire::Problem& problem = reply.header().problems().front();
+  EXPECT_EQ(problem.code(), wire::RESULT_REFUSED);
+  EXPECT_EQ(problem.file(), "joint vector 2");
+  EXPECT_EQ(problem.field(), "q3_deg");
+  EXPECT_TRUE(problem.has_value() && problem.has_limit());
+  EXPECT_NEAR(problem.value(), 85.9437, 1e-3);
+  EXPECT_EQ(problem.limit(), 70);
 }
 
 TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <future>
 #include <map>
 #include <memory>
 #include <set>
@@ -27,6 +29,8 @@ wire::CorrectTargetRequest corrections(std::size_t targets) {
   wire::Target target;
   target.kind(wire::TARGET_JOINTS);
   target.joints_rad(kJoints);
+  target.approach().temperature_c(std::nan(""));
+  target.approach().time_s(std::nan(""));
   request.targets(std::vector<wire::Target>(targets, target));
   return request;
 }
@@ -179,20 +183,61 @@ TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {
   import.action(wire::MANAGE_IMPORT);
   std::string text = "[";
   for (int i = 0; i < 500000; ++i) text += "0.125,";
-  import.text(text + "1]");
+  import.model_text(text + "1]");
+  import.change().expected_version(-1);
   constexpr std::size_t kImports = 12;
+  test::RawClient<wire::ReadModels> reader(options_.domain, options_.port, "reader");
+  ASSERT_TRUE(reader.wait_until_matched());
   for (std::size_t i = 0; i < kImports; ++i) slow.send(import, static_cast<std::int64_t>(i));
-  wire::ManageModelsRequest list;
+  wire::ReadModelsRequest list;
   list.about().cell("cell-7");
-  list.action(wire::MANAGE_LIST);
-  other.send(list, 1);
+  list.what(wire::READ_MODELS);
+  reader.send(list, 1);
   wire::ManageModelsRequest rollback;
   rollback.about().cell("cell-8");
   rollback.action(wire::MANAGE_ROLLBACK);
-  other.send(rollback, 2);
-  ASSERT_EQ(other.wait_for_replies(2).size(), 2U);
+  rollback.change().expected_version(-1);
+  other.send(rollback, 1);
+  ASSERT_EQ(reader.wait_for_replies(1).size(), 1U);
+  ASSERT_EQ(other.wait_for_replies(1).size(), 1U);
   EXPECT_LT(slow.replies(), kImports) << "they waited behind the imports";
   EXPECT_EQ(slow.wait_for_replies(kImports).size(), kImports);
+}
+
+class NarrowTest : public LoadTest {
+ protected:
+  static DdsOptions one_at_a_time() {
+    DdsOptions options = test::test_dds_options();
+    options.client_requests = 1;
+    return options;
+  }
+  NarrowTest() : LoadTest(one_at_a_time()) {}
+};
+
+TEST_F(NarrowTest, ASessionThatIsToldToTryAgainLaterDoesSo) {
+  start();
+  const auto session = client::Session::open({options_.domain, {options_.port}, std::chrono::seconds(20)});
+  ASSERT_TRUE(session) << session.error().message;
+  client::CallContext cell_7;
+  cell_7.cell = "cell-7";
+  std::vector<std::future<std::size_t>> callers;
+  for (int k = 0; k < 8; ++k) {
+    callers.push_back(std::async(std::launch::async, [&] {
+      std::size_t answered = 0;
+      for (int i = 0; i < 10; ++i) {
+        client::TargetMm target;
+        target.seed_rad = kJoints;
+        target.joint_target = true;
+        const auto answer = (*session)->correct_targets(cell_7, std::vector<client::TargetMm>(200, target));
+        EXPECT_TRUE(answer) << answer.error().message;
+        answered += answer ? 1 : 0;
+      }
+      return answered;
+    }));
+  }
+  std::size_t answered = 0;
+  for (auto& caller : callers) answered += caller.get();
+  EXPECT_EQ(answered, 80U);
 }
 
 class CrowdTest : public LoadTest {

@@ -62,7 +62,7 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     participant_ = wire::make_participant({"raw client", domain, "127.0.0.1", 0, {port}}).value();
     wire::dds::TypeSupport type(new AnyBytesType(typename Operation::Request().getName()));
     type.register_type(participant_.get());
-    auto* requests = participant_->create_topic(fmt::format("{}_Request", Operation::kName), type.get_type_name(),
+    auto* requests = participant_->create_topic(wire::topic_name(Operation::kName, "_Request"), type.get_type_name(),
                                                 wire::dds::TOPIC_QOS_DEFAULT);
     auto* replies = wire::make_reply_topic<Operation>(*participant_).value();
     participant_->create_subscriber(wire::subscriber_qos(partition_))
@@ -90,16 +90,21 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     return matched_ > 0 && answers_ > 0;
   }
   void send(Bytes bytes) { writer_->write(&bytes); }
-  /// As a client that listens in `partition`.
-  void send_for(const std::string& partition, Request request, std::int64_t sequence_number) {
-    request.header().request_id().sequence_number(sequence_number);
-    request.header().reply_partition(partition);
-    request.header().contract_version(wire::CONTRACT_VERSION);
-    send(to_bytes<typename Operation::Request>(std::move(request)));
-  }
   /// With its header filled in.
   void send(Request request, std::int64_t sequence_number) {
     send_for(partition_, std::move(request), sequence_number);
+  }
+  /// As a client that listens in `partition`.
+  void send_for(const std::string& partition, Request request, std::int64_t sequence_number) {
+    fill_in(request.header(), sequence_number);
+    request.header().reply_partition(partition);
+    send(to_bytes<typename Operation::Request>(std::move(request)));
+  }
+  void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
+    header.request_id().writer_guid(wire::octets_of(writer_->guid()));
+    header.request_id().sequence_number(sequence_number);
+    header.reply_partition(partition_);
+    header.contract_version(wire::CONTRACT_VERSION);
   }
   [[nodiscard]] std::size_t replies() {
     const std::lock_guard lock(mutex_);

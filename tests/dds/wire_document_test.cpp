@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 #include <map>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -51,6 +53,12 @@ TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
                                                       {"kTargetsPerRequest", kTargetsPerRequest},
                                                       {"MAX_JOINTS", MAX_JOINTS},
                                                       {"MAX_NAME", MAX_NAME},
+                                                      {"MAX_ID", MAX_ID},
+                                                      {"MAX_SPELLING", MAX_SPELLING},
+                                                      {"MAX_SENTENCE", MAX_SENTENCE},
+                                                      {"MAX_JOBS", MAX_JOBS},
+                                                      {"MAX_ERRORS", MAX_ERRORS},
+                                                      {"kMaxText", kMaxText},
                                                       {"MAX_BATCHES", MAX_BATCHES},
                                                       {"MAX_VERSIONS", MAX_VERSIONS},
                                                       {"MAX_CELLS", MAX_CELLS},
@@ -59,6 +67,8 @@ TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
                                                       {"kMaxStateSample", kMaxStateSample},
                                                       {"kRequestDepth", kRequestDepth},
                                                       {"kReplyDepth", kReplyDepth},
+                                                      {"client_requests", DdsOptions().client_requests},
+                                                      {"queued_requests", DdsOptions().queued_requests},
                                                       {"max_clients", DdsOptions().max_clients}};
   std::map<std::string, long long> told;
   for (const Row& row : rows()) {
@@ -92,12 +102,12 @@ Row told_of(const std::string& topic, const std::string& writer, const dds::Data
 
 TEST(WireDocument, TellsTheQosOfEveryTopic) {
   const std::vector<Row> expected = {
-      told_of("<Operation>_Request", "client", call_writer_qos(kReplyDepth), call_reader_qos(kRequestDepth)),
-      told_of("<Operation>_Reply", "server", call_writer_qos(kReplyDepth), call_reader_qos(kReplyDepth)),
-      told_of(ServiceStatusTopic::kName, "server", service_status_writer_qos(), state_reader_qos()),
-      told_of(ModelStatusTopic::kName, "server", state_writer_qos(), state_reader_qos()),
-      told_of(ModelSnapshotTopic::kName, "server", state_writer_qos(), state_reader_qos()),
-      told_of(TrainingProgressTopic::kName, "server", progress_writer_qos(), progress_reader_qos())};
+      told_of("<Operation>_2_Request", "client", call_writer_qos(kReplyDepth), call_reader_qos(kRequestDepth)),
+      told_of("<Operation>_2_Reply", "server", call_writer_qos(kReplyDepth), call_reader_qos(kReplyDepth)),
+      told_of(topic_name(ServiceStatusTopic::kName), "server", service_status_writer_qos(), state_reader_qos()),
+      told_of(topic_name(ModelStatusTopic::kName), "server", state_writer_qos(), state_reader_qos()),
+      told_of(topic_name(ModelSnapshotTopic::kName), "server", state_writer_qos(), state_reader_qos()),
+      told_of(topic_name(TrainingProgressTopic::kName), "server", progress_writer_qos(), progress_reader_qos())};
   std::vector<Row> told;
   for (const Row& row : rows()) {
     if (row.size() == 6 && (row[1] == "client" || row[1] == "server")) told.push_back(row);
@@ -105,28 +115,48 @@ TEST(WireDocument, TellsTheQosOfEveryTopic) {
   EXPECT_EQ(told, expected);
 }
 
-TEST(WireDocument, TellsTheNumberOfEveryResultCode) {
-  const std::vector<std::string> names = {"RESULT_OK",
-                                          "RESULT_UNSUPPORTED",
-                                          "RESULT_INVALID_ARGUMENT",
-                                          "RESULT_OUT_OF_RESOURCES",
-                                          "RESULT_UNKNOWN_OPERATION",
-                                          "RESULT_UNKNOWN_EXCEPTION",
-                                          "RESULT_REFUSED",
-                                          "RESULT_NOT_FOUND",
-                                          "RESULT_CONFLICT",
-                                          "RESULT_TOO_LARGE",
-                                          "RESULT_BUSY",
-                                          "RESULT_INTERNAL",
-                                          "RESULT_WRONG_CONTRACT"};
-  ASSERT_EQ(names.size(), RESULT_WRONG_CONTRACT + 1U);
+/// The names of an enumeration of the IDL, in order.
+std::vector<std::string> enumerators_of(const std::string& file, const std::string& enumeration) {
+  std::ifstream idl(std::string(TRAMMEL_SOURCE_DIR) + "/idl/" + file);
+  const std::string text((std::istreambuf_iterator<char>(idl)), {});
+  const std::size_t begin = text.find("enum " + enumeration + " {");
+  std::istringstream lines(text.substr(begin, text.find('}', begin) - begin));
+  std::vector<std::string> names;
+  std::string line;
+  for (std::getline(lines, line); std::getline(lines, line);) {
+    const std::string name = trimmed(line.substr(0, line.find_first_of(",/")));
+    if (!name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+TEST(WireDocument, TellsEveryResultCodeOfTheIdlAndWhatToDo) {
+  const std::vector<std::string> names = enumerators_of("common.idl", "ResultCode");
+  ASSERT_EQ(names.size(), RESULT_MALFORMED + 1U);
+  EXPECT_EQ(names[RESULT_WRONG_CONTRACT], "RESULT_WRONG_CONTRACT");
+  EXPECT_EQ(names[RESULT_MALFORMED], "RESULT_MALFORMED");
   std::vector<std::string> told;
   for (const Row& row : rows()) {
     if (row.size() != 4 || !row[0].starts_with("RESULT_")) continue;
     EXPECT_EQ(row[1], std::to_string(told.size())) << row[0];
+    EXPECT_FALSE(row[2].empty()) << row[0];
+    EXPECT_TRUE(!row[3].empty() || row[0] == "RESULT_OK") << row[0];
     told.push_back(row[0]);
   }
   EXPECT_EQ(told, names);
+}
+
+TEST(WireDocument, TellsTheRoleOfEveryOperation) {
+  const std::set<std::string> operations = {PredictError::kName, CorrectTarget::kName, SubmitMeasurements::kName,
+                                            Train::kName,        Diagnose::kName,      CheckHealth::kName,
+                                            ReadModels::kName,   ManageModels::kName,  ReleaseBatches::kName};
+  const std::set<std::string> roles = {"read", "submit", "change", "release"};
+  std::set<std::string> told;
+  for (const Row& row : rows()) {
+    if (row.size() != 3 || !roles.contains(row[1])) continue;
+    EXPECT_TRUE(told.insert(row[0]).second) << row[0];
+  }
+  EXPECT_EQ(told, operations);
 }
 
 }  // namespace

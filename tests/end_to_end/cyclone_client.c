@@ -1,6 +1,7 @@
 /* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction
  * and prints both. Usage: cyclone_client DOMAIN CELL [LIMIT_S]. The network is set by CYCLONEDDS_URI. */
 #include <dds/dds.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,13 +64,13 @@ int main(int argc, char** argv) {
   if (participant < 0) return fail("no participant");
 
   const dds_entity_t status_topic =
-      dds_create_topic(participant, &trammel_wire_ServiceStatus_desc, "ServiceStatus", NULL, NULL);
+      dds_create_topic(participant, &trammel_wire_v2_ServiceStatus_desc, "ServiceStatus_2", NULL, NULL);
   const dds_entity_t model_topic =
-      dds_create_topic(participant, &trammel_wire_ModelStatus_desc, "ModelStatus", NULL, NULL);
+      dds_create_topic(participant, &trammel_wire_v2_ModelStatus_desc, "ModelStatus_2", NULL, NULL);
   const dds_entity_t request_topic =
-      dds_create_topic(participant, &trammel_wire_PredictErrorRequest_desc, "PredictError_Request", NULL, NULL);
+      dds_create_topic(participant, &trammel_wire_v2_PredictErrorRequest_desc, "PredictError_2_Request", NULL, NULL);
   const dds_entity_t reply_topic =
-      dds_create_topic(participant, &trammel_wire_PredictErrorReply_desc, "PredictError_Reply", NULL, NULL);
+      dds_create_topic(participant, &trammel_wire_v2_PredictErrorReply_desc, "PredictError_2_Reply", NULL, NULL);
   const dds_entity_t status_reader = dds_create_reader(participant, status_topic, state_qos(), NULL);
   const dds_entity_t model_reader = dds_create_reader(participant, model_topic, state_qos(), NULL);
   const char* partitions[1] = {PARTITION};
@@ -80,10 +81,10 @@ int main(int argc, char** argv) {
   const dds_entity_t request_writer = dds_create_writer(participant, request_topic, call_qos(), NULL);
   if (status_reader < 0 || model_reader < 0 || reply_reader < 0 || request_writer < 0) return fail("no endpoints");
 
-  const trammel_wire_ServiceStatus* status = take_one(participant, status_reader);
+  const trammel_wire_v2_ServiceStatus* status = take_one(participant, status_reader);
   if (status == NULL) return fail("no ServiceStatus");
   printf("server=%s contract=%u cells=%u\n", status->server, status->contract_version, status->cells._length);
-  const trammel_wire_ModelStatus* in_force = take_one(participant, model_reader);
+  const trammel_wire_v2_ModelStatus* in_force = take_one(participant, model_reader);
   if (in_force == NULL) return fail("no ModelStatus");
   printf("cell=%s version=%d\n", in_force->cell, in_force->model.version);
 
@@ -99,28 +100,37 @@ int main(int argc, char** argv) {
   }
 
   double values[6] = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
-  trammel_wire_Joints joints = {._maximum = 6, ._length = 6, ._buffer = values, ._release = false};
+  trammel_wire_v2_CommandedJoints pose;
+  memset(&pose, 0, sizeof pose);
+  pose.joints_rad._maximum = pose.joints_rad._length = 6;
+  pose.joints_rad._buffer = values;
+  pose.approach.temperature_c = pose.approach.time_s = NAN;
   char empty[1] = "";
-  trammel_wire_PredictErrorRequest request;
+  dds_guid_t guid;
+  if (dds_get_guid(request_writer, &guid) != DDS_RETCODE_OK) return fail("the writer has no GUID");
+  trammel_wire_v2_PredictErrorRequest request;
   memset(&request, 0, sizeof request);
-  memset(request.header.request_id.writer_guid, 0xc7, sizeof request.header.request_id.writer_guid);
+  memcpy(request.header.request_id.writer_guid, guid.v, sizeof request.header.request_id.writer_guid);
   request.header.request_id.sequence_number = SEQUENCE_NUMBER;
   strcpy(request.header.server, status->server);
   strcpy(request.header.reply_partition, PARTITION);
-  request.header.contract_version = trammel_wire_CONTRACT_VERSION;
+  strcpy(request.header.trace_id, "trace-7");
+  request.header.deadline_ms = 5000;
+  request.header.contract_version = trammel_wire_v2_CONTRACT_VERSION;
   request.about.cell = argv[2];
   request.about.tool = empty;
   request.about.payload = empty;
   request.about.model = empty;
-  request.joints_rad._maximum = 1;
-  request.joints_rad._length = 1;
-  request.joints_rad._buffer = &joints;
+  request.poses._maximum = 1;
+  request.poses._length = 1;
+  request.poses._buffer = &pose;
   if (dds_write(request_writer, &request) != DDS_RETCODE_OK) return fail("cannot write the request");
 
-  const trammel_wire_PredictErrorReply* reply = take_one(participant, reply_reader);
+  const trammel_wire_v2_PredictErrorReply* reply = take_one(participant, reply_reader);
   if (reply == NULL) return fail("no reply");
-  printf("result=%d id=%lld guid=%02x model=%s version=%d items=%u\n", (int)reply->header.result,
-         (long long)reply->header.related_request_id.sequence_number, reply->header.related_request_id.writer_guid[15],
+  const int is_ours = memcmp(reply->header.related_request_id.writer_guid, guid.v, sizeof guid.v) == 0;
+  printf("result=%d id=%lld ours=%d trace=%s model=%s version=%d items=%u\n", (int)reply->header.result,
+         (long long)reply->header.related_request_id.sequence_number, is_ours, reply->header.trace_id,
          reply->model.hash, reply->model.version, reply->predictions._length);
   if (reply->predictions._length == 1) printf("dx_mm=%.6f\n", reply->predictions._buffer[0].dx_mm);
   dds_delete(participant);

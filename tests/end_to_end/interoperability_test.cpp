@@ -10,32 +10,53 @@ namespace {
 
 #ifdef TRAMMEL_CYCLONE_CLIENT
 
-TEST(Interoperability, ACycloneDdsClientGetsItsPrediction) {
-  test::Backend backend;
-  const auto served = backend.serve(7);
-  const DdsOptions options = test::test_dds_options();
-  DdsService service(options, *backend.trainer, *backend.store, backend.registry);
-  const Status started = service.start();
-  ASSERT_TRUE(started) << started.error().message;
-
-  const std::string network = fmt::format(
+/// The environment of a Cyclone DDS client that looks for a server at this port.
+std::string network(const DdsOptions& options) {
+  return fmt::format(
       "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\" "
       "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast></General><Discovery>"
       "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address=\"127.0.0.1:{}\"/></Peers></Discovery></Domain>"
       "</CycloneDDS>",
       options.port);
-  const auto in_domain = [&](std::uint32_t domain, const char* limit_s) {
-    return test::run({"/usr/bin/env", network, TRAMMEL_CYCLONE_CLIENT, std::to_string(domain), "cell-7", limit_s});
-  };
-  const test::Finished client = in_domain(options.domain, "20");
+}
+
+class Interoperability : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Status started = service_.start();
+    ASSERT_TRUE(started) << started.error().message;
+  }
+  test::Finished run(const char* client, std::uint32_t domain, const char* limit_s) {
+    return test::run({"/usr/bin/env", network(options_), client, std::to_string(domain), "cell-7", limit_s});
+  }
+
+  test::Backend backend_;
+  std::shared_ptr<const ServedModel> served_ = backend_.serve(7);
+  const DdsOptions options_ = test::test_dds_options();
+  DdsService service_{options_, *backend_.trainer, *backend_.store, backend_.registry};
+};
+
+TEST_F(Interoperability, ACycloneDdsClientGetsItsPrediction) {
+  const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT, options_.domain, "20");
   EXPECT_EQ(client.exit_code, 0) << client.err;
-  EXPECT_EQ(client.out, fmt::format("server=server-a contract=1 cells=2\n"
+  EXPECT_EQ(client.out, fmt::format("server=server-a contract=2 cells=2\n"
                                     "cell=cell-7 version=7\n"
-                                    "result=0 id=4711 guid=c7 model={} version=7 items=1\n"
+                                    "result=0 id=4711 ours=1 trace=trace-7 model={} version=7 items=1\n"
                                     "dx_mm=0.700000\n",
-                                    served->model.provenance().hash));
-  const test::Finished stranger = in_domain(options.domain + 65, "3");
+                                    served_->model.provenance().hash));
+  const test::Finished stranger = run(TRAMMEL_CYCLONE_CLIENT, options_.domain + 65, "3");
   EXPECT_EQ(stranger.err, "cyclone_client: no ServiceStatus\n") << "it looked at the same port from another domain";
+}
+
+TEST_F(Interoperability, AClientOfTheContractBeforeIsToldThatItMustBeUpdated) {
+  const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT_1, options_.domain, "20");
+  EXPECT_EQ(client.exit_code, 0) << client.err;
+  EXPECT_EQ(
+      client.out,
+      "server=server-a contract=2 cells=2\n"
+      "predict: result=12 id=4711 contract=2 items=0: the request is of contract 1, this server speaks contract 2: "
+      "update the client\n"
+      "list: result=12 models=0\n");
 }
 
 #endif

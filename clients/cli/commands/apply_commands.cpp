@@ -57,6 +57,9 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
     asked.q = pose.context.q;
     asked.tool = pose.context.tool;
     asked.payload = pose.context.payload;
+    asked.direction = pose.context.direction;
+    asked.temperature = pose.context.temperature;
+    asked.time = pose.context.time;
     asked.served = true;
     poses.push_back(std::move(asked));
   }
@@ -68,30 +71,17 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
     const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
     for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
-      if (arguments.covariance) predictions.together.push_back(joint_uncertainty(prediction));
-      if (!arguments.orientation) continue;
-      const Result<RotationUncertainty> turned = rotation_uncertainty(prediction);
-      if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
-      predictions.turned.push_back(*turned);
     }
   }
   return predictions;
 }
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
-  if (arguments.covariance)
-    return failure(ErrorCode::kUsage, "--covariance needs a model file")
-        .of("--covariance")
-        .next("a service does not send covariances");
-  if (arguments.orientation)
-    return failure(ErrorCode::kUsage, "--orientation needs a model file")
-        .of("--orientation")
-        .next("a service does not send these deviations");
   Result<client::CallContext> context = call_context(arguments);
   if (!context) return tl::make_unexpected(context.error());
   context->tool = list.poses.front().context.tool;
   context->payload = list.poses.front().context.payload;
-  std::vector<std::vector<double>> joints;
+  std::vector<client::CommandedJoints> poses;
   for (const CommandedPose& pose : list.poses) {
     if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
       return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
@@ -102,23 +92,37 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
           .with_text(pose.context.tool)
           .next("a service is asked for one of each");
     }
-    joints.push_back(to_wire(pose.context.q, list.joint_types));
+    poses.push_back({to_wire(pose.context.q, list.joint_types), approach_of(pose.context)});
   }
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
   ProgressLine progress;
-  auto answer = (*session)->predict_error(*context, joints, [&](double share) { progress.show("predicting", share); });
+  auto answer =
+      (*session)->predict_error_at(*context, poses, [&](double share) { progress.show("predicting", share); });
   if (!answer) return tl::make_unexpected(answer.error());
   return Predictions{answer->model.id, std::move(answer->items)};
+}
+
+/// What --covariance and --orientation ask for.
+Status add_uncertainties(Predictions& predictions, const ApplyArguments& arguments) {
+  for (const client::PredictedError& item : predictions.items) {
+    if (arguments.covariance) predictions.together.push_back(joint_uncertainty(item));
+    if (!arguments.orientation) continue;
+    const Result<RotationUncertainty> turned = rotation_uncertainty(item);
+    if (!turned) return Failure(turned.error()).as(ErrorCode::kRefused).in(arguments.model);
+    predictions.turned.push_back(*turned);
+  }
+  return {};
 }
 
 Status predict(const ApplyArguments& arguments) {
   Result<JointList> list = read_joint_csv(arguments.input);
   if (!list) return tl::make_unexpected(list.error());
   fill_in(*list, arguments);
-  const Result<Predictions> predictions =
+  Result<Predictions> predictions =
       arguments.service.service ? predict_by_service(*list, arguments) : predict_here(*list, arguments);
   if (!predictions) return tl::make_unexpected(predictions.error());
+  if (const Status added = add_uncertainties(*predictions, arguments); !added) return added;
   if (const Status written = write_output(arguments.output, predictions_csv(*list, *predictions)); !written) {
     return written;
   }

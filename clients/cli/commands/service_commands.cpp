@@ -7,7 +7,6 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
-#include "server/base/unix_time.h"
 
 namespace trammel::cli {
 
@@ -45,8 +44,8 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
     return tl::make_unexpected(written.error());
   }
   const std::string next = next_step(*end);
-  if (end->stage == "failed") {
-    return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what)
+  if (end->stage == "failed" || end->stage == "cancelled") {
+    return refused("job {} of cell {} {}: {}", end->job, end->cell, end->stage, end->what)
         .of("job")
         .with_value(end->job)
         .next(next);
@@ -107,7 +106,7 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
     text += server_text(server);
     list.push_back(server_json(server));
   }
-  tell(text + models_text(*models, unix_now()) + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
+  tell(text + models_text(*models) + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
   return write_json(arguments.json, {{"servers", list},
                                      {"models", models_json(*models)},
                                      {"jobs", jobs_json(*jobs)},
@@ -123,7 +122,7 @@ Status list_models(client::Session& session, const ServiceArguments& arguments) 
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<std::vector<client::ModelInfo>> models = session.models(*cell);
   if (!models) return tl::make_unexpected(models.error());
-  tell(models_text(*models, unix_now()), {arguments.json});
+  tell(models_text(*models), {arguments.json});
   return write_json(arguments.json, {{"cell", *cell}, {"models", models_json(*models)}});
 }
 

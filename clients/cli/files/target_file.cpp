@@ -53,6 +53,11 @@ Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector
 }
 
 Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns, Target& target) {
+  Result<PoseContext> comes = columns.commanded.circumstances(table, row);
+  if (!comes) return tl::make_unexpected(comes.error());
+  target.direction = std::move(comes->direction);
+  target.temperature = comes->temperature;
+  target.time = comes->time;
   target.joint_target = columns.pose.empty();
   if (!columns.commanded.joint_types().empty() &&
       (target.joint_target || !columns.commanded.joints_empty(table, row))) {

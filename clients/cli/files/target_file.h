@@ -23,7 +23,8 @@ struct TargetFile {
 };
 
 /// Reads targets (CSV, mm and deg): `x_mm,y_mm,z_mm,qw,qx,qy,qz` (X_BT) with `conf` (0..7) or `q1_deg`... as the seed,
-/// or `q1_deg`... alone. Other columns are kept. Refuses as batches are, and a pose with neither conf nor seed.
+/// or `q1_deg`... alone. `dir1`..., `temperature_c` and `time_s` say how the arm comes there. Other columns are kept.
+/// Refuses as batches are, and a pose with neither conf nor seed.
 [[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
@@ -16,6 +18,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr double kNotLearned = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kPoseColumns = "x_mm,y_mm,z_mm,qw,qx,qy,qz";
 
 std::string pose_fields(const client::PoseMm& pose) {
@@ -61,15 +64,29 @@ client::PoseMm to_wire(const Pose& X_BT) {
 client::PredictedError to_wire(const ErrorPrediction& prediction) {
   const Vector3 e = prediction.error_B * to_mm(1);
   const Vector3 s = prediction.stddev_B * to_mm(1);
-  return {to_wire(prediction.X_BT_nominal),
-          to_wire(prediction.X_BT_predicted),
-          e.x(),
-          e.y(),
-          e.z(),
-          s.x(),
-          s.y(),
-          s.z(),
-          prediction.in_domain};
+  const Vector3 sl = prediction.true_stddev_B * to_mm(1);
+  const Vector3 r = pose_difference(prediction.X_BT_predicted, prediction.X_BT_nominal).tail<3>();
+  const Vector3 sr = prediction.rotation_stddev_B.value_or(Vector3::Constant(kNotLearned));
+  const Matrix3 c = to_mm(1) * to_mm(1) * prediction.covariance_B;
+  client::PredictedError item{to_wire(prediction.X_BT_nominal),
+                              to_wire(prediction.X_BT_predicted),
+                              e.x(),
+                              e.y(),
+                              e.z(),
+                              s.x(),
+                              s.y(),
+                              s.z(),
+                              prediction.in_domain};
+  std::tie(item.rx_rad, item.ry_rad, item.rz_rad) = std::tuple(r.x(), r.y(), r.z());
+  std::tie(item.slx_mm, item.sly_mm, item.slz_mm) = std::tuple(sl.x(), sl.y(), sl.z());
+  std::tie(item.cxy_mm2, item.cxz_mm2, item.cyz_mm2) = std::tuple(c(0, 1), c(0, 2), c(1, 2));
+  std::tie(item.srx_rad, item.sry_rad, item.srz_rad) = std::tuple(sr.x(), sr.y(), sr.z());
+  item.bias_share = prediction.bias_weight;
+  return item;
+}
+
+client::Approach approach_of(const PoseContext& context) {
+  return {context.direction, context.temperature, context.time};
 }
 
 std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types) {
@@ -89,26 +106,25 @@ client::CorrectedTarget to_wire(const Correction& correction, const std::vector<
           to_mm(correction.error_after),
           to_mm(correction.stddev),
           correction.iterations,
-          correction.message};
+          correction.message,
+          to_mm(correction.measured_stddev),
+          correction.turn_before,
+          correction.turn_after};
 }
 
 client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types) {
   return {to_wire(target.X_BT), target.seed ? to_wire(*target.seed, joint_types) : std::vector<double>(), target.conf,
-          target.joint_target};
+          target.joint_target, client::Approach{target.direction, target.temperature, target.time}};
 }
 
-JointUncertainty joint_uncertainty(const ErrorPrediction& prediction) {
-  const Matrix3 covariance_mm2 = to_mm(1) * to_mm(1) * prediction.covariance_B;
-  const Vector3 stddev_mm = to_mm(1) * prediction.true_stddev_B;
-  return {covariance_mm2(0, 1), covariance_mm2(0, 2), covariance_mm2(1, 2),
-          stddev_mm.x(),        stddev_mm.y(),        stddev_mm.z()};
+JointUncertainty joint_uncertainty(const client::PredictedError& item) {
+  return {item.cxy_mm2, item.cxz_mm2, item.cyz_mm2, item.slx_mm, item.sly_mm, item.slz_mm};
 }
 
-Result<RotationUncertainty> rotation_uncertainty(const ErrorPrediction& prediction) {
-  if (!prediction.rotation_stddev_B)
+Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& item) {
+  if (std::isnan(item.srx_rad))
     return refused("the model learned no orientations: its training poses did not all have one, or its bias is none");
-  const Vector3& s = *prediction.rotation_stddev_B;
-  return RotationUncertainty{to_deg(s.x()), to_deg(s.y()), to_deg(s.z())};
+  return RotationUncertainty{to_deg(item.srx_rad), to_deg(item.sry_rad), to_deg(item.srz_rad)};
 }
 
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
@@ -176,7 +192,8 @@ std::vector<std::string> correction_columns(const Corrections& corrections) {
   for (std::size_t j = 0; j < joints; ++j) {
     columns.push_back(joint_column(static_cast<int>(j), type_of(corrections.joint_types, j)));
   }
-  for (const char* name : {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message"}) {
+  for (const char* name : {"error_before_mm", "error_after_mm", "sigma_mm", "iterations", "model_id", "message",
+                           "sigma_measured_mm", "turn_before_deg", "turn_after_deg"}) {
     columns.emplace_back(name);
   }
   return columns;
@@ -227,8 +244,10 @@ std::string corrections_csv(const TargetFile& file, const Corrections& correctio
         text += csv_number(wire_to_column(item.q_rad[j], type_of(corrections.joint_types, j)));
       }
     }
-    text += fmt::format(",{},{},{},{},{},{}\n", field_of(item.error_before_mm), field_of(item.error_after_mm),
+    text += fmt::format(",{},{},{},{},{},{}", field_of(item.error_before_mm), field_of(item.error_after_mm),
                         field_of(item.sigma_mm), item.iterations, corrections.model_id, csv_field(item.message));
+    text += fmt::format(",{},{},{}\n", field_of(item.sigma_measured_mm), field_of(to_deg(item.turn_before_rad)),
+                        field_of(to_deg(item.turn_after_rad)));
   }
   return text;
 }
@@ -254,6 +273,9 @@ ordered_json corrections_json(const TargetFile& file, const Corrections& correct
     json["error_before_mm"] = json_of(item.error_before_mm);
     json["error_after_mm"] = json_of(item.error_after_mm);
     json["sigma_mm"] = json_of(item.sigma_mm);
+    json["sigma_measured_mm"] = json_of(item.sigma_measured_mm);
+    json["turn_before_deg"] = json_of(to_deg(item.turn_before_rad));
+    json["turn_after_deg"] = json_of(to_deg(item.turn_after_rad));
     json["iterations"] = item.iterations;
     items.push_back(json);
   }

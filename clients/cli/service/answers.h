@@ -19,19 +19,22 @@ namespace trammel::cli {
 [[nodiscard]] std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types);
 [[nodiscard]] client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types);
 
-/// The parts of a prediction's uncertainty that the wire does not carry.
+/// How the arm comes to a pose, as far as that is known.
+[[nodiscard]] client::Approach approach_of(const PoseContext& context);
+
+/// How the coordinates of a prediction's uncertainty hang together, and how much of it is the true error's.
 struct JointUncertainty {
   double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
   double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error: without the tracker's own sigma
 };
-[[nodiscard]] JointUncertainty joint_uncertainty(const ErrorPrediction& prediction);
+[[nodiscard]] JointUncertainty joint_uncertainty(const client::PredictedError& prediction);
 
 /// About the axes of the base, of one measurement of the orientation.
 struct RotationUncertainty {
   double srx_deg = 0, sry_deg = 0, srz_deg = 0;
 };
 /// Refuses a prediction of a model that did not learn orientations.
-[[nodiscard]] Result<RotationUncertainty> rotation_uncertainty(const ErrorPrediction& prediction);
+[[nodiscard]] Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& prediction);
 
 /// Answers with the id of the one model that gave them.
 struct Predictions {

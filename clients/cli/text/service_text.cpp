@@ -1,8 +1,8 @@
 #include "clients/cli/text/service_text.h"
 
-#include <cmath>
 #include <ctime>
 #include <map>
+#include <optional>
 
 namespace trammel::cli {
 
@@ -20,6 +20,11 @@ std::string date_text(std::int64_t unix_s) {
                      parts.tm_hour, parts.tm_min);
 }
 
+template <typename Number>
+ordered_json if_known(const std::optional<Number>& number) {
+  return number ? ordered_json(*number) : ordered_json(nullptr);
+}
+
 ordered_json model_json(const client::ModelInfo& model) {
   return {{"cell", model.cell},
           {"version", model.version},
@@ -28,10 +33,13 @@ ordered_json model_json(const client::ModelInfo& model) {
           {"hash", model.hash},
           {"level", model.level},
           {"batch", model.batch_id},
+          {"batch_hash", model.batch_hash},
           {"trained_at_unix_s", model.trained_at_unix_s},
-          {"data_age_s", model.data_age_s},
+          {"training_age_s", model.training_age_s},
+          {"measured_at_unix_s", if_known(model.measured_at_unix_s)},
+          {"data_age_s", if_known(model.data_age_s)},
           {"training_poses", model.training_poses},
-          {"validation_rms_mm", model.validation_rms_mm}};
+          {"validation_rms_mm", if_known(model.validation_rms_mm)}};
 }
 
 std::string job_line(const client::DatedJob& job) {
@@ -50,15 +58,24 @@ std::string job_line(const client::DatedJob& job) {
 }  // namespace
 
 ordered_json job_json(const client::JobStatus& job) {
-  return {{"job", job.job},          {"cell", job.cell},   {"stage", job.stage},
-          {"what", job.what},        {"share", job.share}, {"model_version", job.model_version},
-          {"in_force", job.in_force}};
+  return {{"job", job.job},
+          {"cell", job.cell},
+          {"stage", job.stage},
+          {"what", job.what},
+          {"share", job.share},
+          {"model_version", job.model_version},
+          {"in_force", job.in_force},
+          {"verdict", job.verdict},
+          {"judged_on", job.judged_on},
+          {"before_mm", if_known(job.before_mm)},
+          {"after_mm", if_known(job.after_mm)},
+          {"limit_mm", if_known(job.limit_mm)},
+          {"u95_mm", if_known(job.u95_mm)},
+          {"why", job.why},
+          {"next", job.next}};
 }
 
 ordered_json jobs_json(const std::vector<client::DatedJob>& jobs) {
-  const auto time = [](const std::optional<std::int64_t>& unix_s) {
-    return unix_s ? ordered_json(*unix_s) : ordered_json(nullptr);
-  };
   ordered_json list = ordered_json::array();
   for (const client::DatedJob& job : jobs) {
     ordered_json one = job_json(job.status);
@@ -66,8 +83,8 @@ ordered_json jobs_json(const std::vector<client::DatedJob>& jobs) {
                 {"kind", job.kind},
                 {"batches", job.batches},
                 {"created_unix_s", job.created_unix_s},
-                {"started_unix_s", time(job.started_unix_s)},
-                {"finished_unix_s", time(job.finished_unix_s)}});
+                {"started_unix_s", if_known(job.started_unix_s)},
+                {"finished_unix_s", if_known(job.finished_unix_s)}});
     list.push_back(std::move(one));
   }
   return list;
@@ -94,16 +111,15 @@ ordered_json models_json(const std::vector<client::ModelInfo>& models) {
   return json;
 }
 
-std::string models_text(const std::vector<client::ModelInfo>& models, std::int64_t now) {
+std::string models_text(const std::vector<client::ModelInfo>& models) {
   if (models.empty()) return "no models\n";
   std::string text = fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id", "poses",
                                  "held out mm", "trained", "data of", "level");
   for (const client::ModelInfo& model : models) {
     text += fmt::format("{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ', model.cell,
                         model.version, model.id, model.training_poses,
-                        model.validation_rms_mm > 0 ? fmt::format("{:.4f}", model.validation_rms_mm) : "-",
-                        date_text(model.trained_at_unix_s),
-                        date_text(now - static_cast<std::int64_t>(std::llround(model.data_age_s))),
+                        model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
+                        date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
                         model.level.empty() ? "nominal" : model.level);
   }
   return text + "  (* in force; dates in UTC)\n";
@@ -117,9 +133,18 @@ std::string server_text(const client::ServerStatus& server) {
 }
 
 ordered_json server_json(const client::ServerStatus& server) {
-  return {{"server", server.server_id},  {"version", server.version},        {"state", server.state},
-          {"cells", server.cells},       {"requests", server.requests},      {"refused", server.refused},
-          {"uptime_s", server.uptime_s}, {"queued_jobs", server.queued_jobs}};
+  return {{"server", server.server_id},
+          {"version", server.version},
+          {"state", server.state},
+          {"cells", server.cells},
+          {"requests", server.requests},
+          {"refused", server.refused},
+          {"shed", server.shed},
+          {"unheard", server.unheard},
+          {"misdirected", server.misdirected},
+          {"unreadable", server.unreadable},
+          {"uptime_s", server.uptime_s},
+          {"queued_jobs", server.queued_jobs}};
 }
 
 std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches) {
@@ -140,15 +165,17 @@ ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batche
 }
 
 std::string next_step(const client::JobStatus& job) {
-  if (job.stage == "failed" && job.what.find("quarantine") != std::string::npos) {
+  if (job.verdict == "quarantined") {
     return fmt::format(
         "next: trammel diagnose --service --cell {0} says what the batch differs in; trammel retrain --service --cell "
         "{0} --batch ID --release learns from it, if it is good",
         job.cell);
   }
-  if (job.model_version == 0 || job.in_force) return "";
-  return fmt::format("next: trammel activate --service --model {}@{} puts it in force, if it is wanted", job.cell,
-                     job.model_version);
+  if (job.model_version > 0 && !job.in_force) {
+    return fmt::format("next: trammel activate --service --model {}@{} puts it in force, if it is wanted", job.cell,
+                       job.model_version);
+  }
+  return job.next.empty() ? "" : "next: " + job.next;
 }
 
 }  // namespace trammel::cli

@@ -15,8 +15,7 @@ namespace trammel::cli {
 [[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
 
 [[nodiscard]] nlohmann::ordered_json models_json(const std::vector<client::ModelInfo>& models);
-/// `now`: Unix time, s, that their ages count from.
-[[nodiscard]] std::string models_text(const std::vector<client::ModelInfo>& models, std::int64_t now);
+[[nodiscard]] std::string models_text(const std::vector<client::ModelInfo>& models);
 
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
@@ -24,7 +23,7 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches);
 [[nodiscard]] std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches);
 
-/// What to do next where a job did not put a model in force; empty where there is nothing.
+/// What to do next where a job did not put a model in force, by its verdict; empty where there is nothing.
 [[nodiscard]] std::string next_step(const client::JobStatus& job);
 
 }  // namespace trammel::cli

@@ -45,7 +45,7 @@ void Lane::stop() {
     stopped_ = true;
     left = turns_.clear();
   }
-  for (const auto& entry : left) entry->job().shed({"the server stops", kSoon});
+  for (const auto& entry : left) entry->job().shed({"the server stops", kSoon, false});
 }
 
 std::optional<Shed> Lane::submit(std::shared_ptr<Job> job, Ask ask) {
@@ -53,8 +53,8 @@ std::optional<Shed> Lane::submit(std::shared_ptr<Job> job, Ask ask) {
   bool all_are_busy = false;
   {
     const MutexLock lock(mutex_);
-    if (stopped_) return Shed{"the server stops", kSoon};
-    if (!place) return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client)};
+    if (stopped_) return Shed{"the server stops", kSoon, false};
+    if (!place) return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client), false};
     if (auto shed = turns_.add(std::move(job), std::move(ask), std::move(*place), now_())) return shed;
     waits_ = true;
     workable_ = true;
@@ -115,7 +115,7 @@ void Lane::run(const Turns::Portion& portion) {
     const MutexLock lock(mutex_);
     given_up = turns_.settle(portion, done, now_());
   }
-  if (given_up) portion.entry->job().shed({"it was not done in time", kSoon});
+  if (given_up) portion.entry->job().shed({"it was not done in time", kSoon, true});
 }
 
 Turns::Done Lane::work_on(const Turns::Portion& portion) {

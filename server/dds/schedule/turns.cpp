@@ -51,7 +51,7 @@ void Turns::forget_clients() {
 }
 
 std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost own, SteadyTime now) const {
-  const auto full = [&](const std::string& why) { return Shed{why, retry_after(ask.client)}; };
+  const auto full = [&](const std::string& why) { return Shed{why, retry_after(ask.client), false}; };
   if (client.entries.size() >= limits_.client_requests) {
     return full(fmt::format("{} requests of this client wait", client.entries.size()));
   }
@@ -67,7 +67,7 @@ std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost ow
                              begins - Cost(ask.start_by - now));
   if (late <= Cost(0)) return std::nullopt;
   return Shed{fmt::format("its {} items would be done in {:.0f} ms, too late", ask.items, 1e3 * ends.count()),
-              as_retry(late)};
+              as_retry(late), false};
 }
 
 Cost Turns::served_in(const Client& client, Cost own, std::size_t items) const {
@@ -150,7 +150,8 @@ std::optional<Shed> Turns::too_late(const Client& client, const Entry& entry, St
                       static_cast<double>(std::max<std::size_t>(1, std::min(ask.items, limits_.workers))));
   const Cost late = Cost(now - limit) + (ask.finish_by && !begun ? together : Cost(0));
   if (late <= Cost(0)) return std::nullopt;
-  return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1))};
+  return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1)),
+              ask.finish_by && now > limit};
 }
 
 void Turns::open(Entry& entry, std::size_t items) {

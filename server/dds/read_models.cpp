@@ -1,0 +1,130 @@
+#include <algorithm>
+
+#include "idl/limits.h"
+#include "server/compensate/model_file.h"
+#include "server/dds/codec.h"
+#include "server/dds/handlers.h"
+
+namespace trammel {
+namespace {
+
+using wire::ReadModelsReply;
+using wire::ReadModelsRequest;
+
+/// The last ones of a list that is longer than an answer takes.
+template <typename Item>
+std::size_t first_of_last(const std::vector<Item>& all, std::size_t most) {
+  return all.size() > most ? all.size() - most : 0;
+}
+
+Status check_fits(const std::string& what, std::size_t bytes) {
+  if (bytes <= wire::kMaxText) return {};
+  return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, bytes, wire::kMaxText)
+      .beyond(bytes, wire::kMaxText);
+}
+
+}  // namespace
+
+Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
+  const std::string& cell = request.about().cell();
+  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE;
+  if (request.what() == wire::READ_JOB) return job_of(request.job());
+  if (request.what() > wire::READ_FINDINGS) return unsupported<ReadModelsReply>("what");
+  if (!cell.empty() || !of_all) {
+    if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  }
+  auto reply = read(cell, request);
+  if (!reply) return reply;
+  if (const auto served = registry_.in_force(cell)) reply->in_force(to_wire(*served, true, unix_now_s()));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModelsRequest& request) const {
+  switch (request.what()) {
+    case wire::READ_MODELS:
+      return models_of(cell);
+    case wire::READ_MODEL:
+      return exported(cell, request.version());
+    case wire::READ_JOBS:
+      return jobs_of(cell);
+    case wire::READ_QUARANTINE:
+      return quarantine_of(cell);
+    case wire::READ_FINDINGS:
+      return findings_of(cell, request.job(), request.page());
+    default:
+      return unsupported<ReadModelsReply>("what");
+  }
+}
+
+Result<ReadModelsReply> Handlers::job_of(std::int64_t job) const {
+  const auto progress = trainer_.progress(job);
+  if (!progress) return tl::make_unexpected(progress.error());
+  const auto asked = store_.job(job);
+  if (!asked) return tl::make_unexpected(asked.error());
+  ReadModelsReply reply;
+  reply.jobs().push_back(to_wire(Trainer::DatedJob{*asked, *progress}));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
+  const auto models = store_.models(cell);
+  if (!models) return tl::make_unexpected(models.error());
+  ReadModelsReply reply;
+  const std::int64_t now = unix_now_s();
+  for (std::size_t i = first_of_last(*models, wire::MAX_VERSIONS); i < models->size(); ++i)
+    reply.models().push_back(to_wire((*models)[i], now));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::exported(const std::string& cell, int asked) const {
+  const auto in_force = registry_.in_force(cell);
+  if (asked == 0 && !in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
+  const int version = asked == 0 ? in_force->version : asked;
+  const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                              : store_.model(cell, version);
+  if (!model) return tl::make_unexpected(model.error());
+  ReadModelsReply reply;
+  reply.version(version);
+  reply.text(serialize(*model));
+  const Status fits = check_fits(fmt::format("cell {} version {}", cell, version), reply.text().size());
+  if (!fits) return tl::make_unexpected(fits.error());
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::jobs_of(const std::string& cell) const {
+  const auto jobs = trainer_.jobs(cell);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  ReadModelsReply reply;
+  for (std::size_t i = first_of_last(*jobs, wire::MAX_JOBS); i < jobs->size(); ++i)
+    reply.jobs().push_back(to_wire((*jobs)[i]));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::quarantine_of(const std::string& cell) const {
+  const auto batches = trainer_.quarantined(cell);
+  if (!batches) return tl::make_unexpected(batches.error());
+  ReadModelsReply reply;
+  for (std::size_t i = first_of_last(*batches, wire::MAX_VERSIONS); i < batches->size(); ++i)
+    reply.batches().push_back(to_wire((*batches)[i]));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int64_t job, bool page) const {
+  const auto asked = trainer_.progress(job);
+  if (!asked) return tl::make_unexpected(asked.error());
+  if (asked->cell != cell)
+    return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
+  auto found = trainer_.diagnosis(job);
+  if (!found) return tl::make_unexpected(found.error());
+  ReadModelsReply reply;
+  if (page) reply.page_html(std::move(found->page));
+  const std::size_t bytes = found->findings.size() + reply.page_html().size();
+  if (const Status fits = check_fits(fmt::format("what job {} found", job), bytes); !fits)
+    return Failure(fits.error()).next("ask without the page");
+  reply.text(std::move(found->findings));
+  return reply;
+}
+
+bool happens_once(const ReadModelsRequest&) { return false; }
+
+}  // namespace trammel
