@@ -78,18 +78,20 @@ TEST_F(LoadTest, EightClientsThatAskForMoreThanCanBeDoneAreAllAnsweredOrToldSo) 
   for (std::size_t i = 0; i < kSent; ++i) {
     for (auto& client : clients) client->send(corrections(500), static_cast<std::int64_t>(i));
   }
-  std::size_t busy = 0;
+  std::size_t busy = 0, least = kSent, most = 0;
   for (auto& client : clients) {
     const auto replies = client->wait_for_replies(kSent);
     auto counted = codes(replies);
     EXPECT_EQ(counted[wire::RESULT_OK] + counted[wire::RESULT_BUSY], kSent);
-    EXPECT_GE(counted[wire::RESULT_OK], 32U) << "one client was served, another not";
+    least = std::min(least, counted[wire::RESULT_OK]);
+    most = std::max(most, counted[wire::RESULT_OK]);
     busy += counted[wire::RESULT_BUSY];
     std::set<std::int64_t> numbers;
     for (const auto& reply : replies) numbers.insert(reply.header().related_request_id().sequence_number());
     EXPECT_EQ(numbers.size(), kSent) << "one was answered twice, another not at all";
   }
   EXPECT_GT(busy, 0U);
+  EXPECT_GE(3 * least, most) << "one client was served, another not";
 }
 
 TEST_F(LoadTest, AnHonestClientAmongSixteenFloodersTakesTurnsWithThem) {
@@ -101,25 +103,20 @@ TEST_F(LoadTest, AnHonestClientAmongSixteenFloodersTakesTurnsWithThem) {
   }
   auto honest = corrector("honest");
   ASSERT_TRUE(honest->wait_until_matched());
-  for (int i = 0; i < 60; ++i) {
-    for (auto& flooder : flooders) flooder->send(corrections(200), i);
+  constexpr std::size_t kEach = 60;
+  wire::CorrectTargetRequest patient = corrections(200);
+  patient.header().deadline_ms(600000);
+  for (std::size_t i = 0; i < kEach; ++i) {
+    for (auto& flooder : flooders) flooder->send(patient, static_cast<std::int64_t>(i));
   }
-  const auto answered = [&] {
-    std::size_t all = 0;
-    for (auto& flooder : flooders) all += flooder->replies();
-    return all;
-  };
-  std::size_t before = answered();
-  std::size_t most = 0;
-  for (int i = 0; i < 5; ++i) {
-    honest->send(corrections(1), i);
-    ASSERT_EQ(honest->wait_for_replies(static_cast<std::size_t>(i) + 1).size(), static_cast<std::size_t>(i) + 1);
-    const std::size_t now = answered();
-    most = std::max(most, now - before);
-    before = now;
+  for (std::size_t i = 0; i < 5; ++i) {
+    honest->send(corrections(1), static_cast<std::int64_t>(i));
+    ASSERT_EQ(honest->wait_for_replies(i + 1).size(), i + 1);
   }
+  std::size_t answered = 0;
+  for (auto& flooder : flooders) answered += flooder->replies();
   EXPECT_EQ(codes(honest->wait_for_replies(5))[wire::RESULT_OK], 5U);
-  EXPECT_LT(most, 16U * 60U / 4) << "it waited behind the requests of the others";
+  EXPECT_LT(answered, flooders.size() * kEach / 2) << "it waited behind the requests of the others";
 }
 
 TEST_F(LoadTest, RepliesThatNobodyReadsCostNobodyElseAnything) {
