@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
+#include <utility>
+
+#include "server/base/plain_text.h"
 
 namespace trammel::wire {
 namespace {
@@ -11,11 +13,11 @@ namespace {
 constexpr std::size_t kEncapsulation = 4;
 constexpr std::size_t kMostPadding = 3;
 
+}  // namespace
+
 bool is_token(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c > 0x20 && c < 0x7f; });
 }
-
-}  // namespace
 
 Fault fault_of_contract(std::uint32_t contract_version) {
   Fault fault{RESULT_WRONG_CONTRACT, {}, {}, "contract_version", {}, {}};
@@ -92,6 +94,9 @@ void CdrWalk::text(const char* field, std::size_t most_bytes, Text kind) {
     return fail(RESULT_REFUSED, fmt::format("{} has a NUL byte, it is no text", field), field);
   if (kind == Text::kToken && !is_token(text))
     return fail(RESULT_REFUSED, fmt::format("{} must be printable ASCII without spaces", field), field);
+  if (kind == Text::kPlain && !is_plain(text))
+    return fail(RESULT_REFUSED,
+                fmt::format("{} '{}' must be UTF-8 without control characters", field, shown_short(text)), field);
 }
 
 std::size_t CdrWalk::list(const char* field, std::size_t most, std::size_t least_bytes) {

@@ -15,6 +15,9 @@ namespace trammel::wire {
 
 using namespace v2;
 
+/// Whether the text is printable ASCII without spaces.
+[[nodiscard]] bool is_token(std::string_view text);
+
 /// Why a sample cannot be used.
 struct Fault {
   ResultCode code = RESULT_MALFORMED;

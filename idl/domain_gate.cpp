@@ -11,6 +11,8 @@
 #include <string_view>
 #include <utility>
 
+#include "idl/guard/guard.h"
+#include "idl/limits.h"
 #include "server/base/mutex.h"
 
 namespace trammel::wire {
@@ -20,63 +22,10 @@ namespace rtps = eprosima::fastdds::rtps;
 using eprosima::fastrtps::rtps::Locator_t;
 using eprosima::fastrtps::rtps::LocatorsIterator;
 using eprosima::fastrtps::rtps::SenderResource;
-using Bytes = std::span<const unsigned char>;
 
-// RTPS 2.3: the header, submessages, parameter lists (9.4, 9.6.2.2).
-constexpr std::size_t kHeader = 20;
-constexpr std::size_t kPrefixAt = 8, kPrefix = 12;
-constexpr unsigned char kPad = 0x01, kInfoTimestamp = 0x09, kData = 0x15;
-constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04;
-constexpr std::uint32_t kAnnouncer = 0x000100c2;  // entity id of the writer
 constexpr std::chrono::milliseconds kBetweenLosses{500};
-constexpr std::uint16_t kSentinel = 0x0001, kDomainId = 0x000f, kUserData = 0x002c;
+constexpr std::uint16_t kDomainId = 0x000f, kUserData = 0x002c;
 constexpr std::string_view kMark = "trammel.domain=";
-
-/// Reads from the front. Empty when too few bytes are left.
-class Reader {
- public:
-  Reader(Bytes bytes, bool little_endian) : rest_(bytes), little_endian_(little_endian) {}
-
-  std::optional<Bytes> take(std::size_t count) {
-    if (count > rest_.size()) return std::nullopt;
-    const Bytes front = rest_.first(count);
-    rest_ = rest_.subspan(count);
-    return front;
-  }
-  std::optional<std::uint16_t> u16() {
-    const auto b = take(2);
-    if (!b) return std::nullopt;
-    const auto first = static_cast<unsigned>((*b)[0]), second = static_cast<unsigned>((*b)[1]);
-    return static_cast<std::uint16_t>(little_endian_ ? first | second << 8 : first << 8 | second);
-  }
-  std::optional<std::uint32_t> u32() {
-    const auto b = take(4);
-    if (!b) return std::nullopt;
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | (*b)[little_endian_ ? 3 - i : i];
-    return value;
-  }
-  [[nodiscard]] Bytes rest() const { return rest_; }
-
- private:
-  Bytes rest_;
-  bool little_endian_;
-};
-
-struct Parameter {
-  std::uint16_t id = 0;
-  Bytes value;
-};
-
-/// The next parameter of a list; empty at its end.
-std::optional<Parameter> next_parameter(Reader& list) {
-  const auto id = list.u16();
-  const auto length = list.u16();
-  if (!id || !length || *id == kSentinel) return std::nullopt;
-  const auto value = list.take(*length);
-  if (!value) return std::nullopt;
-  return Parameter{*id, *value};
-}
 
 std::optional<std::uint32_t> marked_domain(Bytes user_data) {
   const std::string_view text(reinterpret_cast<const char*>(user_data.data()), user_data.size());
@@ -138,18 +87,10 @@ template <typename Found>
 bool any_data(Bytes message, const Found& found) {
   if (message.size() < kHeader) return false;
   Bytes rest = message.subspan(kHeader);
-  while (rest.size() >= 4) {
-    const unsigned char id = rest[0], flags = rest[1];
-    Reader length_reader(rest.subspan(2), (flags & kLittleEndian) != 0);
-    std::size_t length = length_reader.u16().value_or(0);
-    const Bytes body = length_reader.rest();
-    if (length == 0 && id != kPad && id != kInfoTimestamp) length = body.size();  // to the end of the message
-    if (length > body.size()) return false;
-    if (id == kData) {
-      const auto data = data_of(body.first(length), flags);
-      if (data && found(*data)) return true;
-    }
-    rest = body.subspan(length);
+  while (const auto submessage = next_submessage(rest)) {
+    if (submessage->id != kData) continue;
+    const auto data = data_of(submessage->body, submessage->flags);
+    if (data && found(*data)) return true;
   }
   return false;
 }
@@ -169,20 +110,31 @@ class Gate final : public rtps::ChainingTransport {
       if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
       knows_itself_ = true;
     }
+    if (guard_) guard_->sent(Bytes(buffer, size));
     return below->send(buffer, size, first, last, limit);
   }
 
   void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
                const Locator_t& here, const Locator_t& there) override {
-    const Bytes message(buffer, size);
+    const auto passed = guard_ ? guard_->check(Bytes(buffer, size), socket_of(there)) : Bytes(buffer, size);
+    if (!passed) return;
+    const Bytes message = *passed;
     if (is_of_another_domain(message, domain_)) return;
     const bool own = heard_ && is_own(message);
     if (own && is_to_be_lost(message)) return;
-    next->OnDataReceived(buffer, size, here, there);
+    next->OnDataReceived(message.data(), static_cast<std::uint32_t>(message.size()), here, there);
     if (own && is_announcement(message)) ++heard_->announcements;
   }
 
  private:
+  /// Address and port of an IPv4 socket.
+  static std::uint64_t socket_of(const Locator_t& there) {
+    const auto& address = there.address;
+    std::uint64_t socket = there.port;
+    for (std::size_t i = 12; i < 16; ++i) socket = socket << 8 | address[i];
+    return socket;
+  }
+
   [[nodiscard]] bool is_own(Bytes message) const {
     if (!knows_itself_ || message.size() < kHeader) return false;
     return std::equal(own_prefix_.begin(), own_prefix_.end(), message.begin() + kPrefixAt);
@@ -205,6 +157,7 @@ class Gate final : public rtps::ChainingTransport {
   std::unique_ptr<GateDescriptor> configuration_;
   const std::uint32_t domain_;
   const std::shared_ptr<HeardOfItself> heard_;
+  const std::unique_ptr<Guard> guard_;
   std::atomic<bool> knows_itself_{false};
   Mutex mutex_;
   std::array<unsigned char, kPrefix> own_prefix_{};         // written once, before knows_itself_
@@ -215,20 +168,27 @@ class Gate final : public rtps::ChainingTransport {
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {
  public:
   GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t of,
-                 std::shared_ptr<HeardOfItself> counted)
-      : ChainingTransportDescriptor(std::move(below)), domain(of), heard(std::move(counted)) {}
+                 std::shared_ptr<HeardOfItself> counted, std::shared_ptr<DropCounts> dropped_counts)
+      : ChainingTransportDescriptor(std::move(below)),
+        domain(of),
+        heard(std::move(counted)),
+        dropped(std::move(dropped_counts)) {}
 
   rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
 
   std::uint32_t domain;
   std::shared_ptr<HeardOfItself> heard;
+  std::shared_ptr<DropCounts> dropped;  // null: no guard
 };
 
 Gate::Gate(const GateDescriptor& descriptor)
     : ChainingTransport(descriptor),
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
       domain_(descriptor.domain),
-      heard_(descriptor.heard) {}
+      heard_(descriptor.heard),
+      guard_(descriptor.dropped
+                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.dropped)
+                 : nullptr) {}
 
 rtps::TransportDescriptorInterface* Gate::get_configuration() { return configuration_.get(); }
 
@@ -236,20 +196,20 @@ rtps::TransportDescriptorInterface* Gate::get_configuration() { return configura
 
 std::string domain_mark(std::uint32_t domain) { return fmt::format("{}{}", kMark, domain); }
 
-bool is_of_another_domain(Bytes message, std::uint32_t domain) {
+bool is_of_another_domain(std::span<const unsigned char> message, std::uint32_t domain) {
   return any_data(message, [domain](const Data& data) {
     return data.writer == kAnnouncer && says_another_domain(data.payload, domain);
   });
 }
 
-bool is_announcement(Bytes message) {
+bool is_announcement(std::span<const unsigned char> message) {
   return any_data(message, [](const Data& data) { return data.writer == kAnnouncer && !data.payload.empty(); });
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(
     std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t domain,
-    std::shared_ptr<HeardOfItself> heard) {
-  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard));
+    std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped) {
+  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard), std::move(dropped));
 }
 
 }  // namespace trammel::wire

@@ -10,6 +10,8 @@
 #include <span>
 #include <string>
 
+#include "idl/guard/dropped.h"
+
 /// Keeps DDS domains apart. Discovery here uses a fixed port in every domain, and Fast DDS 2.9 does not check the
 /// domain of an announcement. So this gate, a transport below the library, reads the domain in each announcement and
 /// drops those of other domains. The library ignores participants that it has not discovered.
@@ -35,9 +37,10 @@ struct HeardOfItself {
   std::atomic<std::uint32_t> first_lost_of{0};
 };
 
-/// The transport `below` with the gate in front. `heard` may be null.
+/// The transport `below` with the gate in front, and before it the guard (guard/guard.h), which counts in `dropped`.
+/// `heard` may be null. Without `dropped` there is no guard: for tests that show what it is for.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> with_domain_gate(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below, std::uint32_t domain,
-    std::shared_ptr<HeardOfItself> heard);
+    std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped);
 
 }  // namespace trammel::wire

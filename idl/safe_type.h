@@ -104,6 +104,7 @@ class ReceivedType final : public SafeType<PubSubType> {
       return false;
     }
     received.fault = fault_of(*payload, received.header());
+    if (!is_token(received.header().trace_id().c_str())) received.header().trace_id("");
     if (received.fault || this->deserialize_unseen(payload, static_cast<Request*>(&received))) return true;
     received.fault = Fault{RESULT_MALFORMED, "the sample cannot be read", {}, {}, {}, {}};
     return true;

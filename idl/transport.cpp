@@ -119,7 +119,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   const std::string mark = domain_mark(options.domain);
   qos.user_data().setValue(std::vector<unsigned char>(mark.begin(), mark.end()));
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports = {with_domain_gate(udp, options.domain, options.heard_of_itself)};
+  qos.transport().user_transports = {with_domain_gate(udp, options.domain, options.heard_of_itself, options.dropped)};
   qos.transport().send_socket_buffer_size = kSocketBuffer;
   qos.transport().listen_socket_buffer_size = kSocketBuffer;
   auto& builtin = qos.wire_protocol().builtin;

@@ -37,6 +37,8 @@ struct ParticipantOptions {
   std::vector<std::uint16_t> peer_ports;  ///< on `address`: where it looks for others
   /// If set, the participant is its own peer on `listen_port`, and its announcements are counted when they come back.
   std::shared_ptr<HeardOfItself> heard_of_itself = {};
+  /// Counts what the guard drops.
+  std::shared_ptr<DropCounts> dropped = std::make_shared<DropCounts>();
 };
 
 struct ParticipantDeleter {

@@ -15,6 +15,8 @@ template <typename Struct>
 struct Of {};  // which type a shape is of
 
 void id(CdrWalk& walk, const char* field) { walk.text(field, MAX_ID, Text::kPlain); }
+/// A name that a server tells; whoever shows it to people spells out what is not plain.
+void told(CdrWalk& walk, const char* field) { walk.text(field, MAX_ID, Text::kAny); }
 void sentence(CdrWalk& walk, const char* field) { walk.text(field, MAX_SENTENCE, Text::kAny); }
 void spelling(CdrWalk& walk, const char* field) { walk.text(field, MAX_SPELLING, Text::kPlain); }
 void token(CdrWalk& walk, const char* field) { walk.text(field, MAX_NAME, Text::kToken); }
@@ -29,12 +31,13 @@ void shape(CdrWalk& walk, Of<SampleIdentity>) {
   walk.wides(1);
 }
 
-void shape(CdrWalk& walk, Of<RequestHeader>) {
+/// A trace that is none is no reason to leave a request unanswered.
+void shape(CdrWalk& walk, Of<RequestHeader>, Text trace = Text::kToken) {
   shape(walk, Of<SampleIdentity>());
   token(walk, "server");
   token(walk, "reply_partition");
   walk.longs(2);
-  token(walk, "trace_id");
+  walk.text("trace_id", MAX_NAME, trace);
 }
 
 void shape(CdrWalk& walk, Of<Change>) {
@@ -83,10 +86,10 @@ void shape(CdrWalk& walk, Of<ReplyHeader>) {
 }
 
 void shape(CdrWalk& walk, Of<ModelInfo>) {
-  for (const char* field : {"cell", "id", "hash"}) id(walk, field);
-  spelling(walk, "level");
+  for (const char* field : {"cell", "id", "hash"}) told(walk, field);
+  walk.text("level", MAX_SPELLING, Text::kAny);
   sentence(walk, "batch_id");
-  id(walk, "batch_hash");
+  told(walk, "batch_hash");
   walk.longs(1);
   walk.wides(5);
   walk.longs(1);
@@ -206,7 +209,7 @@ void shape(CdrWalk& walk, Of<ReadModelsRequest>) {
 
 void shape(CdrWalk& walk, Of<Job>) {
   walk.wides(1);
-  id(walk, "cell");
+  told(walk, "cell");
   walk.enumerator("kind", JOB_CHECK);
   walk.enumerator("stage", JOB_CANCELLED);
   sentence(walk, "what");
@@ -214,12 +217,12 @@ void shape(CdrWalk& walk, Of<Job>) {
   walk.longs(1);
   walk.flag("in_force");
   walk.enumerator("verdict", VERDICT_CANCELLED);
-  walk.longs(1);
   walk.wides(4);
   walk.enumerator("code", RESULT_MALFORMED);
   sentence(walk, "why");
   sentence(walk, "next");
-  batch_ids(walk);
+  walk.wides(2);
+  walk.list("batch_ids", MAX_BATCHES, kNumber, "batch", [&] { told(walk, "batch_ids"); });
   walk.wides(3);
 }
 
@@ -228,7 +231,7 @@ void shape(CdrWalk& walk, Of<ReadModelsReply>) {
   walk.list("models", MAX_VERSIONS, 64, "model", [&] { shape(walk, Of<ModelInfo>()); });
   walk.list("jobs", MAX_JOBS, 64, "job", [&] { shape(walk, Of<Job>()); });
   walk.list("batches", MAX_VERSIONS, 24, "batch", [&] {
-    for (const char* field : {"cell", "id", "hash"}) id(walk, field);
+    for (const char* field : {"cell", "id", "hash"}) told(walk, field);
     walk.longs(1);
     walk.wides(1);
     sentence(walk, "quarantine");
@@ -283,8 +286,9 @@ void shape(CdrWalk& walk, Of<ServiceStatus>) {
   walk.enumerator("state", SERVICE_STOPPING);
   walk.list("cells", MAX_CELLS, kNumber, "cell", [&] { id(walk, "cells"); });
   walk.longs(1);
-  walk.wides(7);
+  walk.wides(8);
   walk.longs(1);
+  sentence(walk, "trouble");
   walk.wides(1);
 }
 
@@ -316,7 +320,7 @@ std::optional<Fault> find_fault(std::span<const unsigned char> sample) {
 template <>
 std::optional<Fault> find_fault<RequestHeader>(std::span<const unsigned char> sample) {
   CdrWalk walk(sample);
-  shape(walk, Of<RequestHeader>());
+  shape(walk, Of<RequestHeader>(), Text::kAny);
   return walk.fault();
 }
 

@@ -1,5 +1,6 @@
 // trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
 #include <signal.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -9,16 +10,21 @@
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
+#include "server/base/memory.h"
 #include "server/base/mutex.h"
+#include "server/base/plain_text.h"
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
+#include "server/dds/port_lock.h"
 #include "server/dds/watchdog.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
+#include "server/trainer/compute/compute_main.h"
 #include "server/trainer/trainer.h"
 
 namespace trammel {
@@ -64,11 +70,23 @@ int refuse_start(std::vector<Error> problems) {
 /// Prints what a start would meet on this host.
 int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
-  for (const std::string& note : found.notes) fmt::print("{}\n", note);
+  for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
   if (!found.problems.empty()) return refuse_start(found.problems);
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
+
+/// The message in one line that controls no terminal, whatever names it holds.
+class PlainMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& line) override {
+    const std::string plain = shown({message.payload.data(), message.payload.size()});
+    line.append(plain.data(), plain.data() + plain.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PlainMessage>();
+  }
+};
 
 Status start_log(const LogOptions& options) {
   try {
@@ -79,14 +97,20 @@ Status start_log(const LogOptions& options) {
   }
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
+  auto line = std::make_unique<spdlog::pattern_formatter>();
+  line->add_flag<PlainMessage>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*");
+  spdlog::set_formatter(std::move(line));
   return {};
 }
 
 void log_progress(const JobProgress& progress) {
   switch (progress.stage) {
     case JobStage::kQueued:
-      spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+      if (progress.what.empty()) {
+        spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+      } else {
+        spdlog::warn("{}: job {} is queued: {}", progress.cell, progress.job, progress.what);
+      }
       break;
     case JobStage::kTraining:
       spdlog::debug("{}: job {}: {}, {:.0f} %", progress.cell, progress.job, progress.what, 100 * progress.share);
@@ -168,9 +192,10 @@ Status serve(const ServerConfig& config) {
   StopSignals signals;  // before any thread starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
-  ModelRegistry registry;
+  ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
+  service.set_packet_listener([](const std::string& dropped) { spdlog::warn("{}", dropped); });
   trainer.set_listeners(
       [&service](const JobProgress& progress) {
         log_progress(progress);
@@ -180,11 +205,20 @@ Status serve(const ServerConfig& config) {
         if (!in_force) return;
         spdlog::info("{}: version {} ({}) is in force", model.cell, model.version, model.model.provenance().id);
         service.publish_model(model.cell);
+      },
+      [](const std::string& trouble, bool over) {
+        if (over) return spdlog::info("over: {}", trouble);
+        spdlog::warn("{}", trouble);
       });
 
   const auto notices = trainer.take_up();
   if (!notices) return tl::make_unexpected(notices.error());
   for (const std::string& notice : *notices) spdlog::warn("{}", notice);
+  // A second copy of this server is told about the port first.
+  const Status free = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
+  if (!free) return free;
+  const auto name = PortLock::take_name(config.dds.domain, config.dds.server_id);
+  if (!name) return tl::make_unexpected(name.error());
   if (const Status started = service.start(); !started) return started;
   if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
   spdlog::info("ready: {} serves {} cells on {}:{}, domain {}, store {}", config.dds.server_id, config.cells.size(),
@@ -200,6 +234,7 @@ Status serve(const ServerConfig& config) {
 int run(const Arguments& arguments) {
   ServerReading server = read_server(arguments.config);
   ServerConfig& config = server.config;
+  config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
   if (arguments.store) config.store = *arguments.store;
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
@@ -216,6 +251,8 @@ int run(const Arguments& arguments) {
 }  // namespace trammel
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == trammel::kComputeWord)
+    return trammel::compute_main({argv + 2, argv + argc});
   CLI::App app("Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or SIGINT.",
                "trammeld");
   app.footer(
@@ -236,5 +273,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : trammel::kExitUsage;
   }
+  trammel::give_large_blocks_back();
   return trammel::run(arguments);
 }

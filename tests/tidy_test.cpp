@@ -45,7 +45,8 @@ const std::map<std::string, Outsider> kOutsiders = {
     {"clients/cam", {{"idl", "clients/session"}, 0}},
     {"clients/cli", {{"clients/session", "clients/cam"}, 7}},
     {"clients", {{"clients/cli"}, -1}},
-    {"idl", {{}, 0}},
+    {"idl", {{"idl/guard"}, 0}},
+    {"idl/guard", {{}, 0}},
 };
 
 /// Headers of other people's libraries that only some may include.
@@ -197,7 +198,9 @@ std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder
     if (target_floor && *target_floor <= outsider->second.highest_floor) return std::nullopt;
     return target + " is not for " + room;
   }
-  if (target == "idl") return room == "server/dds" ? std::nullopt : std::optional<std::string>("idl is for server/dds");
+  if (target == "idl" || target == "idl/guard") {
+    return room == "server/dds" ? std::nullopt : std::optional<std::string>(target + " is for server/dds");
+  }
   if (!target_floor) return target + " has no floor that the server knows";
   const int own = *floor_of(rooms, room);
   if (*target_floor < own) return std::nullopt;

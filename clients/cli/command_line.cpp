@@ -1,9 +1,11 @@
 #include "clients/cli/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <sstream>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/plain_text.h"
 
 namespace trammel::cli {
 
@@ -41,6 +43,15 @@ std::string json_path_of(const CLI::App& command) {
   return option == nullptr || option->empty() ? std::string() : option->as<std::string>();
 }
 
+/// Prints help or what is wrong with the arguments, and returns the parser's own exit code.
+int told(const CLI::App& app, const CLI::ParseError& error) {
+  std::ostringstream out, err;
+  const int code = app.exit(error, out, err);
+  fmt::print("{}", shown_lines(out.str()));
+  fmt::print(stderr, "{}", shown_lines(err.str()));
+  return code;
+}
+
 }  // namespace
 
 int run_command_line(int argc, const char* const* argv) {
@@ -65,7 +76,7 @@ int run_command_line(int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
+    return told(app, error) == 0 ? 0 : kWrongUsage;
   }
   if (!chosen) {
     fmt::print(stderr, "A command is required\n{}", app.help());

@@ -62,8 +62,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   }
 
   /// Sends the request to a server whose reader and writer are matched. If that server leaves, or is silent for half of
-  /// the time, the request is sent once more with the same id. While the server says that it is busy, the request is
-  /// sent again when it says. kUnreachable: no answer by `deadline`.
+  /// the time, the request is sent once more with the same id. kUnreachable: no answer by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route, Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
     request.header().reply_partition(partition_);
@@ -79,7 +78,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     request.header().trace_id(fmt::format("{}-{}", partition_.substr(partition_.size() - kTraceBytes), last_sequence_));
     waiting_.try_emplace(last_sequence_);
     lock.unlock();
-    auto answer = attempt_until_done(request, route, deadline);
+    auto answer = attempt_twice(request, route, deadline);
     lock.lock();
     waiting_.erase(id.sequence_number());
     room_.notify_one();
@@ -97,19 +96,6 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
 
   Caller(wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, std::string partition, ServerWatch& watch)
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
-
-  Result<Reply> attempt_until_done(Request& request, const Route& route, Clock::time_point deadline) {
-    while (true) {
-      auto answer = attempt_twice(request, route, deadline);
-      if (!answer || answer->header().result() != wire::RESULT_BUSY) return answer;
-      const std::chrono::milliseconds wait(answer->header().retry_after_ms());
-      const auto again = Clock::now() + wait;
-      if (wait.count() == 0 || again >= deadline) return answer;
-      MutexLock lock(mutex_);
-      Waiting& waiting = waiting_.at(request.header().request_id().sequence_number());
-      waiting.changed.wait_until(lock, again, [&]() TRAMMEL_REQUIRES(mutex_) { return waiting.reply.has_value(); });
-    }
-  }
 
   Result<Reply> attempt_twice(Request& request, const Route& route, Clock::time_point deadline) {
     const auto now = Clock::now();
@@ -133,7 +119,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       waiting.changed.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
         return waiting.reply || !readers_.contains(server->participant);
       });
-      if (waiting.reply) return *std::exchange(waiting.reply, std::nullopt);
+      if (waiting.reply) return std::move(*waiting.reply);
     }
     if (const auto other = watch_.other_contract(); asked.empty() && other) return tl::make_unexpected(*other);
     return asked.empty()

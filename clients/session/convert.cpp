@@ -62,24 +62,30 @@ const char* text(wire::JobStage stage) {
 
 const char* text(wire::JobVerdict verdict) {
   switch (verdict) {
-    case wire::VERDICT_NONE:
-      return "none";
+    case wire::VERDICT_OPEN:
+      return "open";
     case wire::VERDICT_IN_FORCE:
       return "in_force";
-    case wire::VERDICT_NOT_IN_FORCE:
-      return "not_in_force";
+    case wire::VERDICT_NOT_BETTER:
+      return "not_better";
     case wire::VERDICT_UNDECIDED:
       return "undecided";
-    case wire::VERDICT_NO_MODEL:
-      return "no_model";
+    case wire::VERDICT_DIAGNOSED:
+      return "diagnosed";
+    case wire::VERDICT_NOTHING_APPLIED:
+      return "nothing_applied";
     case wire::VERDICT_QUARANTINED:
       return "quarantined";
-    case wire::VERDICT_FAILED:
-      return "failed";
+    case wire::VERDICT_REFUSED:
+      return "refused";
+    case wire::VERDICT_OVER_LIMIT:
+      return "over_limit";
+    case wire::VERDICT_BROKEN:
+      return "broken";
     case wire::VERDICT_CANCELLED:
       return "cancelled";
   }
-  return "none";
+  return "open";
 }
 
 const char* text(wire::JobKind kind) {
@@ -236,7 +242,6 @@ JobStatus status_of(const wire::Job& job) {
                    job.share(),  job.model_version(), job.in_force()};
   const wire::JobOutcome& outcome = job.outcome();
   status.verdict = text(outcome.verdict());
-  status.judged_on = outcome.judged_on();
   status.before_mm = if_known(outcome.before_mm());
   status.after_mm = if_known(outcome.after_mm());
   status.limit_mm = if_known(outcome.limit_mm());
@@ -274,6 +279,8 @@ ServerStatus from_wire(const wire::ServiceStatus& status) {
   result.unheard = status.unheard();
   result.misdirected = status.misdirected();
   result.unreadable = status.unreadable();
+  result.lost = status.lost();
+  result.trouble = status.trouble();
   result.uptime_s = status.uptime_s();
   result.queued_jobs = status.queued_jobs();
   return result;

@@ -95,6 +95,11 @@ const KnownServer* ServerWatch::choose(const std::string& cell, const std::strin
   return best;
 }
 
+void ServerWatch::wait_until(Clock::time_point time) {
+  MutexLock lock(mutex_);
+  changed_.wait_until(lock, time, [] { return false; });
+}
+
 void ServerWatch::wake() {
   { const MutexLock lock(mutex_); }
   changed_.notify_all();

@@ -110,6 +110,8 @@ class ServerWatch {
                                                            const std::function<bool(const KnownServer&)>& reachable);
   /// Why no server is found, where the only ones that are there speak another contract than this program.
   [[nodiscard]] std::optional<Error> other_contract() const;
+  /// Lets the time pass.
+  void wait_until(Clock::time_point time);
   /// Call when the result of `reachable` may have changed: waiting calls look again.
   void wake();
 

@@ -17,6 +17,7 @@ namespace {
 /// is far below.
 constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
+constexpr std::uint32_t kLeastPatience = 10;  // ms, before a busy server is asked again
 
 /// A unique name, also across hosts: 128 random bits.
 std::string make_name(const char* what) {
@@ -87,7 +88,12 @@ struct Session::Participant {
   [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
                                                              typename Operation::Request::type request,
                                                              const Route& route) {
-    auto reply = caller.call(std::move(request), route, deadline());
+    return as_result(caller.call(std::move(request), route, deadline()));
+  }
+
+  /// An error reply of the server is an error here, and one of no server says where it was looked for.
+  template <typename Reply>
+  [[nodiscard]] Result<Reply> as_result(Result<Reply> reply) const {
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
       Error error = reply.error();
       error.message += fmt::format(" ({})", where_it_looked());
@@ -95,6 +101,22 @@ struct Session::Participant {
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
+  }
+
+  /// The same for what changes nothing: a server that is busy is asked again when it says, until the deadline.
+  template <typename Operation>
+  [[nodiscard]] Result<typename Operation::Reply::type> call_patiently(Caller<Operation>& caller,
+                                                                       const typename Operation::Request::type& request,
+                                                                       const Route& route) {
+    const auto until = deadline();
+    while (true) {
+      auto reply = caller.call(request, route, until);
+      const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
+      const auto again = Clock::now() + std::chrono::milliseconds(
+                                            is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
+      if (!is_busy || again >= until) return as_result(std::move(reply));
+      watch->wait_until(again);
+    }
   }
 
   [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action,
@@ -173,7 +195,7 @@ struct Session::Participant {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const auto reply = call(caller, std::move(request), {context.cell, {}, false});
+      const auto reply = call_patiently(caller, request, {context.cell, {}, false});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),

@@ -92,10 +92,10 @@ struct JobStatus {
   double share = 0;
   int model_version = 0;
   bool in_force = false;
-  /// How it ended: `none in_force not_in_force undecided no_model quarantined failed cancelled`.
-  std::string verdict = "none";
-  int judged_on = 0;  ///< poses held out
-  /// rms on them of what was in force, and of the new model; what that must not exceed; two standard uncertainties of
+  /// How it ended: `open in_force not_better undecided diagnosed nothing_applied quarantined refused over_limit broken
+  /// cancelled`.
+  std::string verdict = "open";
+  /// Held-out rms of what was in force, and of the new model; what that must not exceed; two standard uncertainties of
   /// the difference. Empty: not judged.
   std::optional<double> before_mm = {}, after_mm = {}, limit_mm = {}, u95_mm = {};
   std::string why = {};   ///< of a job that made no model
@@ -135,7 +135,9 @@ struct ServerStatus {
   std::vector<std::string> cells;
   std::uint64_t requests = 0, refused = 0;        ///< answered; of them with an error
   std::uint64_t shed = 0, unheard = 0;            ///< of them: busy or too late; to nobody, the client had left
-  std::uint64_t misdirected = 0, unreadable = 0;  ///< dropped: sent in another client's name; not even a header
+  std::uint64_t misdirected = 0, unreadable = 0;  ///< dropped: to another client's partition; not even a header
+  std::uint64_t lost = 0;                         ///< by DDS
+  std::string trouble;                            ///< what it cannot do now, and why; empty: nothing
   double uptime_s = 0;
   int queued_jobs = 0;
 };

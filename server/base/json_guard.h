@@ -14,7 +14,7 @@ namespace trammel {
 struct JsonLimits {
   std::size_t bytes = std::size_t{256} << 20;
   std::size_t depth = 16;                         ///< of arrays and objects inside one another
-  std::size_t values = 16'000'000;                ///< numbers, texts, true, false, null
+  std::size_t values = 4'000'000;                 ///< numbers, texts, true, false, null
   std::size_t containers = 200'000;               ///< arrays and objects
   std::size_t members = 1'000'000;                ///< of all objects together
   std::size_t text_bytes = std::size_t{1} << 20;  ///< of one text

@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "server/base/check.h"
+#include "server/base/plain_text.h"
 
 namespace trammel {
 
@@ -29,11 +30,11 @@ const char* to_text(ErrorCode code) {
 }
 
 std::string sentence(const Error& error) {
-  std::string text = error.file;
+  std::string text = shown(error.file);
   if (error.row) text += fmt::format("{}row {}", text.empty() ? "" : " ", *error.row);
   if (!text.empty()) text += ": ";
-  text += error.message;
-  if (!error.next.empty()) text += "; " + error.next;
+  text += shown_lines(error.message);
+  if (!error.next.empty()) text += "; " + shown_lines(error.next);
   for (const Error& other : error.also) text += "\n" + sentence(other);
   return text;
 }

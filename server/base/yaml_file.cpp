@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "server/base/near_miss.h"
+#include "server/base/plain_text.h"
 
 namespace trammel {
 namespace {
@@ -16,6 +17,7 @@ constexpr std::size_t kMostBytes = std::size_t{1} << 20;
 constexpr int kMostDepth = 20;
 constexpr int kMostEntries = 20'000;
 constexpr int kMostAliases = 100;
+constexpr double kLargestNumber = 1e12;
 
 /// Counts what the parser meets and stops it at the limits.
 class Counter final : public YAML::EventHandler {
@@ -68,6 +70,7 @@ Status check_yaml_limits(const std::string& text, const std::string& where) {
         .in(where)
         .beyond(text.size(), kMostBytes);
   }
+  if (!is_utf8(text)) return refused("not UTF-8 text").in(where);
   std::istringstream stream(text);
   Counter counter(where);
   try {
@@ -89,6 +92,10 @@ YamlMap::YamlMap(YAML::Node node, std::string file, std::string path, std::share
 std::optional<long> line_of(const YAML::Mark& mark) {
   if (mark.is_null()) return std::nullopt;
   return mark.line + 1;
+}
+
+std::string column_text(const YAML::Mark& mark) {
+  return mark.is_null() ? std::string() : fmt::format("column {}: ", mark.column + 1);
 }
 
 std::optional<long> YamlMap::line_of(const std::string& key) const {
@@ -125,6 +132,7 @@ std::vector<std::string> YamlMap::keys() const {
   std::set<std::string> seen;
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) refuse("?", "a key that is not a word");
+    if (!is_plain(entry.first.Scalar())) refuse(entry.first.Scalar(), "a key with control characters");
     if (!seen.insert(entry.first.Scalar()).second) refuse(entry.first.Scalar(), "given twice");
     names.push_back(entry.first.Scalar());
   }
@@ -144,6 +152,8 @@ double YamlMap::number_of(const YAML::Node& node, const std::string& key) const 
   double value = 0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) refuse(key, expected("a number", node));
   if (!std::isfinite(value)) refuse(key, refused("{} is not finite", node.Scalar()).with_text(node.Scalar()));
+  if (std::abs(value) > kLargestNumber)
+    refuse(key, refused("{:g}, limit {:g}", value, kLargestNumber).beyond(value, kLargestNumber));
   return value;
 }
 
@@ -166,9 +176,14 @@ bool YamlMap::boolean(const std::string& key, bool otherwise) const {
   return value;
 }
 
+std::string YamlMap::plain(const std::string& text, const std::string& key) const {
+  if (!is_plain(text)) refuse(key, refused("'{}' has control characters", shown_short(text)).with_text(shown(text)));
+  return text;
+}
+
 std::string YamlMap::text(const std::string& key) const {
   if (!at(key).IsScalar()) refuse(key, "expected a text");
-  return at(key).Scalar();
+  return plain(at(key).Scalar(), key);
 }
 std::string YamlMap::text(const std::string& key, const std::string& otherwise) const {
   return has(key) ? text(key) : otherwise;
@@ -190,7 +205,7 @@ std::vector<std::string> YamlMap::texts(const std::string& key) const {
   std::vector<std::string> values;
   for (const YAML::Node& item : node) {
     if (!item.IsScalar()) refuse(key, "expected a list of texts");
-    values.push_back(item.Scalar());
+    values.push_back(plain(item.Scalar(), key));
   }
   return values;
 }

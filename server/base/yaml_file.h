@@ -10,8 +10,8 @@
 
 #include "server/base/result.h"
 
-/// Reads YAML that people write. Unknown keys are refused. Every error says file, key and what was expected. Included
-/// only by readers (`*_file.cpp`) and config/.
+/// Reads YAML that people write. Unknown keys are refused, texts with control characters too. Every error says file,
+/// key and what was expected. Included only by readers (`*_file.cpp`) and config/.
 namespace trammel {
 
 /// Thrown by YamlMap, caught by read_yaml(); never leaves a reader.
@@ -51,6 +51,8 @@ class YamlMap {
   [[nodiscard]] YamlMap map(const std::string& key) const;
   [[nodiscard]] std::vector<YamlMap> maps(const std::string& key) const;
   [[nodiscard]] std::vector<std::string> keys() const;
+  /// Line of the key, counted from 1.
+  [[nodiscard]] std::optional<long> row_of(const std::string& key) const { return line_of(key); }
   [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
   /// Refuses with the error `why`. File, line and the path of keys to `key` are added here.
   [[noreturn]] void refuse(const std::string& key, Failure why) const;
@@ -61,6 +63,7 @@ class YamlMap {
   [[nodiscard]] std::optional<long> line_of(const std::string& key) const;
   [[nodiscard]] YAML::Node at(const std::string& key) const;
   [[nodiscard]] double number_of(const YAML::Node& node, const std::string& key) const;
+  [[nodiscard]] std::string plain(const std::string& text, const std::string& key) const;
 
   YAML::Node node_;
   std::string file_;
@@ -68,12 +71,14 @@ class YamlMap {
   std::shared_ptr<std::vector<Error>> problems_;
 };
 
-/// Refuses a text that is too large to be written by hand (kTooLarge): over a megabyte, 20 levels of nesting, 20,000
-/// entries or 100 aliases. Reads it once and keeps nothing. Throws what the parser throws.
+/// Refuses a text that is not UTF-8, and one that is too large to be written by hand (kTooLarge): over a megabyte, 20
+/// levels of nesting, 20,000 entries or 100 aliases. Reads it once and keeps nothing. Throws what the parser throws.
 [[nodiscard]] Status check_yaml_limits(const std::string& text, const std::string& where);
 
 /// Line of the text, counted from 1; empty if the parser does not know it.
 [[nodiscard]] std::optional<long> line_of(const YAML::Mark& mark);
+/// `column 5: `, counted from 1; empty if the parser does not know it.
+[[nodiscard]] std::string column_text(const YAML::Mark& mark);
 
 /// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one Error that holds all.
 template <typename Read>
@@ -89,7 +94,7 @@ auto read_yaml(const std::string& text, const std::string& where, Read&& read)
   } catch (const YamlRefusal& refusal) {
     return Failure(refusal.error);
   } catch (const YAML::Exception& error) {
-    Failure damaged = refused("not YAML: {}", error.msg).in(where);
+    Failure damaged = refused("{}not YAML: {}", column_text(error.mark), error.msg).in(where);
     damaged.value().row = line_of(error.mark);
     return damaged;
   }

@@ -73,10 +73,10 @@ struct BiasModel::Fitted {
   }
   MatrixXd leave_one_out_mean_B() const { return outputs->leave_one_out_mean().rowwise() + state.offset.transpose(); }
 
-  static Result<std::shared_ptr<Fitted>> from(const BiasState& state);
+  static Result<std::shared_ptr<Fitted>> from(const BiasState& state, VarianceForm form);
 };
 
-Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state) {
+Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state, VarianceForm form) {
   if (const Status fine = check_observations(state.q, state.residual_B, state.sigma); !fine)
     return tl::make_unexpected(fine.error());
   if (state.kernel == kNone) {
@@ -95,13 +95,15 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   const CoupledHyperparameters at = hyperparameters_of(state);
   const OutputData data = data_of(state);
   BiasOutputsPtr outputs =
-      coupled ? condition_coupled(*bias, data, at) : condition_independent(bias->kernel, data, at.outputs);
+      coupled ? condition_coupled(*bias, data, at) : condition_independent(bias->kernel, data, at.outputs, form);
   if (!outputs) return refused("bias: the covariance of {} observations is not positive definite", state.q.rows());
   return std::make_shared<Fitted>(state, coupled, std::move(outputs));
 }
 
 Result<BiasModel> BiasModel::restore(const BiasState& state) {
-  return Fitted::from(state).map([](std::shared_ptr<Fitted> fitted) { return BiasModel(std::move(fitted)); });
+  return Fitted::from(state, VarianceForm::kCompressedOnly).map([](std::shared_ptr<Fitted> fitted) {
+    return BiasModel(std::move(fitted));
+  });
 }
 
 Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& options) {
@@ -148,7 +150,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   state.block_hyperparameters = found->found.blocks;
 
   // By the same way as a stored model, so that a restored one cannot differ.
-  const auto fitted = Fitted::from(state);
+  const auto fitted = Fitted::from(state, VarianceForm::kCompressed);
   if (!fitted) return tl::make_unexpected(fitted.error());
   (*fitted)->report.starts_at_best = found->starts_at_best;
   (*fitted)->report.evaluations = found->evaluations;

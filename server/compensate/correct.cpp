@@ -87,6 +87,16 @@ std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
                      has_blocks ? "its kernel" : "the learned bias");
 }
 
+/// How the arm comes to the target.
+PoseContext way_to(const Target& target) {
+  PoseContext context;
+  context.direction = target.direction;
+  context.temperature = target.temperature;
+  context.time = target.time;
+  context.served = true;
+  return context;
+}
+
 /// Of one measurement where the true position has this stddev an axis.
 double measured(double stddev, double sigma) { return std::hypot(stddev, sigma); }
 
@@ -152,13 +162,9 @@ std::vector<int> CompensatedModel::branches_that_reach(const Target& asked, cons
 
 Correction CompensatedModel::correct(const Target& target, const std::string& tool, const std::string& payload,
                                      const CorrectOptions& options) const {
-  PoseContext context;
+  PoseContext context = way_to(target);
   context.tool = tool;
   context.payload = payload;
-  context.direction = target.direction;
-  context.temperature = target.temperature;
-  context.time = target.time;
-  context.served = true;
   Correction result;
   const auto end = [&](CorrectionStatus status, std::string message) {
     result.status = status;
@@ -187,10 +193,9 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.error_after = result.error_before;
   result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
   result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
-  const auto turn = [&](const Vector3& mean, const ErrorPrediction& at) {
-    return turn_rms(mean, at.rotation_stddev_B, cell().tracker.sigma_rotation);
-  };
-  result.turn_before = turn(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(), before);
+  const double sigma_rotation = cell().tracker.sigma_rotation;
+  result.turn_before = turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
+                                before.rotation_stddev_B, sigma_rotation);
   result.turn_after = result.turn_before;
   if (start->status != InverseStatus::kOk) return not_reached(*start);
 
@@ -211,7 +216,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
   result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
-  result.turn_after = turn(found.missing.tail<3>(), after);
+  result.turn_after = turn_rms(found.missing.tail<3>(), after.rotation_stddev_B, sigma_rotation);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
   return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
 }

@@ -1,17 +1,18 @@
 #include "server/compensate/model_file.h"
 
-#include <algorithm>
-#include <array>
 #include <map>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "server/base/hash.h"
 #include "server/base/json_guard.h"
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/file/check_parts.h"
 #include "server/compensate/file/keys.h"
 #include "server/compensate/file/read_parts.h"
+#include "server/compensate/file/self_test.h"
 #include "server/compensate/file/write_parts.h"
 
 namespace trammel {
@@ -20,54 +21,83 @@ namespace {
 
 using Json = nlohmann::json;
 using model_file::kFormat;
+using model_file::kOldestFormat;
 using Members = std::map<std::string, std::string_view>;
 
-/// Text of a file as a message may show it: short, without control characters.
-std::string shown(std::string_view text) {
-  std::string plain(text.substr(0, 120));
-  std::replace_if(
-      plain.begin(), plain.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return plain;
+/// Text of a file as a message may show it.
+std::string excerpt(std::string_view text) { return shown_short(text, 120); }
+
+/// The format that the file says it has.
+Result<int> format_of(const Members& members, const std::string& where) {
+  const auto said = members.find("trammel_model");
+  if (said == members.end()) return refused("not a Trammel model: no trammel_model").in(where).of("trammel_model");
+  for (int format = kOldestFormat; format <= kFormat; ++format) {
+    if (said->second == std::to_string(format)) return format;
+  }
+  return refused("model format {}, this program reads {} to {}", excerpt(said->second), kOldestFormat, kFormat)
+      .in(where)
+      .of("trammel_model")
+      .with_text(excerpt(said->second));
 }
 
 /// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing one.
-Status check_keys(const Members& members, const std::string& where) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"content", "hash", "stamp", "trammel_model", "stamp_hash"};
+Status check_keys(const Members& members, int format, const std::string& where) {
+  static const std::set<std::string_view> kAlways = {"content", "hash", "stamp", "trammel_model"};
+  // The oldest were written before the stamp was hashed.
+  static const std::set<std::string_view> kSince = {"stamp_hash", "self_test", "self_test_hash"};
+  const auto taken = [&](std::string_view key) {
+    return kAlways.contains(key) || (format == kOldestFormat ? key == "stamp_hash" : kSince.contains(key));
+  };
   for (const auto& [key, value] : members) {
-    if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
-      return refused("not a Trammel model: unknown key {}", shown(key)).in(where).of(shown(key));
+    if (!taken(key)) return refused("not a Trammel model: unknown key {}", excerpt(key)).in(where).of(excerpt(key));
   }
-  // Models from before the stamp was hashed have no stamp_hash.
-  for (const std::string_view key : kKeys) {
-    if (key != "stamp_hash" && !members.contains(std::string(key)))
+  std::set<std::string_view> wanted = kAlways;
+  if (format > kOldestFormat) wanted.insert(kSince.begin(), kSince.end());
+  for (const std::string_view key : wanted) {
+    if (!members.contains(std::string(key)))
       return refused("not a Trammel model: no {}", key).in(where).of(std::string(key));
   }
-  const std::string_view format = members.at("trammel_model");
-  if (format == std::to_string(kFormat)) return {};
-  return refused("model format {}, this program reads {}", shown(format), kFormat)
-      .in(where)
-      .of("trammel_model")
-      .with_text(shown(format));
+  return {};
 }
 
 /// Whether `by` is the hash of `of`, both as their bytes stand in the file.
 Status check_hash(const Members& members, const std::string& of, const std::string& by, const std::string& where) {
   const std::string hash = sha256_hex(members.at(of));
   if (members.at(by) == '"' + hash + '"') return {};
-  return refused("damaged: its {} is {}, its {} has {}", by, shown(members.at(by)), of, hash).in(where).of(by);
+  return refused("damaged: its {} is {}, its {} has {}", by, excerpt(members.at(by)), of, hash).in(where).of(by);
+}
+
+/// Whether no byte was changed since the file was written. Looks at the bytes, before anything is made of them.
+Status check_undamaged(const Members& members, const std::string& where) {
+  const Result<int> format = format_of(members, where);
+  if (!format) return tl::make_unexpected(format.error());
+  Status fine = check_keys(members, *format, where);
+  if (fine) fine = check_hash(members, "content", "hash", where);
+  for (const char* part : {"stamp", "self_test"}) {
+    const std::string by = fmt::format("{}_hash", part);
+    if (fine && members.contains(by)) fine = check_hash(members, part, by, where);
+  }
+  return fine;
+}
+
+/// Whether it predicts as it did.
+Status check_predictions(const CompensatedModel& model, const Members& members) {
+  const auto self_test = members.find("self_test");
+  return self_test == members.end() ? model_file::check_predicts(model)
+                                    : model_file::check_self_test(model, Json::parse(self_test->second));
 }
 
 Result<CompensatedModel> checked_model(const Members& members, const std::string& where) {
-  Status fine = check_keys(members, where);
-  if (fine) fine = check_hash(members, "content", "hash", where);
-  if (fine && members.contains("stamp_hash")) fine = check_hash(members, "stamp", "stamp_hash", where);
-  if (!fine) return tl::make_unexpected(fine.error());
+  if (const Status fine = check_undamaged(members, where); !fine) return tl::make_unexpected(fine.error());
   Result<ModelParts> parts =
       model_file::parts_from(Json::parse(members.at("content")), Json::parse(members.at("stamp")), where);
   if (!parts) return tl::make_unexpected(parts.error());
   const Status possible = model_file::check_parts(*parts);
   Result<CompensatedModel> model =
       possible ? CompensatedModel::make(std::move(*parts)) : tl::make_unexpected(possible.error());
+  if (model) {
+    if (const Status same = check_predictions(*model, members); !same) model = tl::make_unexpected(same.error());
+  }
   return std::move(model).map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }
 
@@ -76,10 +106,13 @@ Result<CompensatedModel> checked_model(const Members& members, const std::string
 std::string serialize(const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
   const Json stamp = model_file::stamp_of(provenance);
+  const Json self_test = model_file::self_test_of(model);
   const Json file = {{"trammel_model", kFormat},
                      {"hash", provenance.hash},
                      {"stamp", stamp},
                      {"stamp_hash", sha256_hex(stamp.dump())},
+                     {"self_test", self_test},
+                     {"self_test_hash", sha256_hex(self_test.dump())},
                      {"content", model_file::content_of(model.parts())}};
   // The last byte closes the object, so a text that was cut off is no longer one.
   return file.dump();
@@ -89,7 +122,7 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
   try {
     return json_members(text, where).and_then([&](const Members& members) { return checked_model(members, where); });
   } catch (const Json::exception& error) {
-    return refused("not a Trammel model: {}", shown(error.what())).in(where);
+    return refused("not a Trammel model: {}", excerpt(error.what())).in(where);
   } catch (const std::bad_alloc&) {
     return failure(ErrorCode::kTooLarge, "its {} bytes ask for more memory than there is", text.size())
         .in(where)

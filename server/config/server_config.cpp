@@ -10,15 +10,14 @@
 #include "server/base/near_miss.h"
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
-#include "server/bias/kernels/kernel_spelling.h"
-#include "server/error_sources/error_source.h"
-#include "server/error_sources/physical_model.h"
+#include "server/compensate/model_spec.h"
 
 namespace trammel {
 namespace {
 
 constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
 constexpr std::size_t kMaxName = 64;     // likewise, bytes
+constexpr int kLeastMemory = 64;         // MiB, of a job: what the program itself takes, and something to compute with
 constexpr int kMaxDomain = 232;          // above it the port numbers of DDS overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
@@ -98,7 +97,7 @@ void read_dds(const YamlMap& map, DdsOptions& dds) {
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
-  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed"});
+  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s"});
   map.attempt([&] { trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000); });
   map.attempt([&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
   map.attempt(
@@ -108,6 +107,15 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
     trainer.seed = static_cast<std::uint64_t>(
         integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
   });
+  ComputeOptions& compute = trainer.compute;
+  map.attempt([&] {
+    const int memory = integer_within(map, "memory_mb", compute.memory_mb, 0, 1 << 24);
+    if (memory != 0 && memory < kLeastMemory)
+      map.refuse("memory_mb",
+                 refused("{}, limit 0 or {} to {}", memory, kLeastMemory, 1 << 24).beyond(memory, kLeastMemory));
+    compute.memory_mb = memory;
+  });
+  map.attempt([&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
 void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
@@ -149,7 +157,7 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "dds", "trainer", "log"});
+  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -159,6 +167,11 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] { file.cell_files = cell_files_of(map, folder); });
   map.attempt([&] { config.store = store_of(map, folder); });
   map.attempt([&] {
+    const auto otherwise = static_cast<int>(config.models_in_memory >> 20);
+    config.models_in_memory =
+        static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
+  });
+  map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), config.dds);
   });
   map.attempt([&] {
@@ -167,24 +180,6 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] {
     if (map.has("log")) read_log(map.map("log"), config.log, folder);
   });
-}
-
-/// Notes what the first training of the cell would refuse.
-void check_training(const Cell& cell, const std::string& file, std::vector<Error>& problems) {
-  const auto note = [&](const char* key, Error why) {
-    why.field.clear();
-    problems.push_back(Failure(std::move(why)).under(fmt::format("model: {}", key)).in(file).value());
-  };
-  if (const Status bias = check_bias_spelling(cell.model.bias); !bias) note("bias", bias.error());
-  bool each_is_known = true;
-  for (const std::string& source : cell.model.error_sources) {
-    const auto made = make_error_source(source, cell);
-    if (!made) note("error_sources", made.error());
-    each_is_known = each_is_known && made;
-  }
-  if (!each_is_known) return;
-  const auto together = make_physical_model(std::make_shared<const Cell>(cell), cell.model.error_sources);
-  if (!together) note("error_sources", together.error());
 }
 
 void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& problems) {
@@ -210,7 +205,7 @@ void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& p
                              .in(path)
                              .with_text(name)
                              .value());
-    check_training(*cell, cell_file, problems);
+    for (Error& one : check_model_spec(*cell, cell_file)) problems.push_back(std::move(one));
     file.config.cells[name] = std::make_shared<const Cell>(std::move(*cell));
   }
 }

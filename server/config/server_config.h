@@ -21,6 +21,7 @@ struct LogOptions {
 struct ServerConfig {
   std::map<std::string, std::shared_ptr<const Cell>> cells;  ///< by name
   std::string store;                                         ///< path of the database
+  std::size_t models_in_memory = std::size_t{8192} << 20;    ///< bytes; beyond, those not used for longest leave it
   DdsOptions dds;
   TrainerOptions trainer;
   LogOptions log;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/base/hash.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -15,6 +16,7 @@ namespace {
 constexpr double kQuaternionTolerance = 1e-3;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kNoTime = -1;
+constexpr double kTemperatureLimit = 1e3;      // degrees Celsius, as in files
 constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, where nobody knows better
 
 double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
@@ -105,6 +107,12 @@ Status read_approach(const wire::Approach& approach, const Chain& chain, const s
        {std::pair(approach.temperature_c(), "temperature_c"), std::pair(approach.time_s(), "time_s")}) {
     if (std::isinf(value)) return refused("{} is not finite", field).in(where).of(field).with_value(value);
   }
+  if (std::abs(approach.temperature_c()) > kTemperatureLimit) {
+    return refused("temperature {} C, limit {}", approach.temperature_c(), kTemperatureLimit)
+        .in(where)
+        .of("temperature_c")
+        .beyond(approach.temperature_c(), kTemperatureLimit);
+  }
   context.direction.assign(directions.begin(), directions.end());
   if (!std::isnan(approach.temperature_c())) context.temperature = approach.temperature_c();
   if (!std::isnan(approach.time_s())) context.time = approach.time_s();
@@ -148,20 +156,26 @@ namespace {
 
 wire::JobVerdict to_wire(JobVerdict verdict) {
   switch (verdict) {
-    case JobVerdict::kNone:
-      return wire::VERDICT_NONE;
+    case JobVerdict::kOpen:
+      return wire::VERDICT_OPEN;
     case JobVerdict::kInForce:
       return wire::VERDICT_IN_FORCE;
-    case JobVerdict::kNotInForce:
-      return wire::VERDICT_NOT_IN_FORCE;
+    case JobVerdict::kNotBetter:
+      return wire::VERDICT_NOT_BETTER;
     case JobVerdict::kUndecided:
       return wire::VERDICT_UNDECIDED;
-    case JobVerdict::kNoModel:
-      return wire::VERDICT_NO_MODEL;
+    case JobVerdict::kDiagnosed:
+      return wire::VERDICT_DIAGNOSED;
+    case JobVerdict::kNothingApplied:
+      return wire::VERDICT_NOTHING_APPLIED;
     case JobVerdict::kQuarantined:
       return wire::VERDICT_QUARANTINED;
-    case JobVerdict::kFailed:
-      return wire::VERDICT_FAILED;
+    case JobVerdict::kRefused:
+      return wire::VERDICT_REFUSED;
+    case JobVerdict::kOverLimit:
+      return wire::VERDICT_OVER_LIMIT;
+    case JobVerdict::kBroken:
+      return wire::VERDICT_BROKEN;
     case JobVerdict::kCancelled:
       return wire::VERDICT_CANCELLED;
   }
@@ -169,18 +183,18 @@ wire::JobVerdict to_wire(JobVerdict verdict) {
 }
 
 wire::JobOutcome to_wire(const JobOutcome& outcome) {
+  constexpr double kBytesPerMb = 1 << 20;
   wire::JobOutcome result;
   result.verdict(to_wire(outcome.verdict));
-  result.judged_on(outcome.judged_on);
   result.before_mm(mm_or_unknown(outcome.before));
   result.after_mm(mm_or_unknown(outcome.after));
   result.limit_mm(mm_or_unknown(outcome.limit));
-  result.u95_mm(mm_or_unknown(outcome.u95));
-  if (outcome.why) {
-    result.code(trammel::to_wire(outcome.why->code));
-    result.why(cut(sentence(*outcome.why), wire::MAX_SENTENCE));
-  }
+  result.u95_mm(kUnknown);
+  if (outcome.code) result.code(trammel::to_wire(*outcome.code));
+  result.why(cut(outcome.why, wire::MAX_SENTENCE));
   result.next(cut(outcome.next, wire::MAX_SENTENCE));
+  result.peak_memory_mb(outcome.peak_memory ? static_cast<double>(*outcome.peak_memory) / kBytesPerMb : kUnknown);
+  result.processor_time_s(outcome.processor_time.value_or(kUnknown));
   return result;
 }
 
@@ -204,7 +218,7 @@ wire::Job to_wire(const JobProgress& progress) {
       job.stage(wire::JOB_DONE);
       break;
     case JobStage::kFailed:
-      job.stage(wire::JOB_FAILED);
+      job.stage(progress.outcome.verdict == JobVerdict::kCancelled ? wire::JOB_CANCELLED : wire::JOB_FAILED);
       break;
   }
   job.what(cut(progress.what, wire::MAX_SENTENCE));
@@ -319,6 +333,25 @@ void put_error(const wire::Fault& fault, wire::ReplyHeader& header) {
   put_error(error, header);
   header.result(fault.code);
   header.problems().front().code(fault.code);
+}
+
+ChangeId change_id(const std::string& id, const std::string& asked) {
+  return id.empty() ? ChangeId{} : ChangeId{id, asked};
+}
+
+std::string in_few_words(const std::string& verb, const std::string& cell, const std::vector<std::string>& rest) {
+  std::string all;
+  for (const std::string& one : rest) all += fmt::format("{}:{}", one.size(), one);
+  return fmt::format("{} {} {}", verb, cell, sha256_hex(all));
+}
+
+Result<std::optional<int>> expected_version(const wire::Change& change) {
+  const int version = change.expected_version();
+  if (version == -1) return std::nullopt;
+  if (version >= 0) return std::optional(version);
+  return failure(ErrorCode::kUsage, "expected version {}, the least is -1", version)
+      .of("expected_version")
+      .beyond(version, -1);
 }
 
 std::string cut(const std::string& text, std::size_t most_bytes) {

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "idl/valid.h"
 #include "server/registry/model_registry.h"
@@ -32,6 +34,14 @@ namespace trammel {
 [[nodiscard]] wire::BatchInfo to_wire(const StoredBatch& batch);
 [[nodiscard]] wire::TargetStatus to_wire(CorrectionStatus status);
 [[nodiscard]] wire::ResultCode to_wire(ErrorCode code);
+
+/// What makes a change happen once: the client's id of it with what is asked for; empty without an id.
+[[nodiscard]] ChangeId change_id(const std::string& id, const std::string& asked);
+/// What is asked for, in one line: the verb, the cell, and a hash of all the rest.
+[[nodiscard]] std::string in_few_words(const std::string& verb, const std::string& cell,
+                                       const std::vector<std::string>& rest);
+/// Empty: whatever. Refuses a version that there cannot be.
+[[nodiscard]] Result<std::optional<int>> expected_version(const wire::Change& change);
 
 /// The error in the header of a reply: code, sentence and data.
 void put_error(const Error& error, wire::ReplyHeader& header);

@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <stop_token>
@@ -18,6 +19,7 @@
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/old_contract.h"
+#include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
@@ -110,16 +112,20 @@ class ThreadName {
 
 class DdsService::Running {
  public:
+  using PacketListener = std::function<void(const std::string& dropped)>;
+
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
-                                                              const ModelRegistry& registry) {
+                                                              const ModelRegistry& registry,
+                                                              const PacketListener& packet_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
     if (!port) return tl::make_unexpected(port.error());
     auto events = std::make_unique<ServiceEvents>();
     const auto heard = std::make_shared<wire::HeardOfItself>();
+    const auto dropped = std::make_shared<wire::DropCounts>();
     auto participant = wire::make_participant({"trammel server " + options.server_id, options.domain, options.address,
-                                               options.port, options.peer_ports, heard},
+                                               options.port, options.peer_ports, heard, dropped},
                                               events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
@@ -136,6 +142,8 @@ class DdsService::Running {
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
         std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
+    running->packets_.emplace(dropped);
+    running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
     return running;
@@ -146,10 +154,10 @@ class DdsService::Running {
     status_thread_ = {};
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
+    old_contract_.reset();
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
-    old_contract_.reset();
   }
 
   Running(const Running&) = delete;
@@ -178,6 +186,7 @@ class DdsService::Running {
           const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
+        store_(store),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
@@ -193,7 +202,7 @@ class DdsService::Running {
         corrections_(compute_limits(options), room_),
         reads_(limits_of_reads(options), room_, kBehindComputing),
         changes_(limits_of_changes(options), room_, kBehindComputing),
-        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_, events_->owners()} {
+        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {
     for (const auto& [name, cell] : trainer.cells()) publishing_[name];
   }
 
@@ -215,7 +224,7 @@ class DdsService::Running {
     if (opened) opened = open(wire::ManageModels(), others);
     if (opened) opened = open(wire::ReleaseBatches(), others);
     if (!opened) return opened;
-    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_, core_.owners);
+    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_);
     if (!old) return tl::make_unexpected(old.error());
     old_contract_ = std::move(*old);
     return {};
@@ -225,7 +234,6 @@ class DdsService::Running {
 
   void tell_status(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "status");
-    bool clients_wait = false;
     ServiceEvents::News news{true, {}};
     Clock::time_point told;
     while (!stop.stop_requested()) {
@@ -234,7 +242,8 @@ class DdsService::Running {
         told = Clock::now();
       }
       ++status_steps_;
-      clients_wait = channels_.tend();
+      if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
+      const bool clients_wait = channels_.tend();
       ++status_steps_;
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
       news = events_->wait(stop, clients_wait ? std::min(left, wire::kAnnouncement) : left);
@@ -249,6 +258,7 @@ class DdsService::Running {
                                      {"receiving", [this]() -> Mark { return echo_->heard(); }},
                                      {"taking requests", [this] { return core_.taking.oldest(); }},
                                      {"replying", [this] { return replying_.oldest(); }},
+                                     {"replies", [this]() -> Mark { return channels_.looks(); }},
                                      {"status", [this]() -> Mark { return status_steps_.load(); }}};
     parts.push_back({"predictions", [this] { return predictions_.unseen(); }});
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
@@ -264,14 +274,15 @@ class DdsService::Running {
     status.program_version(options_.program_version);
     status.state(state);
     for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
-    status.models_in_force(static_cast<std::int32_t>(registry_.all().size()));
-    const CallCounts& counts = core_.counts;
-    status.requests(counts.requests + counts.shed);
-    status.refused(counts.refused + counts.shed);
-    status.shed(counts.shed);
+    status.models_in_force(static_cast<std::int32_t>(registry_.cells_served()));
+    status.requests(core_.counts.requests + core_.counts.shed);
+    status.refused(core_.counts.refused + core_.counts.shed);
+    status.shed(core_.counts.shed);
     status.unheard(channels_.unheard());
-    status.misdirected(counts.misdirected);
-    status.unreadable(*core_.unreadable + counts.lost);
+    status.misdirected(core_.counts.misdirected);
+    status.unreadable(*core_.unreadable);
+    status.lost(core_.counts.lost);
+    if (const auto why = store_.state().why_not_written) status.trouble(cut(sentence(*why), wire::MAX_SENTENCE));
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -280,6 +291,7 @@ class DdsService::Running {
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
+  const Store& store_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;
@@ -296,6 +308,8 @@ class DdsService::Running {
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
+  std::optional<PacketReport> packets_;  // of the status thread
+  PacketListener packet_listener_;
   std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
@@ -306,13 +320,17 @@ DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const
 
 DdsService::~DdsService() { stop(); }
 
+void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
+  packet_listener_ = std::move(listener);
+}
+
 Status DdsService::start() {
   {
     const MutexLock lock(mutex_);
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -23,6 +24,9 @@ class DdsService {
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
+  /// Called with a sentence for the log when packets have been dropped (idl/guard), at most once a minute, in a thread
+  /// of the service. Set it before start().
+  void set_packet_listener(std::function<void(const std::string& dropped)> listener);
   /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses a port that is
   /// taken, an address that this host does not have, and a server or cell name that the wire does not allow.
   [[nodiscard]] Status start();
@@ -41,6 +45,7 @@ class DdsService {
   void publish(const Publish& publish);
 
   const DdsOptions options_;
+  std::function<void(const std::string&)> packet_listener_ = [](const std::string&) {};
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "idl/valid.h"
@@ -67,10 +69,18 @@ class Handlers {
   [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
 
  private:
-  [[nodiscard]] Result<std::int64_t> train_from_batches(const wire::TrainRequest& request);
-  [[nodiscard]] Result<std::int64_t> train_diagnosed(const wire::TrainRequest& request);
-  /// The version activated, gone back to or imported.
+  /// The job.
+  [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
+  /// The version activated, gone back to or imported; 0: none.
   [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
+  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job);
+  /// The job, or 0.
+  [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
+  /// Refuses (kConflict) where another version is in force.
+  [[nodiscard]] Status check_expected(const std::string& cell, const std::optional<int>& expected) const;
+  /// The same, unless the change has been made under this id.
+  [[nodiscard]] Status check_expected_once(const std::string& cell, const std::optional<int>& expected,
+                                           const ChangeId& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
                                                    const wire::ReadModelsRequest& request) const;
   [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;

@@ -6,7 +6,7 @@ namespace trammel {
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
   if (request.force()) return unsupported<wire::ManageModelsReply>("force");
   if (request.change().expected_epoch() != 0) return unsupported<wire::ManageModelsReply>("expected_epoch");
-  if (request.action() > wire::MANAGE_IMPORT) return unsupported<wire::ManageModelsReply>("action");
+  if (request.action() == wire::MANAGE_BACKUP) return unsupported<wire::ManageModelsReply>("action");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto version = changed(cell, request);
@@ -18,9 +18,46 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
 }
 
 Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsRequest& request) {
-  if (request.action() == wire::MANAGE_ROLLBACK) return trainer_.rollback(cell);
-  if (request.action() == wire::MANAGE_IMPORT) return trainer_.import_model(cell, request.model_text());
-  return trainer_.activate(cell, request.version()).map([&] { return int{request.version()}; });
+  const auto expected = expected_version(request.change());
+  if (!expected) return tl::make_unexpected(expected.error());
+  const auto under = [&](const std::string& asked) {
+    return ChangeRequest{change_id(request.change().id().to_string(), asked), *expected};
+  };
+  switch (request.action()) {
+    case wire::MANAGE_ROLLBACK:
+      return trainer_.rollback(cell, under("roll back " + cell));
+    case wire::MANAGE_IMPORT: {
+      const std::string& text = request.model_text();
+      const ChangeId id = under(in_few_words("import", cell, {text})).id;
+      if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
+        return tl::make_unexpected(as_expected.error());
+      return trainer_.import_model(cell, text, id);
+    }
+    case wire::MANAGE_CANCEL_JOB:
+      return cancel(cell, request.job()).map([] { return 0; });
+    default:
+      return trainer_.activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())))
+          .map([&] { return int{request.version()}; });
+  }
+}
+
+Status Handlers::cancel(const std::string& cell, std::int64_t job) {
+  const auto asked = trainer_.progress(job);
+  if (!asked) return tl::make_unexpected(asked.error());
+  if (asked->cell != cell)
+    return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
+  return trainer_.cancel(job);
+}
+
+Status Handlers::check_expected(const std::string& cell, const std::optional<int>& expected) const {
+  if (!expected) return {};
+  const auto served = registry_.in_force(cell);
+  const int version = served ? served->version : 0;
+  if (version == *expected) return {};
+  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version, *expected)
+      .of("expected")
+      .beyond(*expected, version)
+      .next("look again, and decide anew");
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
@@ -28,20 +65,38 @@ Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesReq
   if (request.change().expected_epoch() != 0) return unsupported<wire::ReleaseBatchesReply>("expected_epoch");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  const auto job = released(cell, request);
+  if (!job) return tl::make_unexpected(job.error());
   wire::ReleaseBatchesReply reply;
-  if (request.action() == wire::RELEASE_AND_TRAIN) {
-    const auto job =
-        trainer_.retrain(cell, request.batch_ids(), request.level(), request.bias(), Trainer::Quarantine::kReleased);
-    if (!job) return tl::make_unexpected(job.error());
-    reply.job(*job);
-    return reply;
-  }
-  if (request.batch_ids().size() != 1) {
-    return failure(ErrorCode::kUsage, "{} batches to release, 1 is needed", request.batch_ids().size())
+  reply.job(*job);
+  return reply;
+}
+
+Result<std::int64_t> Handlers::released(const std::string& cell, const wire::ReleaseBatchesRequest& request) {
+  const auto expected = expected_version(request.change());
+  if (!expected) return tl::make_unexpected(expected.error());
+  const auto& batches = request.batch_ids();
+  const bool trains = request.action() == wire::RELEASE_AND_TRAIN;
+  if (!trains && batches.size() != 1) {
+    return failure(ErrorCode::kUsage, "{} batches to release, 1 is needed", batches.size())
         .of("batch_ids")
-        .beyond(request.batch_ids().size(), 1);
+        .beyond(batches.size(), 1);
   }
-  return trainer_.release(cell, request.batch_ids().front()).map([&] { return reply; });
+  const ChangeId id =
+      change_id(request.change().id().to_string(),
+                in_few_words(trains ? "release and train" : "release", cell,
+                             {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}));
+  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
+    return tl::make_unexpected(as_expected.error());
+  if (!trains) return trainer_.release(cell, batches.front(), id).map([] { return std::int64_t{0}; });
+  return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kReleased, id);
+}
+
+Status Handlers::check_expected_once(const std::string& cell, const std::optional<int>& expected,
+                                     const ChangeId& id) const {
+  const auto made = store_.outcome_of(id);
+  if (!made) return tl::make_unexpected(made.error());
+  return *made ? Status() : check_expected(cell, expected);
 }
 
 bool happens_once(const wire::ManageModelsRequest&) { return true; }

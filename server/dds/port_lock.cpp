@@ -13,19 +13,36 @@
 
 namespace trammel {
 
-Result<PortLock> PortLock::take(const std::string& address, std::uint16_t port) {
-  // A name in the abstract namespace: taken atomically, freed by the kernel.
+namespace {
+
+/// A socket with this name in the abstract namespace: taken atomically, freed by the kernel. Below 0: it is taken.
+int named_socket(const std::string& text) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
-  const std::string text = fmt::format("trammel-dds-{}-{}", address, port);
   const std::size_t length = std::min(text.size(), sizeof name.sun_path - 1);
   std::copy_n(text.begin(), length, name.sun_path + 1);
   const int lock = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (lock < 0)
-    return failure(ErrorCode::kInternal, "cannot open a socket to lock port {}", port).of("port").with_value(port);
-  PortLock result(lock);
   const auto name_size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
-  if (bind(lock, reinterpret_cast<const sockaddr*>(&name), name_size) != 0) {
+  if (lock >= 0 && bind(lock, reinterpret_cast<const sockaddr*>(&name), name_size) == 0) return lock;
+  if (lock >= 0) close(lock);
+  return -1;
+}
+
+}  // namespace
+
+Result<PortLock> PortLock::take_name(std::uint32_t domain, const std::string& server) {
+  const int lock = named_socket(fmt::format("trammel-name-{}-{}", domain, server));
+  if (lock >= 0) return PortLock(lock);
+  return failure(ErrorCode::kConflict, "another trammel server of this host is called {} in domain {}", server, domain)
+      .of("server")
+      .with_text(server)
+      .next("give this one a name of its own");
+}
+
+Result<PortLock> PortLock::take(const std::string& address, std::uint16_t port) {
+  const int lock = named_socket(fmt::format("trammel-dds-{}-{}", address, port));
+  PortLock result(lock);
+  if (lock < 0) {
     return failure(ErrorCode::kConflict, "another trammel server uses port {} on {}", port, address)
         .of("port")
         .with_value(port)

@@ -26,55 +26,6 @@ OutboxLimits limits_of_kept() {
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched)
-    : publisher_(publisher), matched_(std::move(matched)) {}
-
-std::shared_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
-                                               std::function<void()> matched) {
-  std::shared_ptr<ReplyWriter> result(new ReplyWriter(publisher, std::move(matched)));
-  result->writer_ = publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
-                                                wire::dds::StatusMask::publication_matched());
-  return result->writer_ == nullptr ? nullptr : result;
-}
-
-ReplyWriter::~ReplyWriter() {
-  if (writer_ != nullptr) publisher_.delete_datawriter(writer_);
-}
-
-void ReplyWriter::on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) {
-  readers_ = status.current_count;
-  if (status.current_count_change > 0) matched_();
-}
-
-/// A publisher and its writers. Only the tending thread adds writers and destroys it.
-class ReplyChannels::Channel {
- public:
-  Channel(wire::dds::DomainParticipant& participant, const std::string& partition)
-      : participant_(participant), publisher_(participant.create_publisher(wire::publisher_qos(partition))) {}
-  ~Channel() {
-    writers_.clear();
-    if (publisher_ != nullptr) participant_.delete_publisher(publisher_);
-  }
-  Channel(const Channel&) = delete;
-  Channel& operator=(const Channel&) = delete;
-
-  [[nodiscard]] wire::dds::Publisher* publisher() const { return publisher_; }
-  void add(const std::string& topic, Writer writer) { writers_[topic] = std::move(writer); }
-  [[nodiscard]] Writer writer(const std::string& topic) const {
-    const auto found = writers_.find(topic);
-    return found == writers_.end() ? nullptr : found->second;
-  }
-  /// A sender has a writer in its hands.
-  [[nodiscard]] bool is_in_use() const {
-    return std::any_of(writers_.begin(), writers_.end(), [](const auto& one) { return one.second.use_count() > 1; });
-  }
-
- private:
-  wire::dds::DomainParticipant& participant_;
-  wire::dds::Publisher* const publisher_;
-  std::map<std::string, Writer> writers_;  // by topic
-};
-
 ReplyChannels::ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity,
                              std::function<void()> wants_tending, WorkUnderWay& writing)
     : participant_(participant),
@@ -101,7 +52,7 @@ void ReplyChannels::heard(const std::vector<ReaderEvent>& events) {
 
 bool ReplyChannels::tend() {
   std::vector<ChannelBook::Change> changes;
-  std::vector<std::shared_ptr<Channel>> unused;  // destroyed without the lock
+  std::vector<std::shared_ptr<ReplyChannel>> unused;  // parked without the lock
   bool somebody_waits = false;
   {
     const MutexLock lock(mutex_);
@@ -111,49 +62,54 @@ bool ReplyChannels::tend() {
     unused.assign(std::make_move_iterator(used), std::make_move_iterator(closed_.end()));
     closed_.erase(used, closed_.end());
   }
-  unused.clear();
+  for (auto& channel : unused) parked_.park(std::move(channel), Clock::now());
   for (const ChannelBook::Change& each : changes) change(each);
-  return somebody_waits;
+  return parked_.tend(Clock::now()) || somebody_waits;
 }
 
 void ReplyChannels::change(const ChannelBook::Change& change) {
   if (change.kind == ChannelBook::Change::Kind::kClose) {
     close(change.partition);
   } else {
-    open(change.partition, change.topic);
+    open(change);
   }
 }
 
-void ReplyChannels::open(const std::string& partition, const std::string& topic) {
-  std::shared_ptr<Channel> channel;
+void ReplyChannels::open(const ChannelBook::Change& change) {
+  std::shared_ptr<ReplyChannel> channel;
   wire::dds::Topic* of = nullptr;
   {
     const MutexLock lock(mutex_);
-    of = topics_.at(topic);
-    if (const auto found = channels_.find(partition); found != channels_.end()) channel = found->second;
+    of = topics_.at(change.topic);
+    if (const auto found = channels_.find(change.partition); found != channels_.end()) channel = found->second;
   }
-  if (!channel) channel = std::make_shared<Channel>(participant_, partition);
+  if (!channel) channel = parked_.take(change.participant, change.partition);
+  if (!channel) channel = std::make_shared<ReplyChannel>(participant_, change.partition);
   if (channel->publisher() == nullptr) return;
-  Writer writer = ReplyWriter::make(*channel->publisher(), of, [this] { matched(); });
+  Writer writer = channel->writer(change.topic);
+  if (!writer) writer = ReplyWriter::make(*channel->publisher(), of, [this] { matched(); });
   {
     const MutexLock lock(mutex_);
-    if (writer) channel->add(topic, std::move(writer));
-    channels_[partition] = std::move(channel);
+    if (writer) channel->add(change.topic, std::move(writer));
+    channels_[change.partition] = std::move(channel);
   }
   matched();  // perhaps before the writer was known here
 }
 
 void ReplyChannels::close(const std::string& partition) {
-  std::shared_ptr<Channel> unused;  // destroyed without the lock
-  const MutexLock lock(mutex_);
-  const auto found = channels_.find(partition);
-  if (found == channels_.end()) return;
-  if (found->second->is_in_use()) {
-    closed_.push_back(std::move(found->second));
-  } else {
-    unused = std::move(found->second);
+  std::shared_ptr<ReplyChannel> unused;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = channels_.find(partition);
+    if (found == channels_.end()) return;
+    if (found->second->is_in_use()) {
+      closed_.push_back(std::move(found->second));
+    } else {
+      unused = std::move(found->second);
+    }
+    channels_.erase(found);
   }
-  channels_.erase(found);
+  if (unused) parked_.park(std::move(unused), Clock::now());
 }
 
 void ReplyChannels::matched() {
@@ -252,6 +208,7 @@ void ReplyChannels::deliver(const std::stop_token& stop) {
     std::vector<Ready> ready = wait_for_ready(stop);
     is_last = is_last && ready.empty();
     for (const Ready& each : ready) write(each.writer, each.reply.get());
+    ++looks_;
   }
 }
 

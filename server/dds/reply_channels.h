@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <functional>
 #include <list>
 #include <map>
@@ -15,6 +14,7 @@
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
+#include "server/dds/reply_channel.h"
 #include "server/dds/reply_sink.h"
 #include "server/dds/schedule/channel_book.h"
 #include "server/dds/schedule/outbox.h"
@@ -22,31 +22,6 @@
 #include "server/dds/stillness.h"
 
 namespace trammel {
-
-/// A writer of one reply topic to one client.
-class ReplyWriter final : private wire::dds::DataWriterListener {
- public:
-  /// Null when DDS refuses. `matched` is called when a reader has been matched, in a thread of DDS.
-  [[nodiscard]] static std::shared_ptr<ReplyWriter> make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
-                                                         std::function<void()> matched);
-  ~ReplyWriter() override;
-  ReplyWriter(const ReplyWriter&) = delete;
-  ReplyWriter& operator=(const ReplyWriter&) = delete;
-
-  [[nodiscard]] bool has_reader() const { return readers_ > 0; }
-  /// Does not wait for the reader: what it does not take in time is overwritten.
-  [[nodiscard]] bool write(void* reply) { return writer_->write(reply); }
-
- private:
-  ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched);
-  void on_publication_matched(wire::dds::DataWriter* writer,
-                              const wire::dds::PublicationMatchedStatus& status) override;
-
-  wire::dds::Publisher& publisher_;
-  const std::function<void()> matched_;
-  wire::dds::DataWriter* writer_ = nullptr;
-  std::atomic<int> readers_{0};
-};
 
 /// The reply channels: a publisher in the partition of each client, and a writer for each topic that it listens to.
 /// They are made when discovery finds the client's readers, and only then; ChannelBook says who has one. A reply to a
@@ -86,17 +61,18 @@ class ReplyChannels final : public ReplySink {
   /// Writes what was posted, and what was kept once its reader is matched, until `stop`.
   void deliver(const std::stop_token& stop);
 
+  /// How often deliver() has looked; it does at least twice a second. For the watchdog: takes no lock.
+  [[nodiscard]] std::uint64_t looks() const { return looks_; }
   /// Replies that were dropped because nobody listened.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }
   [[nodiscard]] std::size_t clients() const;
 
  private:
-  class Channel;
   using Writer = std::shared_ptr<ReplyWriter>;
   void answered(const std::string& partition);
   void matched();
   void change(const ChannelBook::Change& change);
-  void open(const std::string& partition, const std::string& topic);
+  void open(const ChannelBook::Change& change);
   void close(const std::string& partition);
   /// Null: nobody of the participant is matched there.
   [[nodiscard]] Writer writer(const std::string& participant, const std::string& partition,
@@ -114,12 +90,14 @@ class ReplyChannels final : public ReplySink {
   wire::dds::DomainParticipant& participant_;
   const std::function<void()> wants_tending_;
   WorkUnderWay& writing_;
+  ParkedChannels parked_;  // of the tending thread
   std::atomic<std::uint64_t> unheard_{0};
+  std::atomic<std::uint64_t> looks_{0};
   mutable Mutex mutex_;
   Condition due_;
-  std::map<std::string, wire::dds::Topic*> topics_ TRAMMEL_GUARDED_BY(mutex_);           // by name
-  std::map<std::string, std::shared_ptr<Channel>> channels_ TRAMMEL_GUARDED_BY(mutex_);  // by partition
-  std::vector<std::shared_ptr<Channel>> closed_ TRAMMEL_GUARDED_BY(mutex_);  // perhaps still in use by a sender
+  std::map<std::string, wire::dds::Topic*> topics_ TRAMMEL_GUARDED_BY(mutex_);                // by name
+  std::map<std::string, std::shared_ptr<ReplyChannel>> channels_ TRAMMEL_GUARDED_BY(mutex_);  // by partition
+  std::vector<std::shared_ptr<ReplyChannel>> closed_ TRAMMEL_GUARDED_BY(mutex_);  // perhaps still in use by a sender
   ChannelBook book_ TRAMMEL_GUARDED_BY(mutex_);
   Outbox posted_ TRAMMEL_GUARDED_BY(mutex_);
   Outbox kept_ TRAMMEL_GUARDED_BY(mutex_);  // until their reader is matched

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "idl/safe_type.h"
+#include "idl/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
@@ -24,18 +24,22 @@ namespace trammel {
 struct CallCounts {
   std::atomic<std::uint64_t> requests{0};  ///< answered by a handler or from memory
   std::atomic<std::uint64_t> refused{0};   ///< of them, with another code than RESULT_OK
-  /// Answered with RESULT_BUSY or RESULT_DEADLINE_MISSED: there was no time or no room.
-  std::atomic<std::uint64_t> shed{0};
-  std::atomic<std::uint64_t> misdirected{0};  ///< not answered: the reply partition is another client's
-  std::atomic<std::uint64_t> lost{0};         ///< by a DDS reader, before anybody saw them
+  std::atomic<std::uint64_t> shed{0};      ///< answered with RESULT_BUSY: there was no time or no room
+  std::atomic<std::uint64_t> lost{0};      ///< by a DDS reader, before anybody saw them
+  /// Not answered: another client listens where the reply was to go.
+  std::atomic<std::uint64_t> misdirected{0};
 };
 
-/// Whose answer it is, and to which request.
-inline void put_identity(const wire::RequestHeader& asked, const std::string& server_id, wire::ReplyHeader& reply) {
-  reply.related_request_id(asked.request_id());
-  reply.server(server_id);
-  reply.contract_version(wire::CONTRACT_VERSION);
-  reply.trace_id(asked.trace_id());
+/// Of a request that claims to be of another DDS writer than the one that sent it.
+[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
+                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
+  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
+  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
+                     "request_id must hold the GUID of the writer that sends it",
+                     {},
+                     "writer_guid",
+                     {},
+                     {}};
 }
 
 /// What the calls of one operation share. Outlives them.
@@ -79,11 +83,11 @@ class Call final : public Job {
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
 
   std::size_t begin() override {
-    if (find_known()) return 0;
     if (request_->fault) {
       refuse(*request_->fault);
       return 0;
     }
+    if (find_known()) return 0;
     if constexpr (!kComputes) return 1;
     guarded([this] { begin_portions(); });
     return portions_ ? portions_->items() : 0;
@@ -111,10 +115,15 @@ class Call final : public Job {
   }
 
   void shed(const Shed& shed) override {
-    const auto code = shed.is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY;
-    refuse(wire::Fault{code, shed.why, {}, {}, {}, {}});
+    const bool is_over = shed.too_late && request_->header().deadline_ms() > 0;
+    refuse(wire::Fault{is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY,
+                       fmt::format("{}; try again in {} ms", shed.why, shed.retry_after.count()),
+                       {},
+                       is_over ? "deadline_ms" : "",
+                       {},
+                       {}});
     reply_.header().retry_after_ms(static_cast<std::uint32_t>(shed.retry_after.count()));
-    put_identity(request_->header(), context_.server_id, reply_.header());
+    put_identity();
     context_.counts.shed += answer(&ReplySink::post);
   }
 
@@ -137,7 +146,7 @@ class Call final : public Job {
       if (begun) {
         portions_ = std::move(*begun);
       } else {
-        refuse(begun.error());
+        accept(Result<Reply>(tl::make_unexpected(begun.error())));
       }
     }
   }
@@ -150,7 +159,7 @@ class Call final : public Job {
     }
   }
 
-  /// An Error or a wire::Fault.
+  /// `why`: an Error or a wire::Fault.
   template <typename Why>
   void refuse(const Why& why) {
     const MutexLock lock(mutex_);
@@ -173,10 +182,17 @@ class Call final : public Job {
     }
   }
 
+  void put_identity() {
+    reply_.header().related_request_id(request_->header().request_id());
+    reply_.header().server(context_.server_id);
+    reply_.header().contract_version(wire::CONTRACT_VERSION);
+    reply_.header().trace_id(request_->header().trace_id());
+  }
+
   void remember(bool is_good) {
-    put_identity(request_->header(), context_.server_id, reply_.header());
+    put_identity();
     if (!is_good) return;
-    if constexpr (kComputes) context_.lately.remember(sent_, reply_);
+    if (kComputes) context_.lately.remember(sent_, reply_);
     if (happens_once(*request_)) {
       context_.memory.remember(request_id_text(request_->header().request_id()), reply_);
     }

@@ -6,12 +6,10 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 
 #include "idl/transport.h"
-#include "server/dds/partition_owners.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_call.h"
 #include "server/dds/schedule/lane.h"
@@ -27,9 +25,8 @@ struct ServiceCore {
   const Trainer& trainer;  ///< knows which cells are served
   Handlers& handlers;
   ReplyChannels& channels;
-  const PartitionOwners& owners;
   CallCounts counts{};
-  /// Not answered: not even the header could be read.
+  /// Dropped: not even the header could be read.
   std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
   WorkUnderWay taking{};  ///< takes of requests from DDS readers
 };
@@ -39,18 +36,6 @@ struct Lanes {
   Lane& changes;
   Lane& reads;
 };
-
-/// Of a request that claims to be of another DDS writer than the one that sent it.
-[[nodiscard]] inline std::optional<wire::Fault> fault_of_identity(const wire::RequestHeader& header,
-                                                                  const eprosima::fastrtps::rtps::GUID_t& writer) {
-  if (header.request_id().writer_guid() == wire::octets_of(writer)) return std::nullopt;
-  return wire::Fault{wire::RESULT_WRONG_IDENTITY,
-                     "request_id must hold the GUID of the writer that sends it",
-                     {},
-                     "writer_guid",
-                     {},
-                     {}};
-}
 
 class RequestEndpointBase {
  public:
@@ -91,7 +76,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
 
  private:
   /// How long a request waits for its turn whose client does not say how long it waits.
-  static constexpr std::chrono::seconds kPatience{5};
+  static constexpr std::chrono::milliseconds kPatience{5000};
 
   RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
       : core_(core),
@@ -123,9 +108,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     if (!wanted.empty() && wanted != core_.server_id) return;
     const ReplyAddress to{wire::participant_of(writer), request->header().reply_partition().to_string(),
                           context_.reply_topic};
-    const auto expectation = core_.owners.may_use(to.partition, to.participant)
-                                 ? core_.channels.expect(to.participant, to.partition)
-                                 : nullptr;
+    auto expectation = core_.channels.expect(to.participant, to.partition);
     if (!expectation) {
       ++core_.counts.misdirected;
       return;
@@ -134,9 +117,9 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     const std::string sent = to.participant +
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request->header().request_id());
-    Lane& lane = !request->fault && happens_once(*request) ? lanes_.changes : lanes_.reads;
+    Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
     Ask ask = ask_of(*request, to.participant);
-    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, expectation);
+    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
     if (!call->is_first()) return;
     if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
   }
@@ -148,11 +131,11 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     if (is_served) ask.cell = cell;
     if (is_served) ask.work = work_of(request, cell, Operation::kName);
     ask.items = items_of(request);
-    ask.bytes = bytes_of_request(request, request.bytes);
+    ask.bytes = bytes_of_request(request);
     const auto now = std::chrono::steady_clock::now();
-    const std::chrono::milliseconds waits(request.header().deadline_ms());
-    if (waits.count() > 0) ask.finish_by = now + waits;
-    ask.start_by = waits.count() > 0 ? now + waits : now + kPatience;
+    const std::chrono::milliseconds deadline(request.header().deadline_ms());
+    ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
+    if (deadline.count() > 0) ask.finish_by = ask.start_by;
     return ask;
   }
 

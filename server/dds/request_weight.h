@@ -38,11 +38,13 @@ template <typename Request>
   }
 }
 
-/// Bytes that a request with so many serialized bytes takes in memory until it is answered, about.
+/// Bytes that a request takes in memory until it is answered, about.
 template <typename Request>
-[[nodiscard]] std::size_t bytes_of_request(const Request& request, std::size_t serialized) {
+[[nodiscard]] std::size_t bytes_of_request(const Request& request) {
   constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
-  return sizeof(Request) + serialized + kAskedAndAnswered * items_of(request);
+  std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
+  if constexpr (requires { request.bytes; }) bytes += request.bytes;  // serialized
+  return bytes;
 }
 
 /// Bytes that a reply takes in memory, about.
@@ -53,18 +55,18 @@ template <typename Reply>
   if constexpr (requires { reply.corrections(); }) bytes += kAnswered * reply.corrections().size();
   if constexpr (requires { reply.predictions(); }) bytes += kAnswered * reply.predictions().size();
   if constexpr (requires { reply.models(); }) bytes += kAnswered * reply.models().size();
-  if constexpr (requires { reply.text(); }) bytes += reply.text().size();
-  if constexpr (requires { reply.findings_json(); }) bytes += reply.findings_json().size();
-  if constexpr (requires { reply.page_html(); }) bytes += reply.page_html().size();
+  if constexpr (requires { reply.jobs(); }) bytes += kAnswered * (reply.jobs().size() + reply.batches().size());
+  if constexpr (requires { reply.text(); }) bytes += reply.text().size() + reply.page_html().size();
   return bytes;
 }
 
-/// Requests that cost alike: of one cell, with the same action or question.
+/// Requests that cost alike: of one cell, with the same action.
 template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
   std::string work = cell + '/' + operation;
   if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
   if constexpr (IsQuestion<Request>) work += '/' + std::to_string(static_cast<int>(request.what()));
+  if constexpr (requires { request.what(); }) work += '/' + std::to_string(static_cast<int>(request.what()));
   return work;
 }
 

@@ -43,19 +43,11 @@ ServiceEvents::News ServiceEvents::wait(const std::stop_token& stop, std::chrono
 void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
                                             eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
+  if (info.status != Info::DISCOVERED_READER && info.status != Info::REMOVED_READER) return;
   const std::string topic = info.info.topicName().to_string();
   const std::vector<std::string> partitions = info.info.m_qos.m_partition.names();
-  const bool is_gone = info.status == Info::REMOVED_READER;
-  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) {
-    return owners_.left(info.info.guid());
-  }
-  if (is_gone) {
-    owners_.left(info.info.guid());
-  } else {
-    owners_.found(info.info.guid(), partitions.front());
-  }
-  if (!is_gone && info.status != Info::DISCOVERED_READER) return;
-  const auto kind = is_gone ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
+  if (!topic.ends_with("_Reply") || partitions.size() != 1 || !wire::valid_partition(partitions.front())) return;
+  const auto kind = info.status == Info::REMOVED_READER ? ReaderEvent::Kind::kLost : ReaderEvent::Kind::kFound;
   {
     const MutexLock lock(mutex_);
     if (readers_.size() >= kMaxReaders) return;

@@ -9,7 +9,6 @@
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
-#include "server/dds/partition_owners.h"
 #include "server/dds/schedule/channel_book.h"
 
 namespace trammel {
@@ -20,11 +19,10 @@ struct ReaderEvent {
   ReplyReader reader;
 };
 
-/// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, whose
-/// they are, and the participants that have left, and nothing else. Thread-safe.
+/// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
+/// the participants that have left, and nothing else. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
-  [[nodiscard]] const PartitionOwners& owners() const { return owners_; }
   /// The status is to be published.
   void status_changed();
   /// The status thread has something else to do.
@@ -44,7 +42,6 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   void on_participant_discovery(wire::dds::DomainParticipant* participant,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
 
-  PartitionOwners owners_;
   Mutex mutex_;
   Condition changed_;
   bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;

@@ -47,7 +47,13 @@ Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& con
 
 Result<Subject> SubjectFinder::find(const wire::Context& context) {
   if (const auto known = cell(context); !known) return tl::make_unexpected(known.error());
-  const auto in_force = registry_.in_force(context.cell());
+  const auto [in_force, comes] = registry_.ready(context.cell());
+  if (comes) {  // a worker of the service does not wait for the disk
+    return failure(ErrorCode::kBusy, "the model of cell {} is being loaded", context.cell())
+        .of("cell")
+        .with_text(context.cell())
+        .next("try again in a second");
+  }
   Subject subject{in_force, true, {}, {}};
   if (const auto wanted = version_number(context.model()); wanted && (!in_force || in_force->version != *wanted)) {
     auto stored = version(context.cell(), *wanted);

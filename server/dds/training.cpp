@@ -4,6 +4,27 @@
 #include "server/dds/handlers.h"
 
 namespace trammel {
+namespace {
+
+/// What a training of each kind is not told.
+Status check_training(const wire::TrainRequest& request) {
+  if (request.kind() == wire::TRAIN_BATCHES) {
+    if (request.csv().empty()) return {};
+    return failure(ErrorCode::kUsage, "a training is of stored batches").of("csv").next("submit the batch first");
+  }
+  if (request.batch_ids().size() > 1) {
+    return failure(ErrorCode::kUsage, "{} batches to diagnose, limit 1", request.batch_ids().size())
+        .of("batch_ids")
+        .beyond(request.batch_ids().size(), 1);
+  }
+  for (const auto& [text, field] : {std::pair(request.level(), "level"), std::pair(request.bias(), "bias")}) {
+    if (text.empty()) continue;
+    return failure(ErrorCode::kUsage, "what a diagnosis finds is trained beside what the model in force has").of(field);
+  }
+  return {};
+}
+
+}  // namespace
 
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
@@ -24,32 +45,29 @@ Result<wire::TrainReply> Handlers::answer(const wire::TrainRequest& request) {
   if (request.diagnosis() != 0) return unsupported<wire::TrainReply>("diagnosis");
   if (request.change().expected_epoch() != 0) return unsupported<wire::TrainReply>("expected_epoch");
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  const auto job = request.kind() == wire::TRAIN_DIAGNOSED ? train_diagnosed(request) : train_from_batches(request);
+  const auto job = trained(request);
   if (!job) return tl::make_unexpected(job.error());
   wire::TrainReply reply;
   reply.job(*job);
   return reply;
 }
 
-Result<std::int64_t> Handlers::train_from_batches(const wire::TrainRequest& request) {
-  if (!request.csv().empty())
-    return failure(ErrorCode::kUsage, "a training is of stored batches").of("csv").next("submit the batch first");
-  return trainer_.retrain(request.about().cell(), request.batch_ids(), request.level(), request.bias());
-}
-
-Result<std::int64_t> Handlers::train_diagnosed(const wire::TrainRequest& request) {
+Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
+  const std::string& cell = request.about().cell();
   const auto& batches = request.batch_ids();
-  if (batches.size() > 1) {
-    return failure(ErrorCode::kUsage, "{} batches to diagnose, limit 1", batches.size())
-        .of("batch_ids")
-        .beyond(batches.size(), 1);
-  }
-  for (const auto& [text, field] : {std::pair(request.level(), "level"), std::pair(request.bias(), "bias")}) {
-    if (!text.empty())
-      return failure(ErrorCode::kUsage, "what a diagnosis finds is trained beside what the model in force has")
-          .of(field);
-  }
-  return trainer_.diagnose(request.about().cell(), batches.empty() ? "" : batches.front(), request.csv(), true);
+  const bool diagnosed = request.kind() == wire::TRAIN_DIAGNOSED;
+  if (const Status sensible = check_training(request); !sensible) return tl::make_unexpected(sensible.error());
+  const auto expected = expected_version(request.change());
+  if (!expected) return tl::make_unexpected(expected.error());
+  const ChangeId id = change_id(
+      request.change().id().to_string(),
+      in_few_words(diagnosed ? "diagnose and train" : "train", cell,
+                   {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}));
+  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
+    return tl::make_unexpected(as_expected.error());
+  if (!diagnosed)
+    return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);
+  return trainer_.diagnose(cell, batches.empty() ? "" : batches.front(), request.csv(), true, id);
 }
 
 bool happens_once(const wire::SubmitMeasurementsRequest&) { return true; }

@@ -26,8 +26,8 @@ using Clock = std::chrono::steady_clock;
   }
   std::array<char, 512> line{};
   std::snprintf(line.data(), line.size(),
-                "trammeld: hangs: no progress for %lld s in: %s; ends at once, to be started again\n",
-                static_cast<long long>(Watchdog::kLimit.count() / 1000), names.data());
+                "trammeld: hangs: no progress for %.1f s in: %s; ends at once, to be started again\n",
+                static_cast<double>(Watchdog::kLimit.count()) / 1000, names.data());
   end_at_once(line.data());
 }
 

@@ -21,7 +21,7 @@ inline constexpr int kExitHung = 70;
 class Watchdog {
  public:
   static constexpr std::chrono::milliseconds kTick{250};
-  static constexpr std::chrono::milliseconds kLimit{5000};
+  static constexpr std::chrono::milliseconds kLimit{2500};  ///< the slowest part moves once a second
 
   explicit Watchdog(std::vector<MovingPart> parts);
 

@@ -11,6 +11,9 @@ namespace trammel {
 
 namespace {
 
+constexpr double kTimeLimit = 1e12;        // s
+constexpr double kTemperatureLimit = 1e3;  // degrees Celsius
+
 struct JointColumn {
   int number = 0;  // from 1
   JointType type = JointType::kRevolute;
@@ -29,9 +32,9 @@ std::optional<JointColumn> as_joint_column(std::string_view name) {
 
 /// An optional column's number in this row; empty field = nothing recorded.
 Result<std::optional<double>> optional_number(const CsvTable& table, std::size_t row,
-                                              const std::optional<std::size_t>& column) {
+                                              const std::optional<std::size_t>& column, double limit) {
   if (!column || table.field(row, *column).empty()) return std::optional<double>();
-  return table.number(row, *column).map([](double value) { return std::optional(value); });
+  return table.number(row, *column, limit).map([](double value) { return std::optional(value); });
 }
 
 }  // namespace
@@ -59,6 +62,9 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
     found.joint_types_.push_back(column.second);
     direction_names.push_back(fmt::format("dir{}", number));
   }
+  // Targets on a branch have no joints of their own, but a way to come there.
+  for (int n = 1; joints.empty() && table.find(fmt::format("dir{}", n)); ++n)
+    direction_names.push_back(fmt::format("dir{}", n));
   Result<std::vector<std::size_t>> directions = table.all_or_none(direction_names);
   if (!directions) return tl::make_unexpected(directions.error());
   found.directions_ = std::move(*directions);
@@ -92,9 +98,9 @@ bool PoseColumns::joints_empty(const CsvTable& table, std::size_t row) const {
 
 Result<PoseContext> PoseColumns::circumstances(const CsvTable& table, std::size_t row) const {
   PoseContext context;
-  const auto time = optional_number(table, row, time_);
+  const auto time = optional_number(table, row, time_, kTimeLimit);
   if (!time) return tl::make_unexpected(time.error());
-  const auto temperature = optional_number(table, row, temperature_);
+  const auto temperature = optional_number(table, row, temperature_, kTemperatureLimit);
   if (!temperature) return tl::make_unexpected(temperature.error());
   context.time = *time;
   context.temperature = *temperature;
@@ -103,9 +109,13 @@ Result<PoseContext> PoseColumns::circumstances(const CsvTable& table, std::size_
     if (!direction) return tl::make_unexpected(direction.error());
     context.direction.push_back(*direction);
   }
-  if (tool_) context.tool = table.field(row, *tool_);
-  if (payload_) context.payload = table.field(row, *payload_);
   context.index = static_cast<int>(row);
+  for (const auto& [column, text] : {std::pair(tool_, &context.tool), std::pair(payload_, &context.payload)}) {
+    if (!column) continue;
+    Result<std::string> name = table.name(row, *column);
+    if (!name) return tl::make_unexpected(name.error());
+    *text = std::move(*name);
+  }
   return context;
 }
 
@@ -118,8 +128,8 @@ Result<PoseContext> PoseColumns::read(const CsvTable& table, std::size_t row) co
   });
 }
 
-std::string PoseColumns::pose_id(const CsvTable& table, std::size_t row) const {
-  if (pose_id_ && !table.field(row, *pose_id_).empty()) return table.field(row, *pose_id_);
+Result<std::string> PoseColumns::pose_id(const CsvTable& table, std::size_t row) const {
+  if (pose_id_ && !table.field(row, *pose_id_).empty()) return table.name(row, *pose_id_);
   return fmt::format("{}", row + 1);
 }
 

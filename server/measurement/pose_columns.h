@@ -28,8 +28,8 @@ class PoseColumns {
   /// Everything about the pose but its joints.
   [[nodiscard]] Result<PoseContext> circumstances(const CsvTable& table, std::size_t row) const;
   [[nodiscard]] Result<PoseContext> read(const CsvTable& table, std::size_t row) const;
-  /// The pose_id column, else the row's count from 1.
-  [[nodiscard]] std::string pose_id(const CsvTable& table, std::size_t row) const;
+  /// The pose_id column, else the row's count from 1. Refuses an id that is no name.
+  [[nodiscard]] Result<std::string> pose_id(const CsvTable& table, std::size_t row) const;
   /// All columns that this class reads.
   [[nodiscard]] std::vector<std::size_t> used() const;
 

@@ -1,12 +1,20 @@
 #pragma once
 
+#include <cstdint>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/mutex.h"
+#include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
+#include "server/registry/reclaimer.h"
 
 namespace trammel {
 
@@ -17,20 +25,99 @@ struct ServedModel {
   CompensatedModel model;
 };
 
-/// The model in force for each cell. Thread-safe. A reader gets the new model or the previous one, never a mixture, and
-/// keeps it while it holds the pointer. Readers never wait for training.
+using ServedModelPtr = std::shared_ptr<const ServedModel>;
+
+/// Memory of what predicts, bytes, as far as it grows with the training poses.
+[[nodiscard]] std::size_t bytes_of(const CompensatedModel& model);
+
+/// Where the models are that are not in memory. Called without a lock, for one version by one thread at a time.
+struct ModelSource {
+  /// The model to serve the cell with: where the one in force cannot be loaded, another version.
+  std::function<Result<ServedModel>(const std::string& cell)> in_force;
+  std::function<Result<ServedModel>(const std::string& cell, int version)> version;
+  /// A model that is in force was loaded, for the first time since it was announced.
+  std::function<void(const ServedModelPtr&)> loaded;
+};
+
+/// The model in force for each cell, and the models in memory. Thread-safe. A reader gets the new model or the previous
+/// one, never a mixture, and keeps it while it holds the pointer. Readers never wait for training.
+///
+/// Models are loaded when they are first asked for, each by one thread however many ask, and leave the memory when it
+/// is over `budget` and they were not used for longest. Whoever may not wait asks ready().
 class ModelRegistry {
  public:
-  /// Null when the cell has no model in force.
-  [[nodiscard]] std::shared_ptr<const ServedModel> in_force(const std::string& cell) const;
+  static constexpr std::size_t kNoLimit = SIZE_MAX;
+  explicit ModelRegistry(std::size_t budget = kNoLimit) : budget_(budget) {}
+
+  /// Null when the cell has no model in force. Waits while it is loaded.
+  [[nodiscard]] ServedModelPtr in_force(const std::string& cell) const;
+  /// The version in force, loaded or not; 0: none.
+  [[nodiscard]] int version_in_force(const std::string& cell) const;
+  /// Any version of the cell. Waits while it is loaded; refuses what its source refuses.
+  [[nodiscard]] Result<ServedModelPtr> version(const std::string& cell, int version) const;
+  /// What in_force() gives, without waiting.
+  struct Ready {
+    ServedModelPtr model;
+    bool comes = false;  ///< it is not in memory, and will be
+  };
+  [[nodiscard]] Ready ready(const std::string& cell) const;
+
   /// Replaces the model of its cell. Readers that hold the previous one keep it.
-  void publish(std::shared_ptr<const ServedModel> model);
-  /// The model in force of every cell that has one, ordered by cell name.
-  [[nodiscard]] std::vector<std::shared_ptr<const ServedModel>> all() const;
+  void publish(ServedModelPtr model);
+  /// The same, of a model that is loaded when it is asked for.
+  void announce(const std::string& cell, int version);
+  /// A model that whoever holds it last does not free itself.
+  [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const { return reclaimer_->watch(std::move(model)); }
+  /// The models in force that are in memory, ordered by cell name.
+  [[nodiscard]] std::vector<ServedModelPtr> all() const;
+  /// How many cells have a model in force.
+  [[nodiscard]] std::size_t cells_served() const;
+  [[nodiscard]] std::size_t bytes() const;
+
+  /// Set before it is used by others; the last one set is emptied before what it calls goes.
+  void set_source(ModelSource source);
+  /// Loads what ready() was asked for; where nothing is, models in force that were never loaded, as long as there is
+  /// room. Returns after `tick` at the latest, or when `stop` is requested. While one thread calls this again and
+  /// again, ready() does not wait.
+  void load_for(const std::stop_token& stop, std::chrono::milliseconds tick);
+  /// No thread calls load_for() any longer.
+  void stop_loading();
+  /// Frees models until `stop` is requested; see reclaimed().
+  void free_models(const std::stop_token& stop) { reclaimer_->run(stop); }
 
  private:
+  using Key = std::pair<std::string, int>;
+  struct Held {
+    ServedModelPtr model;
+    std::size_t bytes = 0;
+    std::uint64_t used = 0;
+  };
+  /// Of a model in memory; counts as a use.
+  [[nodiscard]] ServedModelPtr held(const Key& key) const TRAMMEL_REQUIRES(mutex_);
+  /// Puts it into memory. What has to leave goes to `left`, to be freed without the lock.
+  void hold(ServedModelPtr model, std::vector<ServedModelPtr>* left) const TRAMMEL_REQUIRES(mutex_);
+  /// The version of the model in force of the cell; null: none.
+  [[nodiscard]] const int* place_of(const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
+  /// Loads one, once it is sure that nobody else does; empty: somebody did meanwhile.
+  [[nodiscard]] Result<ServedModelPtr> load(const Key& key) const TRAMMEL_EXCLUDES(mutex_);
+  [[nodiscard]] Result<ServedModelPtr> from_source(const Key& key, bool in_force) const;
+  void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
+
+  const std::size_t budget_;
+  const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ = std::make_shared<Reclaimer<ServedModel>>();
+  // Everything is a memory of what the source has: asking changes it.
   mutable Mutex mutex_;
-  std::map<std::string, std::shared_ptr<const ServedModel>> models_ TRAMMEL_GUARDED_BY(mutex_);
+  mutable Condition changed_;
+  ModelSource source_ TRAMMEL_GUARDED_BY(mutex_);
+  mutable std::map<std::string, int> in_force_ TRAMMEL_GUARDED_BY(mutex_);
+  mutable std::map<Key, Held> held_ TRAMMEL_GUARDED_BY(mutex_);
+  mutable std::set<Key> loading_ TRAMMEL_GUARDED_BY(mutex_);
+  mutable std::deque<Key> wanted_ TRAMMEL_GUARDED_BY(mutex_);              // asked for by those who do not wait
+  mutable std::set<std::string> never_loaded_ TRAMMEL_GUARDED_BY(mutex_);  // cells whose model was only announced
+  mutable std::size_t bytes_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  mutable std::uint64_t uses_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  bool is_loading_ TRAMMEL_GUARDED_BY(mutex_) = false;  // a thread calls load_for()
 };
 
 }  // namespace trammel

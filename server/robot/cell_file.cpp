@@ -3,18 +3,32 @@
 #include <cmath>
 #include <filesystem>
 
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
+#include "server/robot/cell_row.h"
 
 namespace trammel {
 
 namespace {
 
+constexpr double kFarthestMm = 1e9;  // of any frame or point: no cell is larger
+
 Vector3 read_vector(const YamlMap& map, const std::string& key) {
   const std::vector<double> v = map.numbers(key, 3);
+  for (const double value : v) {
+    if (std::abs(value) > kFarthestMm)
+      map.refuse(key, refused("{:g}, limit {:g}", value, kFarthestMm).beyond(value, kFarthestMm));
+  }
   return {v[0], v[1], v[2]};
+}
+
+/// The name of a tool or a payload, as ids in requests have it.
+void check_key(const YamlMap& map, const std::string& name, const char* what) {
+  if (name.empty()) map.refuse(name, refused("a {} without a name", what));
+  if (const Status fine = check_name(name, what); !fine) map.refuse(name, Failure(fine.error()));
 }
 
 void read_link(const YamlMap& map, Joint& joint) {
@@ -114,6 +128,7 @@ void read_tools(const YamlMap& map, Cell& cell) {
     const YamlMap tools = map.map("tools");
     for (const std::string& name : tools.keys()) {
       tools.attempt([&] {
+        check_key(tools, name, "tool");
         cell.tools[name] = std::nullopt;
         if (!tools.is_null(name)) cell.tools[name] = read_pose(tools.map(name));
       });
@@ -128,6 +143,7 @@ void read_payloads(const YamlMap& map, Cell& cell) {
   const YamlMap payloads = map.map("payloads");
   for (const std::string& name : payloads.keys()) {
     payloads.attempt([&] {
+      check_key(payloads, name, "payload");
       const YamlMap entry = payloads.map(name);
       entry.only({"mass_kg", "cog_mm"});
       Payload payload{entry.number("mass_kg"), read_vector(entry, "cog_mm") * from_mm(1)};
@@ -181,6 +197,7 @@ Cell read_cell_map(const YamlMap& map) {
     if (cell.name.empty() || cell.name.find_first_of("@/ \t") != std::string::npos) {
       map.refuse("cell", refused("'{}', expected a name without blanks, '@' and '/'", cell.name).with_text(cell.name));
     }
+    if (const Status fine = check_name(cell.name, "cell"); !fine) map.refuse("cell", Failure(fine.error()));
   });
   read_surroundings(map, cell);
   map.attempt([&] { read_tools(map, cell); });
@@ -207,6 +224,18 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
 
 }  // namespace
 
+namespace {
+
+/// From 0, of a joint that is counted from 1. Chain::make() says whether the robot has it.
+int joint_index(const YamlMap& map, const std::string& key) {
+  const int number = map.integer(key, 0);
+  if (number < 1 || number > kMaxJoints)
+    map.refuse(key, refused("{}, limit 1 to {}", number, kMaxJoints).beyond(number, number < 1 ? 1 : kMaxJoints));
+  return number - 1;
+}
+
+}  // namespace
+
 Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where) {
   return read_yaml(robot_yaml, where,
                    [&](const YamlMap& map) {
@@ -220,7 +249,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                        for (const YamlMap& entry : map.maps("coupling")) {
                          entry.only({"joint", "follows", "ratio"});
                          couplings.push_back(
-                             {entry.integer("joint", 0) - 1, entry.integer("follows", 0) - 1, entry.number("ratio")});
+                             {joint_index(entry, "joint"), joint_index(entry, "follows"), entry.number("ratio")});
                        }
                      }
                      return Chain::make(map.text("name"), std::move(joints), std::move(couplings));
@@ -258,6 +287,13 @@ Result<std::string> robot_text_of(const std::string& cell_yaml, const std::strin
 }
 
 }  // namespace
+
+std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
+  const auto row = read_yaml(cell.cell_yaml, cell.name, [&](const YamlMap& map) {
+    return map.has("model") ? map.map("model").row_of(key) : std::nullopt;
+  });
+  return row ? *row : std::nullopt;
+}
 
 Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {
   Result<Cell> cell = cell_with(parse_robot(robot_yaml, where + " (robot)"), cell_yaml, where);

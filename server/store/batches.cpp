@@ -1,6 +1,7 @@
 #include <utility>
 
 #include "server/base/hash.h"
+#include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
@@ -58,13 +59,17 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
   });
 }
 
-Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
-    const int changes =
-        change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
-    if (changes == 1) return {};
-    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
+                             const ChangeId& change_id) {
+  const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
+    return once(database, change_id, [&]() -> Result<ChangeOutcome> {
+      const int changes =
+          change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
+      if (changes == 1) return ChangeOutcome{};
+      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    });
   });
+  return changed.map([](const ChangeOutcome&) {});
 }
 
 Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {

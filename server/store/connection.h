@@ -2,34 +2,40 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include <chrono>
 #include <exception>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "server/base/mutex.h"
 #include "server/base/result.h"
+#include "server/store/open_database.h"
+#include "server/store/served_copies.h"
+#include "server/store/store.h"
 #include "server/store/writer_lock.h"
 
 namespace trammel {
 
-constexpr int kBusyTimeout = 5000;  // ms to wait while another program reads the file
-
-/// One connection behind one lock.
+/// One connection behind one lock. Where the file cannot be written it is read, or not even that; it is tried again by
+/// whoever wants to write, once a second at most.
 struct StoreConnection {
-  StoreConnection(std::string file, WriterLock writer)
-      : path(std::move(file)),
-        lock(std::move(writer)),
-        database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout) {}
+  StoreConnection(std::string file, WriterLock writer, OpenedDatabase opened, std::unique_ptr<ServedCopies> kept)
+      : path(std::move(file)), lock(std::move(writer)), copies(std::move(kept)), database(std::move(opened.file)) {
+    if (opened.why_not_written) note_trouble(*opened.why_not_written, database == nullptr);
+    must_be_opened_anew = opened.why_not_written.has_value();
+  }
 
-  /// Runs `work(database)` with the lock held. An exception of SQLite becomes kInternal.
+  /// Runs `work(database)` with the lock held, for reading. An exception of SQLite becomes an error.
   template <typename Work>
   auto exclusively(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
     const MutexLock guard(mutex);
+    if (!database) return tl::make_unexpected(*state().why_not_written);
     try {
-      return work(database);
+      return work(*database);
     } catch (const SQLite::Exception& error) {
-      return failure(ErrorCode::kInternal, "{} (SQLite error {})", error.what(), error.getExtendedErrorCode()).in(path);
+      return failure_of(error, path).as(ErrorCode::kInternal);
     } catch (const std::exception& error) {
       return failure(ErrorCode::kInternal, "{}", error.what()).in(path);
     }
@@ -38,18 +44,45 @@ struct StoreConnection {
   /// The same in one transaction, committed only if `work` succeeds.
   template <typename Work>
   auto in_transaction(const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
-    return exclusively([&work](SQLite::Database& open) {
-      SQLite::Transaction transaction(open, SQLite::TransactionBehavior::IMMEDIATE);
-      auto result = work(open);
+    const MutexLock guard(mutex);
+    if (auto open = open_anew(); !open) return tl::make_unexpected(open.error());
+    try {
+      SQLite::Transaction transaction(*database, SQLite::TransactionBehavior::IMMEDIATE);
+      auto result = work(*database);
       if (result) transaction.commit();
+      if (result) note_written();
       return result;
-    });
+    } catch (const SQLite::Exception& error) {
+      Failure said = failure_of(error, path);
+      if (is_of_the_disk(error)) note_trouble(said.value(), false);
+      return said;
+    } catch (const std::exception& error) {
+      return failure(ErrorCode::kInternal, "{}", error.what()).in(path);
+    }
   }
+
+  [[nodiscard]] StoreState state() const;
+  /// Tells those who wait that the state has changed.
+  void note_trouble(const Error& why, bool unreadable);
+  void note_written();
+  /// Something that was found damaged; said once.
+  void note_damage(const std::string& what);
 
   const std::string path;
   const WriterLock lock;
+  const std::unique_ptr<ServedCopies> copies;
   Mutex mutex;
-  SQLite::Database database TRAMMEL_GUARDED_BY(mutex);
+  std::unique_ptr<SQLite::Database> database TRAMMEL_GUARDED_BY(mutex);  // null: cannot be read
+  mutable Mutex state_mutex;                                             // taken last, and for moments only
+  Condition state_changed;
+  StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);
+
+ private:
+  /// Opens a file again that could not be written when it was opened.
+  [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex);
+
+  bool must_be_opened_anew TRAMMEL_GUARDED_BY(mutex) = false;
+  std::chrono::steady_clock::time_point tried_last TRAMMEL_GUARDED_BY(mutex) = {};
 };
 
 /// A prepared statement with its values bound in order.
@@ -71,6 +104,11 @@ int change(SQLite::Database& database, const char* sql, const Values&... values)
 [[nodiscard]] inline std::optional<std::int64_t> optional_integer(SQLite::Statement& row, int column) {
   if (row.isColumnNull(column)) return std::nullopt;
   return row.getColumn(column).getInt64();
+}
+
+[[nodiscard]] inline std::optional<double> optional_number(SQLite::Statement& row, int column) {
+  if (row.isColumnNull(column)) return std::nullopt;
+  return row.getColumn(column).getDouble();
 }
 
 }  // namespace trammel

@@ -1,33 +1,47 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "server/base/result.h"
 
 namespace trammel {
 
+/// What became of a job.
 enum class JobVerdict {
-  kNone,         ///< the job is not over, or nobody recorded it
-  kInForce,      ///< its model was put in force
-  kNotInForce,   ///< its model was judged and is kept, not in force
-  kUndecided,    ///< its model is kept, not in force: too little to judge it by; a person decides
-  kNoModel,      ///< a diagnosis, or nothing to apply
-  kQuarantined,  ///< its batch is kept out
-  kFailed,
-  kCancelled
+  kOpen,            ///< nothing yet; also of jobs from before outcomes were recorded
+  kInForce,         ///< its model was put in force
+  kNotBetter,       ///< its model is stored; the one in force stays, because the new one is not better
+  kUndecided,       ///< its model is stored; too few poses can judge it, a person decides
+  kDiagnosed,       ///< the diagnosis is made; nothing was to be applied
+  kNothingApplied,  ///< the diagnosis is made; it found nothing that a model could be extended by
+  kQuarantined,     ///< its batch is in quarantine, nothing was learned from it
+  kRefused,         ///< the data or the request cannot be trained from
+  kOverLimit,       ///< over the memory or the processor time that a job may take
+  kBroken,          ///< its computing crashed or hung, as often as it may be tried, or the service failed
+  kCancelled        ///< somebody asked for that
 };
+/// The spelling for programs: `in_force`, `not_better`.
+[[nodiscard]] const char* to_text(JobVerdict verdict);
+/// Empty where there is no such verdict.
+[[nodiscard]] std::optional<JobVerdict> job_verdict_of(std::string_view text);
 
-/// How a job ended, as data. Figures are rms over the poses held out, m; empty: not judged.
+/// The reverse of to_text(ErrorCode); empty where there is no such code.
+[[nodiscard]] std::optional<ErrorCode> error_code_of(std::string_view text);
+
+/// The end of a job as data. Its message (StoredJob) says the same in one sentence.
 struct JobOutcome {
-  JobVerdict verdict = JobVerdict::kNone;
-  int judged_on = 0;                  ///< poses
-  std::optional<double> before = {};  ///< of what was in force; of the nominal model where nothing was
-  std::optional<double> after = {};   ///< of the new model
-  std::optional<double> limit = {};   ///< that `after` must not exceed
-  std::optional<double> u95 = {};     ///< of the difference, two standard uncertainties
-  std::optional<Error> why = {};      ///< of a job that made no model: what is wrong
-  std::string next = {};              ///< what to do, as one clause
+  JobVerdict verdict = JobVerdict::kOpen;
+  std::optional<double> before;             ///< m, held-out rms of the model in force; of a first one, nominal
+  std::optional<double> after;              ///< m, of the new model on the same poses
+  std::optional<double> limit;              ///< m, what `after` had to be below
+  std::optional<ErrorCode> code;            ///< of a job that failed
+  std::string why;                          ///< for people, one clause
+  std::string next;                         ///< what to do about it; empty: nothing
+  std::optional<std::int64_t> peak_memory;  ///< bytes, of the process that computed it
+  std::optional<double> processor_time;     ///< s, likewise
 };
 
 }  // namespace trammel

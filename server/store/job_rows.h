@@ -19,6 +19,6 @@ void insert_job_batches(SQLite::Database& database, std::int64_t job, const std:
 [[nodiscard]] Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.
 [[nodiscard]] Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
-                             const std::string& message);
+                             const std::string& message, const JobOutcome& outcome);
 
 }  // namespace trammel

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/base/unix_time.h"
+#include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
@@ -47,8 +48,25 @@ std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at "
-    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id ";
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at, "
+    "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s "
+    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON job_outcomes.job = jobs.id ";
+
+/// The outcome in a row of kJobColumns.
+JobOutcome outcome_of(SQLite::Statement& row) {
+  JobOutcome outcome;
+  if (row.isColumnNull(12)) return outcome;
+  outcome.verdict = job_verdict_of(row.getColumn(12).getString()).value_or(JobVerdict::kOpen);
+  outcome.before = optional_number(row, 13);
+  outcome.after = optional_number(row, 14);
+  outcome.limit = optional_number(row, 15);
+  outcome.code = error_code_of(row.getColumn(16).getString());
+  outcome.why = row.getColumn(17).getString();
+  outcome.next = row.getColumn(18).getString();
+  outcome.peak_memory = optional_integer(row, 19);
+  outcome.processor_time = optional_number(row, 20);
+  return outcome;
+}
 
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
@@ -64,6 +82,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
+  job.outcome = outcome_of(row);
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -81,11 +100,34 @@ void record_start(SQLite::Database& database, std::int64_t job) {
          job, unix_now());
 }
 
-void record_end(SQLite::Database& database, std::int64_t job) {
+template <typename Value>
+void bind_if(SQLite::Statement& row, int column, const std::optional<Value>& value) {
+  if (value) row.bind(column, *value);  // unbound is NULL
+}
+
+void record_outcome(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
+  SQLite::Statement row(database,
+                        "INSERT OR REPLACE INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
+                        "next_step, peak_bytes, processor_s) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  row.bind(1, job);
+  row.bind(2, to_text(outcome.verdict));
+  bind_if(row, 3, outcome.before);
+  bind_if(row, 4, outcome.after);
+  bind_if(row, 5, outcome.limit);
+  row.bind(6, outcome.code ? to_text(*outcome.code) : "");
+  row.bind(7, outcome.why);
+  row.bind(8, outcome.next);
+  bind_if(row, 9, outcome.peak_memory);
+  bind_if(row, 10, outcome.processor_time);
+  row.exec();
+}
+
+void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
          "INSERT INTO job_times (job, finished_at) VALUES (?, ?) "
          "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
          job, unix_now());
+  record_outcome(database, job, outcome);
 }
 
 }  // namespace
@@ -114,16 +156,25 @@ Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
 }
 
 Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
-               const std::string& message) {
+               const std::string& message, const JobOutcome& outcome) {
   return changed_one(change(database,
                             "UPDATE jobs SET state = 'done', model_version = ?1, message = ?2 "
                             "WHERE id = ?3 AND (?4 = '' OR cell = ?4) AND state IN ('queued', 'running')",
                             model_version, message, id, cell),
                      id)
-      .map([&] { record_end(database, id); });
+      .map([&] { record_end(database, id, outcome); });
 }
 
 namespace {
+
+/// One job, where the others can be read even if it cannot.
+Result<StoredJob> read_alone(SQLite::Database& database, std::int64_t id) {
+  try {
+    return read_job(database, id);
+  } catch (const SQLite::Exception& error) {
+    return failure_of(error, database.getFilename());
+  }
+}
 
 Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
@@ -136,15 +187,27 @@ Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& j
   return read_job(database, id);
 }
 
+/// Queues the job that `insert` makes, or returns the one that was queued under this id before.
+template <typename Insert>
+Result<StoredJob> queue_once(SQLite::Database& database, const ChangeId& change_id, const Insert& insert) {
+  const auto queued = once(database, change_id, [&] {
+    return insert().map([](const StoredJob& made) { return ChangeOutcome{0, made.id}; });
+  });
+  if (!queued) return tl::make_unexpected(queued.error());
+  return read_job(database, queued->job);
+}
+
 }  // namespace
 
-Result<StoredJob> Store::add_job(const StoredJob& job, bool release) {
+Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    Result<StoredJob> queued = insert_job_over(database, job);
-    if (!queued || !release) return queued;
-    for (const std::string& id : job.batch_ids)
-      change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
-    return queued;
+    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+      Result<StoredJob> queued = insert_job_over(database, job);
+      if (!queued || !release) return queued;
+      for (const std::string& id : job.batch_ids)
+        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
+      return queued;
+    });
   });
 }
 
@@ -157,14 +220,17 @@ Result<bool> Store::may_release(std::int64_t job) const {
   });
 }
 
-Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis) {
+Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
+                                       const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    Result<StoredJob> queued = insert_job_over(database, job);
-    if (queued) {
-      change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
-             diagnosis.apply ? 1 : 0);
-    }
-    return queued;
+    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+      Result<StoredJob> queued = insert_job_over(database, job);
+      if (queued) {
+        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
+               diagnosis.apply ? 1 : 0);
+      }
+      return queued;
+    });
   });
 }
 
@@ -196,9 +262,16 @@ Result<StoredJob> Store::job(std::int64_t id) const {
 
 Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
-    return jobs_of(
-        database,
-        prepare(database, (std::string(kJobColumns) + "WHERE state IN ('queued', 'running') ORDER BY id").c_str()));
+    std::vector<std::int64_t> ids;
+    SQLite::Statement rows(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
+    while (rows.executeStep()) ids.push_back(rows.getColumn(0).getInt64());
+    std::vector<StoredJob> jobs;
+    for (const std::int64_t id : ids) {
+      auto job = read_alone(database, id);
+      if (job) jobs.push_back(std::move(*job));
+      if (!job) connection_->note_damage(fmt::format("job {}: {}", id, sentence(job.error())));
+    }
+    return jobs;
   });
 }
 
@@ -225,29 +298,30 @@ Status Store::set_job_running(std::int64_t id) {
   });
 }
 
-Status Store::set_job_queued(std::int64_t id) {
+Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
-                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - 1, 0) "
+                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - ?, 0) "
                               "WHERE id = ? AND state IN ('queued', 'running')",
-                              id),
+                              attempt_counts ? 0 : 1, id),
                        id);
   });
 }
 
-Status Store::set_job_failed(std::int64_t id, const std::string& message) {
+Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
                        id)
-        .map([&] { record_end(database, id); });
+        .map([&] { record_end(database, id, outcome); });
   });
 }
 
-Status Store::set_job_done(std::int64_t id, const std::string& message) {
-  return connection_->in_transaction([&](SQLite::Database& database) { return end_job(database, id, "", 0, message); });
+Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
+  return connection_->in_transaction(
+      [&](SQLite::Database& database) { return end_job(database, id, "", 0, message, outcome); });
 }
 
 }  // namespace trammel

@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <utility>
 
+#include "server/base/text_file.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
 #include "server/store/store.h"
@@ -10,6 +13,8 @@
 
 namespace trammel {
 namespace {
+
+constexpr std::size_t kMostToServe = 100;  // versions that are looked at to serve a cell with
 
 /// A row of the cell's history of models in force.
 struct Activation {
@@ -49,12 +54,15 @@ Result<std::vector<Activation>> activations_before(SQLite::Database& database, c
 }
 
 void insert_activation(SQLite::Database& database, const std::string& cell, int version,
-                       const std::optional<std::int64_t>& back) {
-  SQLite::Statement row(database, "INSERT INTO activations (cell, version, back, activated_at) VALUES (?, ?, ?, ?)");
+                       const std::optional<std::int64_t>& back,
+                       const std::optional<std::int64_t>& number = std::nullopt) {
+  SQLite::Statement row(database,
+                        "INSERT INTO activations (cell, version, back, activated_at, number) VALUES (?, ?, ?, ?, ?)");
   row.bind(1, cell);
   row.bind(2, version);
   if (back) row.bind(3, *back);  // unbound is NULL
   row.bind(4, unix_now());
+  if (number) row.bind(5, *number);  // else the next one
   row.exec();
 }
 
@@ -84,6 +92,28 @@ void insert_model_times(SQLite::Database& database, const std::string& cell, int
   row.exec();
 }
 
+void insert_model(SQLite::Database& database, const std::string& cell, int version, const CompensatedModel& model,
+                  const std::string& content) {
+  const ModelProvenance& from = model.provenance();
+  const auto& validation = model.parts().validation;
+  change(database,
+         "INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
+         "content) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         cell, version, from.id, from.hash, from.level, from.batch_id, unix_now(), from.training_poses,
+         validation ? validation->compensated.rms : 0.0, content);
+  insert_model_times(database, cell, version, from);
+}
+
+Result<int> version_of(const Result<ChangeOutcome>& outcome) {
+  return outcome.map([](const ChangeOutcome& made) { return made.version; });
+}
+
+Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
+  const auto text = read_text_file(copy.file);
+  if (!text) return tl::make_unexpected(text.error());
+  return deserialize(*text, copy.file);
+}
+
 int next_version(SQLite::Database& database, const std::string& cell) {
   auto row = prepare(database, "SELECT COALESCE(MAX(version), 0) + 1 FROM models WHERE cell = ?", cell);
   row.executeStep();
@@ -93,30 +123,28 @@ int next_version(SQLite::Database& database, const std::string& cell) {
 }  // namespace
 
 Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                             bool put_in_force, const std::string& message, bool release) {
+                             bool put_in_force, const std::string& message, bool release, const ChangeId& change_id,
+                             const JobOutcome& outcome) {
   const std::string content = serialize(model);
-  const ModelProvenance& from = model.provenance();
-  const auto& validation = model.parts().validation;
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+  const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const int version = next_version(database, cell);
-    change(database,
-           "INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
-           "content) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-           cell, version, from.id, from.hash, from.level, from.batch_id, unix_now(), from.training_poses,
-           validation ? validation->compensated.rms : 0.0, content);
-    insert_model_times(database, cell, version, from);
+    insert_model(database, cell, version, model, content);
     if (job != 0) {
-      if (auto ended = end_job(database, job, cell, version, message); !ended)
+      if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
     if (put_in_force || release) release_batches_of(database, cell, version);
     if (put_in_force) activate_on_top(database, cell, version);
-    return version;
-  });
+    return ChangeOutcome{version};
+  };
+  const auto stored = connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return insert(database); }); });
+  if (stored && put_in_force) copy_after_change(cell);
+  return version_of(stored);
 }
 
-Status Store::activate(const std::string& cell, int version) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+Status Store::activate(const std::string& cell, int version, const ChangeId& change_id) {
+  const auto activate_in = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
           .of("version")
@@ -124,8 +152,12 @@ Status Store::activate(const std::string& cell, int version) {
     }
     release_batches_of(database, cell, version);
     activate_on_top(database, cell, version);
-    return {};
-  });
+    return ChangeOutcome{version};
+  };
+  const auto activated = connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return activate_in(database); }); });
+  if (activated) copy_after_change(cell);
+  return activated.map([](const ChangeOutcome&) {});
 }
 
 Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const {
@@ -138,8 +170,8 @@ Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const
   });
 }
 
-Result<int> Store::rollback(const std::string& cell, int steps) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& change_id) {
+  const auto go_back = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const auto before = activations_before(database, cell);
     if (!before) return tl::make_unexpected(before.error());
     if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
@@ -149,8 +181,12 @@ Result<int> Store::rollback(const std::string& cell, int steps) {
     }
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     insert_activation(database, cell, wanted.version, wanted.back);
-    return wanted.version;
-  });
+    return ChangeOutcome{wanted.version};
+  };
+  const auto restored = connection_->in_transaction(
+      [&](SQLite::Database& database) { return once(database, change_id, [&] { return go_back(database); }); });
+  if (restored) copy_after_change(cell);
+  return version_of(restored);
 }
 
 Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
@@ -182,8 +218,8 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
   });
 }
 
-Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
-  const auto content = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
+Result<std::string> Store::model_text(const std::string& cell, int version) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
     if (!row.executeStep())
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
@@ -191,8 +227,21 @@ Result<CompensatedModel> Store::model(const std::string& cell, int version) cons
           .with_value(version);
     return row.getColumn(0).getString();
   });
-  if (!content) return tl::make_unexpected(content.error());
-  return deserialize(*content, fmt::format("{}: model {}@{}", connection_->path, cell, version));
+}
+
+Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
+  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
+  const auto content = model_text(cell, version);
+  auto stored = content ? deserialize(*content, where) : Result<CompensatedModel>(tl::make_unexpected(content.error()));
+  if (stored) return stored;
+  for (const ServedCopies::Copy& copy : connection_->copies->of(cell)) {
+    if (copy.version != version) continue;
+    auto copied = model_in(copy);
+    if (!copied) continue;
+    connection_->note_damage(fmt::format("{}; its copy is served", sentence(stored.error())));
+    return copied;
+  }
+  return stored;
 }
 
 Result<std::optional<int>> Store::version_in_force(const std::string& cell) const {
@@ -200,6 +249,90 @@ Result<std::optional<int>> Store::version_in_force(const std::string& cell) cons
     const auto present = present_activation(database, cell);
     return present ? std::optional(present->version) : std::nullopt;
   });
+}
+
+void Store::copy_after_change(const std::string& cell) const {
+  // What was changed is stored: a copy that fails only makes the next fault worse.
+  if (const Status copied = copy_model_in_force(cell); !copied)
+    connection_->note_damage(
+        fmt::format("cell {}: the model in force has no copy: {}", cell, sentence(copied.error())));
+}
+
+Status Store::copy_model_in_force(const std::string& cell) const {
+  struct Present {
+    Activation activation;
+    std::string content;
+  };
+  const auto copies = connection_->copies->of(cell);
+  const auto present = connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<Present>> {
+    const auto now = present_activation(database, cell);
+    if (!now || (!copies.empty() && copies.front().activation >= now->number)) return std::nullopt;
+    auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, now->version);
+    if (!row.executeStep()) return std::nullopt;
+    return Present{*now, row.getColumn(0).getString()};
+  });
+  if (!present) return tl::make_unexpected(present.error());
+  if (!*present) return {};
+  const Activation& now = (*present)->activation;
+  return connection_->copies->keep(cell, now.number, now.version, (*present)->content);
+}
+
+std::vector<int> Store::versions_to_serve(const std::string& cell) const {
+  const auto copies = connection_->copies->of(cell);
+  std::vector<Activation> known;
+  const Status read = connection_->exclusively([&](SQLite::Database& database) -> Status {
+    auto at = present_activation(database, cell);
+    while (at && known.size() < kMostToServe) {
+      known.push_back(*at);
+      if (!at->back) break;
+      at =
+          activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?", *at->back));
+    }
+    return {};
+  });
+  if (!read) connection_->note_damage(fmt::format("cell {}: its history: {}", cell, sentence(read.error())));
+  const std::int64_t newest = known.empty() ? 0 : known.front().number;
+  std::vector<int> versions;
+  const auto add = [&versions](int version) {
+    if (std::find(versions.begin(), versions.end(), version) == versions.end()) versions.push_back(version);
+  };
+  for (const ServedCopies::Copy& copy : copies) {
+    if (copy.activation > newest) add(copy.version);
+  }
+  for (const Activation& activation : known) add(activation.version);
+  for (const ServedCopies::Copy& copy : copies) add(copy.version);
+  return versions;
+}
+
+Status Store::take_back_from_copy(const std::string& cell) {
+  const auto copies = connection_->copies->of(cell);
+  if (copies.empty() || connection_->state().why_not_written) return {};
+  const ServedCopies::Copy& newest = copies.front();
+  const auto lost = connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+    const auto present = present_activation(database, cell);
+    return !present || present->number < newest.activation;
+  });
+  if (!lost) return tl::make_unexpected(lost.error());
+  if (!*lost) return {};
+  const auto model = model_in(newest);
+  if (!model) return tl::make_unexpected(model.error());
+  const Status taken = connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    auto there = prepare(database, "SELECT hash FROM models WHERE cell = ? AND version = ?", cell, newest.version);
+    if (!there.executeStep()) {
+      insert_model(database, cell, newest.version, *model, serialize(*model));
+    } else if (there.getColumn(0).getString() != model->provenance().hash) {
+      return failure(ErrorCode::kConflict, "cell {}: version {} is another one than was in force", cell, newest.version)
+          .in(newest.file);
+    }
+    const auto present = present_activation(database, cell);
+    insert_activation(database, cell, newest.version, present ? std::optional(present->number) : std::nullopt,
+                      newest.activation);
+    return {};
+  });
+  if (taken)
+    connection_->note_damage(fmt::format("{}: what put version {} of cell {} in force was lost; taken back from {}",
+                                         connection_->path, newest.version, cell, newest.file));
+  return taken;
 }
 
 }  // namespace trammel

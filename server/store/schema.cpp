@@ -1,5 +1,9 @@
 #include "server/store/schema.h"
 
+#include <utility>
+#include <vector>
+
+#include "server/store/connection.h"
 #include "server/store/file_header.h"
 
 namespace trammel {
@@ -82,14 +86,27 @@ CREATE TABLE diagnoses (
 )sql";
 
 /// Extra tables beside those of the schema version, so that older programs can still open the file. They hold when jobs
-/// began and ended, when models were trained, and when their newest measurement was taken (Unix time, s; NULL = not
-/// recorded). They also hold the batches in quarantine that a job may train from; these are released if its model is
-/// put in force.
+/// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
+/// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
+/// released if its model is put in force. And the changes that clients asked for under an id, with what came of them;
+/// and the store's identity.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
   started_at  INTEGER,
   finished_at INTEGER
+);
+CREATE TABLE IF NOT EXISTS job_outcomes (
+  job         INTEGER PRIMARY KEY REFERENCES jobs (id),
+  verdict     TEXT    NOT NULL,
+  before_m    REAL,
+  after_m     REAL,
+  limit_m     REAL,
+  code        TEXT    NOT NULL,
+  why         TEXT    NOT NULL,
+  next_step   TEXT    NOT NULL,
+  peak_bytes  INTEGER,
+  processor_s REAL
 );
 CREATE TABLE IF NOT EXISTS job_releases (
   job   INTEGER NOT NULL REFERENCES jobs (id),
@@ -106,11 +123,35 @@ CREATE TABLE IF NOT EXISTS model_times (
   PRIMARY KEY (cell, version),
   FOREIGN KEY (cell, version) REFERENCES models (cell, version)
 ) WITHOUT ROWID;
-INSERT INTO model_times (cell, version, trained_at)
-  SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models
-  WHERE NOT EXISTS (SELECT 1 FROM model_times t WHERE t.cell = models.cell AND t.version = models.version)
-    AND json_valid(content) AND json_type(content, '$.stamp.trained_at') = 'integer';
+CREATE TABLE IF NOT EXISTS changes (
+  number  INTEGER PRIMARY KEY AUTOINCREMENT,
+  id      TEXT    NOT NULL UNIQUE,
+  asked   TEXT    NOT NULL,
+  version INTEGER NOT NULL,
+  job     INTEGER NOT NULL,
+  made_at INTEGER NOT NULL
+);
+CREATE TABLE IF NOT EXISTS store_identity (id TEXT NOT NULL);
 )sql";
+
+/// The models whose times are not recorded: found from the keys alone, for the rest is large.
+constexpr const char* kModelsWithoutTimes =
+    "SELECT cell, version FROM models EXCEPT SELECT cell, version FROM model_times";
+
+/// Their times, as far as they can be read.
+void fill_in_times(SQLite::Database& database) {
+  std::vector<std::pair<std::string, int>> without;
+  SQLite::Statement rows(database, kModelsWithoutTimes);
+  while (rows.executeStep()) without.emplace_back(rows.getColumn(0).getString(), rows.getColumn(1).getInt());
+  for (const auto& [cell, version] : without) {
+    change(database,
+           "INSERT INTO model_times (cell, version, trained_at) "
+           "SELECT cell, version, json_extract(content, '$.stamp.trained_at') FROM models "
+           "WHERE cell = ? AND version = ? AND json_valid(content) "
+           "AND json_type(content, '$.stamp.trained_at') = 'integer'",
+           cell, version);
+  }
+}
 
 /// Refuses a file that is neither empty nor a store of ours. Changes nothing.
 Status check_owner(SQLite::Database& database, const std::string& path) {
@@ -125,12 +166,10 @@ Status check_owner(SQLite::Database& database, const std::string& path) {
   if (schema > kSchemaVersion) {
     return refused("schema {} is newer than this program's, limit {}", schema, kSchemaVersion)
         .in(path)
-        .of("schema")
+        .of(kSchemaField)
         .beyond(schema, kSchemaVersion)
         .next("start a newer one");
   }
-  const std::string damage = database.execAndGet("PRAGMA quick_check(1)").getString();
-  if (damage != "ok") return failure(ErrorCode::kInternal, "damaged: {}", damage).in(path);
   return {};
 }
 
@@ -142,6 +181,9 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
   if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
+  database.exec("PRAGMA cell_size_check = ON");
+  // What is acknowledged is in the file itself, and not in its journal alone: that may get lost.
+  database.exec("PRAGMA wal_autocheckpoint = 1");
   const int schema = database.execAndGet("PRAGMA user_version").getInt();
   SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
   if (schema == 0) database.exec(kSchema);
@@ -151,8 +193,32 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
     database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   }
   database.exec(kTimes);
+  fill_in_times(database);
   transaction.commit();
   return {};
+}
+
+Status check_readable(SQLite::Database& database, const std::string& path) {
+  if (auto owner = check_owner(database, path); !owner) return owner;
+  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion && database.tableExists("changes"))
+    return {};
+  return refused("of an older schema, and cannot be written").in(path);
+}
+
+Result<std::string> identity_of(SQLite::Database& database, const std::string& otherwise) {
+  if (database.tableExists("store_identity")) {
+    SQLite::Statement row(database, "SELECT id FROM store_identity");
+    if (row.executeStep()) return row.getColumn(0).getString();
+  }
+  const std::string id = has_models(database) && !otherwise.empty()
+                             ? otherwise
+                             : database.execAndGet("SELECT lower(hex(randomblob(16)))").getString();
+  change(database, "INSERT INTO store_identity (id) VALUES (?)", id);
+  return id;
+}
+
+bool has_models(SQLite::Database& database) {
+  return database.execAndGet("SELECT EXISTS (SELECT 1 FROM models)").getInt() != 0;
 }
 
 }  // namespace trammel

@@ -8,8 +8,16 @@
 
 namespace trammel {
 
+inline constexpr const char* kSchemaField = "schema";  // what the error of a newer schema is of
+
 /// Makes an open file a store of today's schema: an empty one gets its tables, an older one what it lacks. Refuses
-/// (kRefused) a file of another program or of a newer schema, (kInternal) a damaged one.
+/// (kRefused) a file of another program or of a newer schema. Does not look for damage: that shows where it is read.
 [[nodiscard]] Status prepare_file(SQLite::Database& database, const std::string& path);
+/// For a file that is only read: refuses (kRefused) what prepare_file() refuses and what it would have to change.
+[[nodiscard]] Status check_readable(SQLite::Database& database, const std::string& path);
+/// What tells this store from any other one. A store of before it was recorded gets `otherwise`, or a new one.
+[[nodiscard]] Result<std::string> identity_of(SQLite::Database& database, const std::string& otherwise);
+/// Whether any model was ever stored.
+[[nodiscard]] bool has_models(SQLite::Database& database);
 
 }  // namespace trammel

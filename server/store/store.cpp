@@ -1,10 +1,9 @@
 #include "server/store/store.h"
 
-#include <exception>
+#include <memory>
 #include <utility>
 
 #include "server/store/connection.h"
-#include "server/store/schema.h"
 
 namespace trammel {
 
@@ -14,14 +13,11 @@ Store::~Store() = default;
 Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
   auto lock = WriterLock::take(path);
   if (!lock) return tl::make_unexpected(lock.error());
-  try {
-    auto connection = std::make_unique<StoreConnection>(path, std::move(*lock));
-    const Status ready = connection->exclusively([&path](SQLite::Database& d) { return prepare_file(d, path); });
-    if (!ready) return tl::make_unexpected(ready.error());
-    return std::unique_ptr<Store>(new Store(std::move(connection)));
-  } catch (const std::exception& error) {
-    return failure(ErrorCode::kInternal, "cannot be opened: {}", error.what()).in(path);
-  }
+  auto copies = std::make_unique<ServedCopies>(path);
+  auto opened = open_database(path, *copies);
+  if (!opened) return tl::make_unexpected(opened.error());
+  return std::unique_ptr<Store>(
+      new Store(std::make_unique<StoreConnection>(path, std::move(*lock), std::move(*opened), std::move(copies))));
 }
 
 }  // namespace trammel

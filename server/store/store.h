@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
+#include "server/store/job_outcome.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
 /// synchronous=FULL).
@@ -45,6 +47,7 @@ struct StoredJob {
   JobKind kind = JobKind::kTrain;
   std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
+  JobOutcome outcome = {};                       ///< the same as `message`, as data
 };
 
 /// The request of a diagnosis and its findings.
@@ -68,29 +71,70 @@ struct StoredModel {
   std::optional<std::int64_t> measured_at = {};  ///< see ModelProvenance
 };
 
+/// A change that happens once, however often it is asked for: also when the answer to it was lost in a crash.
+struct ChangeId {
+  std::string id;     ///< unique for ever: the client and the number of its request; empty: nothing is remembered
+  std::string asked;  ///< what is asked for, in any words; the same id for anything else is a conflict
+};
+
+/// What such a change came to.
+struct ChangeOutcome {
+  int version = 0;           ///< of the model that was put in force or stored; 0: of none
+  std::int64_t job = 0;      ///< that was queued; 0: none
+  std::int64_t made_at = 0;  ///< Unix time, s
+};
+
+/// What the disk lets a store do.
+struct StoreState {
+  std::optional<Error> why_not_written;  ///< set: every change is refused with it
+  bool readable = true;                  ///< false: only the copies of the models that were in force are there
+  std::int64_t since = 0;                ///< Unix time, s, of the last change of either; 0: none since it was opened
+  std::uint64_t failed_writes = 0;
+  std::vector<std::string> damages;  ///< what was found damaged since it was opened, the first hundred
+};
+
 struct StoreConnection;
 
 /// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, and it is on
-/// disk when the function returns. Errors of the disk or the database are kInternal and name the file.
+/// disk when the function returns. Errors of the disk or the database name the file: kBusy where the disk does not let
+/// it be written now (full, read-only, broken) and may later, kInternal where the file is damaged. Damage of one row is
+/// an error of what reads that row, and of nothing else.
+///
+/// Of each cell the last three versions in force are kept as plain files beside the store, too (`<file>.models`), and
+/// taken where the store does not give them.
 class Store {
  public:
-  /// Creates the file if there is none. Refuses (kRefused) a file of another program or of a newer schema, (kConflict)
-  /// a second writer on the same file, (kInternal) a damaged file. The file `<file>.lock` beside it holds the writer's
+  /// Creates the file if there is none. Refuses (kConflict) a second writer on the same file. A file on a disk that
+  /// cannot be written is read, and written as soon as that is possible: state(). Of a file that is damaged, emptied or
+  /// of another store the copies are there, and nothing is written to it; without copies it is refused (kInternal), as
+  /// is a file of another program or of a newer schema (kRefused). The file `<file>.lock` beside it holds the writer's
   /// process id.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
   ~Store();
+
+  /// Never waits for the disk.
+  [[nodiscard]] StoreState state() const;
+  /// Where it could not be written: whether it can now. Opens the file again where needed, once a second at most.
+  [[nodiscard]] Status try_again();
+  /// False: `stop` was requested first.
+  [[nodiscard]] bool wait_until_writable(const std::stop_token& stop);
 
   /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. A
   /// repeat of the request with the same content returns the job that the first one made. Refuses (kConflict) a batch
   /// id that the cell already has in any other case.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
+  /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for something else. The
+  /// functions that take a ChangeId record it in the transaction of the change itself; where it is recorded already
+  /// they change nothing and return what was made then. The last 100,000 are kept.
+  [[nodiscard]] Result<std::optional<ChangeOutcome>> outcome_of(const ChangeId& change_id) const;
   /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may also
   /// train from batches in quarantine. They leave quarantine in the transaction that puts its model in force.
-  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false);
+  [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false, const ChangeId& change_id = {});
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as add_job().
-  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis);
+  [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
+                                                const ChangeId& change_id = {});
   /// kNotFound: there is no such job, or it is no diagnosis.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Stores the findings of an unfinished diagnosis. The job goes on.
@@ -101,47 +145,63 @@ class Store {
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty).
-  [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason);
+  [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
+                                      const ChangeId& change_id = {});
   /// Newest last, without their text.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
 
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
-  /// Queued and running jobs of all cells, oldest first: a restart must finish them.
+  /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
+  /// left out, and stands in state().
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;
   /// Jobs of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished` done and the last
   /// `finished` failed.
   [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
   /// These refuse (kNotFound) a job that is done or failed already. Setting it running counts an attempt; setting it
-  /// queued takes the attempt back.
+  /// queued takes the attempt back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
-  [[nodiscard]] Status set_job_queued(std::int64_t id);
-  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message);
+  [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
+  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
   /// For a job that makes no model.
-  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message);
+  [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
 
-  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and, if asked, puts the
-  /// model in force, all in one transaction. If the model is put in force, or if `release` is set, the batches that the
-  /// job may release leave quarantine. Returns the version.
+  /// Stores the model as the cell's next version, marks `job` (0 = none) done with `message` and `outcome` and, if
+  /// asked, puts the model in force, all in one transaction. If the model is put in force, or if `release` is set, the
+  /// batches that the job may release leave quarantine. Returns the version.
   [[nodiscard]] Result<int> add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
-                                      bool put_in_force, const std::string& message, bool release = false);
+                                      bool put_in_force, const std::string& message, bool release = false,
+                                      const ChangeId& change_id = {}, const JobOutcome& outcome = {});
   /// Puts a stored version in force. Changes nothing if it is in force already. Refuses (kNotFound) an unknown one.
   ///
   /// How rollback works: an activation remembers the one that it replaced. A rollback restores that one with its own
   /// memory, so the next rollback goes further back: after 1, 2, 3 it gives 2, then 1, then kNotFound. A new activation
   /// remembers the version that is in force at that moment, even if a rollback put it there.
-  [[nodiscard]] Status activate(const std::string& cell, int version);
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {});
   /// The versions that repeated rollbacks restore, the next one first. kNotFound: there is none.
   [[nodiscard]] Result<std::vector<int>> previous_in_force(const std::string& cell) const;
   /// Puts one of previous_in_force() in force, as `steps` rollbacks do; returns it.
-  [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1);
+  [[nodiscard]] Result<int> rollback(const std::string& cell, int steps = 1, const ChangeId& change_id = {});
   /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
+  /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
+  /// The same as it is stored, not checked.
+  [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
+  /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what
+  /// only copies have. Those that came after what the store knows come before it. Never fails: empty where there are
+  /// none.
+  [[nodiscard]] std::vector<int> versions_to_serve(const std::string& cell) const;
+  /// Where the store has lost what was in force last and its copy is there: takes it back into the history, as the
+  /// version in force that it was.
+  [[nodiscard]] Status take_back_from_copy(const std::string& cell);
+  /// Copies the model in force, if it has no copy.
+  [[nodiscard]] Status copy_model_in_force(const std::string& cell) const;
 
  private:
   explicit Store(std::unique_ptr<StoreConnection> connection);
+  void copy_after_change(const std::string& cell) const;
   std::unique_ptr<StoreConnection> connection_;
 };
 

@@ -47,8 +47,13 @@ Status WriterLock::look(const std::string& file) {
 
 Result<WriterLock> WriterLock::take(const std::string& file) {
   const std::string path = lock_path_of(file);
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (descriptor < 0) return failure(ErrorCode::kInternal, "cannot be opened: {}", std::strerror(errno)).in(path);
+  int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const std::string why = std::strerror(errno);
+  const bool writable = descriptor >= 0;
+  // On a disk that cannot be written: the lock file as it is, or the file itself.
+  if (descriptor < 0) descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return failure(ErrorCode::kInternal, "cannot be opened: {}", why).in(path);
   WriterLock lock(descriptor);
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) {
@@ -56,10 +61,10 @@ Result<WriterLock> WriterLock::take(const std::string& file) {
     }
     return held(file, descriptor, path);
   }
+  // Who holds it is for people; on a full disk it is not known.
   const std::string pid = std::to_string(::getpid()) + "\n";
-  if (::ftruncate(descriptor, 0) != 0 || ::pwrite(descriptor, pid.data(), pid.size(), 0) < 0) {
-    return failure(ErrorCode::kInternal, "cannot be written: {}", std::strerror(errno)).in(path);
-  }
+  if (writable)
+    static_cast<void>(::ftruncate(descriptor, 0) == 0 && ::pwrite(descriptor, pid.data(), pid.size(), 0) > 0);
   return lock;
 }
 

@@ -28,7 +28,26 @@ JobProgress progress_of(const StoredJob& job) {
   progress.what = job.message;
   progress.share = job.state == JobState::kDone ? 1 : 0;
   progress.model_version = job.model_version;
+  progress.outcome = job.outcome;
   return progress;
+}
+
+JobOutcome cancelled_outcome() {
+  JobOutcome outcome;
+  outcome.verdict = JobVerdict::kCancelled;
+  outcome.why = "cancelled on request";
+  return outcome;
+}
+
+JobOutcome failed_outcome(const Error& error, JobVerdict verdict) {
+  JobOutcome outcome;
+  outcome.verdict = verdict;
+  outcome.code = error.code;
+  Error why = error;
+  why.next.clear();
+  outcome.why = sentence(why);
+  outcome.next = error.next;
+  return outcome;
 }
 
 void ProgressBook::report(const JobProgress& progress) {

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "server/base/mutex.h"
-#include "server/store/job_outcome.h"
 #include "server/store/store.h"
 
 namespace trammel {
@@ -23,11 +22,16 @@ struct JobProgress {
   double share = 0;       ///< [0, 1]
   int model_version = 0;  ///< once done
   bool in_force = false;
-  JobOutcome outcome = {};  ///< once over
+  JobOutcome outcome = {};  ///< of a job that is over
 };
 
 /// As the store has it; `in_force` is left false.
 [[nodiscard]] JobProgress progress_of(const StoredJob& job);
+
+/// Of a job that somebody ended.
+[[nodiscard]] JobOutcome cancelled_outcome();
+/// Of a job that ended with `error`.
+[[nodiscard]] JobOutcome failed_outcome(const Error& error, JobVerdict verdict);
 
 /// How far the unfinished jobs are. Thread-safe, set_listener() excepted.
 class ProgressBook {

@@ -1,39 +1,22 @@
 #include "server/trainer/job_runner.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
 
 #include "server/base/unix_time.h"
-#include "server/compensate/model_notes.h"
-#include "server/diagnose/diagnose.h"
-#include "server/diagnose/triage.h"
-#include "server/report/diagnosis_json.h"
-#include "server/report/diagnosis_page.h"
-#include "server/trainer/job_batches.h"
-#include "server/trainer/pipeline/extend.h"
-#include "server/trainer/pipeline/lasting_sources.h"
-#include "server/trainer/pipeline/successor.h"
+#include "server/compensate/model_file.h"
+#include "server/trainer/job_sources.h"
+#include "server/trainer/pipeline/given_up.h"
 
 namespace trammel {
 
 namespace {
 
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running job, for its watchers
-constexpr double kDiagnosisShare = 0.6;                   // of a diagnosis that is applied; the rest is the training
-
-std::string findings_text(const Diagnosis& diagnosis) {
-  return diagnosis_json(diagnosis).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
-
-/// The cell as it is served: with the error sources of the model in force.
-std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, const ServedModel* in_force,
-                                      const CheckedBatch& batch) {
-  if (in_force == nullptr) return cell;
-  auto served = std::make_shared<Cell>(*cell);
-  served->model.error_sources = sources_in_force(in_force->model, *cell, batch);
-  return served;
-}
+constexpr std::chrono::milliseconds kFirstPause{250};     // before the disk is asked again; twice as long each time
+constexpr std::chrono::milliseconds kLongestPause{5000};
 
 JobProgress progress_at(const StoredJob& job, JobStage stage) {
   JobProgress progress = progress_of(job);
@@ -41,13 +24,49 @@ JobProgress progress_at(const StoredJob& job, JobStage stage) {
   return progress;
 }
 
-/// `; ` between what is said.
-std::string joined_by_semicolons(const std::vector<std::string>& parts) {
-  std::string text;
-  for (const std::string& part : parts) {
-    if (!part.empty()) text += "; " + part;
-  }
-  return text;
+JobVerdict verdict_of(const Error& error) {
+  const bool of_the_data = error.code != ErrorCode::kInternal && error.code != ErrorCode::kBusy;
+  return of_the_data ? JobVerdict::kRefused : JobVerdict::kBroken;
+}
+
+void add_cost(JobOutcome& outcome, const ComputeCost& cost) {
+  outcome.peak_memory = cost.peak_memory;
+  outcome.processor_time = cost.processor_time;
+}
+
+/// One token for both reasons to stop.
+class EitherStop {
+ public:
+  explicit EitherStop(const StopRequests& stop)
+      : service_(stop.service, Call{&source_}), job_(stop.job, Call{&source_}) {}
+  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  struct Call {
+    std::stop_source* source;
+    void operator()() const { source->request_stop(); }
+  };
+  std::stop_source source_;
+  const std::stop_callback<Call> service_, job_;
+};
+
+/// False: `stop` was requested first.
+bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
+  Mutex mutex;
+  Condition never;
+  MutexLock lock(mutex);
+  never.wait_for(lock, stop, length, [] { return false; });
+  return !stop.stop_requested();
+}
+
+bool is_same(const Opponents& a, const Opponents& b) {
+  const auto versions = [](const Opponents& opponents) {
+    std::vector<int> all = {opponents.in_force ? opponents.in_force->version : 0,
+                            opponents.record ? opponents.record->version : 0};
+    for (const ModelText& before : opponents.served_before) all.push_back(before.version);
+    return all;
+  };
+  return versions(a) == versions(b);
 }
 
 }  // namespace
@@ -56,129 +75,220 @@ JobRunner::JobRunner(const ServedCells& cells, Store& store, const ModelRegistry
                      ProgressBook& book, const TrainerOptions& options)
     : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
 
-void JobRunner::run(const QueuedJob& job, const std::stop_token& stop) {
-  const Status outcome = [&]() -> Status {
+JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop) {
+  const Attempt attempted = [&]() -> Attempt {
     try {
-      return attempt(job, stop);
-    } catch (const std::exception& error) {  // out of memory, for one: this training ends, the service goes on
-      return failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
+      return attempt(id, stop);
+    } catch (const std::exception& error) {  // out of memory, for one: this job ends, the service goes on
+      Failure broken = failure(ErrorCode::kInternal, "the training broke off: {}", error.what());
+      return tl::make_unexpected(Failed{broken.value(), JobVerdict::kBroken});
     }
   }();
-  if (outcome) return;
-  JobProgress progress;
-  progress.job = job.id;
-  if (const auto stored = store_.job(job.id)) progress = progress_of(*stored);
-  if (stop.stop_requested()) {
-    // Should the store refuse, the job counts as interrupted and is taken up all the same.
-    static_cast<void>(store_.set_job_queued(job.id));
-    progress.stage = JobStage::kQueued;
-    return book_.report(progress);
-  }
-  const Status failed = store_.set_job_failed(job.id, sentence(outcome.error()));
-  if (!failed && failed.error().code == ErrorCode::kNotFound) return;  // its model is stored: it has not failed
-  progress.stage = JobStage::kFailed;
-  progress.what = sentence(outcome.error());
-  book_.report(progress);
+  return attempted ? End::kOver : end(id, attempted.error(), stop);
 }
 
-Status JobRunner::attempt(const QueuedJob& queued, const std::stop_token& stop) {
-  const auto job = store_.job(queued.id);
-  if (!job) return tl::make_unexpected(job.error());
+JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop) {
+  const auto failed = [](const Error& error) { return tl::make_unexpected(Failed{error, verdict_of(error)}); };
+  const auto job = store_.job(id);
+  if (!job) return failed(job.error());
   const auto cell = find_cell(cells_, job->cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  if (auto running = store_.set_job_running(job->id); !running) return running;
+  if (!cell) return failed(cell.error());
+  const Status running = once_the_disk_lets(id, stop, [&] { return store_.set_job_running(id); });
+  if (!running) return failed(running.error());
   book_.report(progress_at(*job, JobStage::kTraining));
-  if (job->kind == JobKind::kTrain) {
-    JobBatches batches(store_, *job, **cell, options_, queued.batch);
-    return attempt_training(*job, batches, stop);
+  std::optional<StoredDiagnosis> asked;
+  if (job->kind == JobKind::kDiagnose) {
+    auto stored = store_.diagnosis(id);
+    if (!stored) return failed(stored.error());
+    asked = std::move(*stored);
   }
-  const auto asked = store_.diagnosis(job->id);
-  if (!asked) return tl::make_unexpected(asked.error());
-  JobBatches batches(store_, *job, **cell, options_, queued.batch, *asked);
-  return attempt_diagnosis(*job, batches, asked->apply, stop);
+  return compute(*job, asked, stop);
 }
 
-Status JobRunner::attempt_training(const StoredJob& job, JobBatches& batches, const std::stop_token& stop) {
-  const auto looked_at = hold_against_model_in_force(job, batches);
-  if (!looked_at) return tl::make_unexpected(looked_at.error());
-  const auto batch = batches.to_learn_from();
-  if (!batch) return tl::make_unexpected(batch.error());
-  const bool as_usual = job.level.empty() && job.bias.empty();
-  const auto present = as_usual ? registry_.in_force(job.cell) : nullptr;
-  const auto successor = train_successor(cells_.at(job.cell), *batch, present.get(), train_options(job, stop));
-  if (!successor) return tl::make_unexpected(successor.error());
-  report_storing(job);
-  auto sessions = batches.judging_sessions();
-  if (!sessions) return tl::make_unexpected(sessions.error());
-  const std::string seen = looked_at->empty() ? "" : "the batch: " + *looked_at;
-  return keep(
-      {successor->model, job, Bar::kBetter, std::move(*sessions), joined_by_semicolons({seen, successor->note})});
-}
-
-Status JobRunner::attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply,
-                                    const std::stop_token& stop) {
-  // What is to judge an extended model must not have been looked at.
-  const auto batch = batches.to_diagnose();
-  if (!batch) return tl::make_unexpected(batch.error());
-  DiagnoseOptions options;
-  options.seed = options_.seed;
-  options.progress = [report = reporter(job, stop), whole = apply ? kDiagnosisShare : 1](const std::string& stage,
-                                                                                         double share) {
-    return report("diagnosing: " + stage, whole * share);
+JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+                                      const StopRequests& stop) {
+  auto task = task_of(job, asked);
+  if (!task) return tl::make_unexpected(Failed{task.error(), verdict_of(task.error())});
+  const auto computing = start_computing(options_.compute, std::move(*task), stop);
+  if (!computing) return tl::make_unexpected(Failed{computing.error(), JobVerdict::kBroken, true});
+  if (const Status given = give_batches(**computing, job, asked); !given)
+    return tl::make_unexpected(failed_by(**computing, given.error()));
+  ComputeWatch watch;
+  watch.progress = reporter(job, stop);
+  watch.found = [&](const std::string& findings, const std::string& page) {
+    return once_the_disk_lets(job.id, stop, [&] { return store_.store_findings(job.id, findings, page); });
   };
-  const auto present = registry_.in_force(job.cell);
-  const auto served = as_served(cells_.at(job.cell), present.get(), *batch);
-  const auto diagnosis = trammel::diagnose(served, *batch, options);
-  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
-  const Status stored = store_.store_findings(job.id, findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
-  if (!stored) return stored;
-  if (!apply) return finish(job, std::string(to_string(diagnosis->verdict)));
-  if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
-    const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
-    return finish(job, "nothing applied: " + sentence(can_apply.error()) + stays);
+  const auto made = (*computing)->make(watch);
+  if (!made) return tl::make_unexpected(failed_by(**computing, made.error()));
+  if (!made->quarantine.empty()) return quarantine(job, made->quarantine, (*computing)->cost(), stop);
+  if (!made->model) return finish(job, *made, (*computing)->cost(), stop);
+  return keep(job, *made, **computing, stop);
+}
+
+Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional<StoredDiagnosis>& asked) const {
+  ComputeTask task;
+  task.cell = cells_.at(job.cell);
+  task.kind = job.kind;
+  task.batch_ids = job.batch_ids;
+  task.level = job.level;
+  task.bias = job.bias;
+  task.apply = asked && asked->apply;
+  const auto came = came_with_batch(job);
+  if (!came) return tl::make_unexpected(came.error());
+  task.hold_against_in_force = *came;
+  if (const auto present = registry_.in_force(job.cell))
+    task.in_force = ModelText{present->version, serialize(present->model)};
+  task.seed = options_.seed;
+  task.validation_share = options_.validation_share;
+  task.accept_ratio = options_.accept_ratio;
+  task.now = unix_now();
+  return task;
+}
+
+Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
+  if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return false;
+  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
+    return batch.job == job.id;
+  });
+}
+
+Status JobRunner::give_batches(Computing& computing, const StoredJob& job,
+                               const std::optional<StoredDiagnosis>& asked) const {
+  const auto sources = batch_sources(store_, job, !asked || asked->apply);
+  if (!sources) return tl::make_unexpected(sources.error());
+  for (const BatchSource& source : *sources) {
+    const auto stored = store_.batch(job.cell, source.id);
+    if (!stored) return tl::make_unexpected(stored.error());
+    if (Status taken = computing.take({source.id, stored->csv, stored->accepted_at}, source.judges); !taken)
+      return taken;
   }
-  return this->apply(job, batches, *batch, served->model.error_sources, *diagnosis, stop);
+  if (asked && job.batch_ids.empty()) return computing.take({"", asked->csv, job.created_at}, false);
+  return {};
 }
 
-Status JobRunner::apply(const StoredJob& job, JobBatches& batches, const CheckedBatch& batch,
-                        const std::vector<std::string>& own, const Diagnosis& diagnosis, const std::stop_token& stop) {
-  TrainOptions options = train_options(job, stop);
-  options.progress = [report = options.progress](const std::string& stage, double share) {
-    return report(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
+JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Computing& computing,
+                                   const StopRequests& stop) {
+  JobProgress progress = progress_at(job, JobStage::kStoring);
+  progress.share = 1;
+  book_.report(progress);
+  const ComputeCost cost = computing.cost();
+  const Candidate candidate{*made.model, job, made.remarks, cost.peak_memory, cost.processor_time};
+  std::optional<std::pair<Opponents, GateVerdict>> judged;  // the last time: the disk may make it be asked again
+  const Judging judging = [&](const Opponents& opponents) -> Result<GateVerdict> {
+    if (stop.any()) return given_up();
+    if (judged && is_same(judged->first, opponents)) return judged->second;
+    auto verdict = computing.judge(opponents);
+    if (verdict) judged = {opponents, *verdict};
+    return verdict;
   };
-  const auto extended = extended_model(cells_.at(job.cell), own, batch, diagnosis, options);
-  if (!extended) return tl::make_unexpected(extended.error());
-  report_storing(job);
-  auto found = batches.sessions_of_diagnosis();
-  if (!found) return tl::make_unexpected(found.error());
-  MeasurementBatch& own_judges = found->sessions[found->own].judges;
-  Judges judges = judges_of(diagnosis, std::move(own_judges));
-  own_judges = std::move(judges.batch);
-  return keep({extended->model, job, Bar::kBetterBeyondChance, std::move(found->sessions),
-               judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)})});
+  const auto kept = once_the_disk_lets(job.id, stop, [&] { return history_.keep(candidate, judging, stop.service); });
+  if (!kept) return tl::make_unexpected(failed_by(computing, kept.error()));
+  progress.stage = JobStage::kDone;
+  progress.what = kept->message;
+  progress.model_version = kept->version;
+  progress.in_force = kept->in_force;
+  progress.outcome = kept->outcome;
+  book_.report(progress);
+  return {};
 }
 
-Result<std::string> JobRunner::hold_against_model_in_force(const StoredJob& job, JobBatches& batches) {
-  const auto served = registry_.in_force(job.cell);
-  if (!served || job.batch_ids.size() != 1) return "";
+JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
+                                         const StopRequests& stop) {
   const std::string& id = job.batch_ids.front();
-  const auto stored = store_.batch_record(job.cell, id);
-  if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->job != job.id) return "";  // somebody asked for this training, knowing the batch
-  const auto batch = batches.first();
-  if (!batch) return tl::make_unexpected(batch.error());
-  const Triage seen = triage(served->model, *batch);
-  if (seen.learn) return seen.verdict == TriageVerdict::kClean ? "" : seen.sentence;
-  if (const Status kept = store_.set_quarantine(job.cell, id, seen.sentence); !kept) {
-    return tl::make_unexpected(kept.error());
-  }
-  return refused("batch {} is in quarantine: {}; nothing was learned from it", id, seen.sentence)
-      .of("batch")
-      .with_text(id)
-      .next("retrain --release if it is good");
+  const Status kept = once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why); });
+  if (!kept) return tl::make_unexpected(Failed{kept.error(), verdict_of(kept.error())});
+  Failure refusal = refused("batch {} is in quarantine: {}; nothing was learned from it", id, why)
+                        .of("batch")
+                        .with_text(id)
+                        .next("retrain --release if it is good");
+  return tl::make_unexpected(Failed{refusal.value(), JobVerdict::kQuarantined, false, cost});
 }
 
-std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const std::stop_token& stop) {
+JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, const ComputeCost& cost,
+                                     const StopRequests& stop) {
+  JobProgress progress = progress_at(job, JobStage::kDone);
+  progress.share = 1;
+  progress.what = made.message;
+  progress.outcome = made.outcome;
+  add_cost(progress.outcome, cost);
+  const Status done =
+      once_the_disk_lets(job.id, stop, [&] { return store_.set_job_done(job.id, made.message, progress.outcome); });
+  if (!done) return tl::make_unexpected(Failed{done.error(), verdict_of(done.error())});
+  book_.report(progress);
+  return {};
+}
+
+JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop) {
+  auto stored = store_.job(id);
+  StoredJob job;
+  job.id = id;
+  if (stored) job = std::move(*stored);
+  const bool cancelled = stop.job.stop_requested();
+  if (stop.service.stop_requested() && !cancelled) return put_back(job, job.message, false, stop);
+  const std::string why = sentence(failed.error);
+  if (!cancelled && failed.again && job.attempts < kMaxAttempts)
+    return put_back(job, fmt::format("{}; it is tried again ({} of {})", why, job.attempts + 1, kMaxAttempts), true,
+                    stop);
+  JobProgress progress = progress_at(job, JobStage::kFailed);
+  progress.outcome = cancelled ? cancelled_outcome() : failed_outcome(failed.error, failed.verdict);
+  add_cost(progress.outcome, failed.cost);
+  progress.what = cancelled ? progress.outcome.why : why;
+  if (!cancelled && failed.again) progress.what += fmt::format("; tried {} times", job.attempts);
+  const Status ended = once_the_disk_lets(id, {stop.service, {}},
+                                          [&] { return store_.set_job_failed(id, progress.what, progress.outcome); });
+  if (ended) {
+    book_.report(progress);
+  } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored: it has not failed
+    // The store has it as unfinished still: the next start takes it up.
+    progress.stage = JobStage::kQueued;
+    progress.what += "; the store does not take that: " + sentence(ended.error());
+    book_.report(progress);
+  }
+  return End::kOver;
+}
+
+JobRunner::End JobRunner::put_back(const StoredJob& job, const std::string& why, bool attempt_counts,
+                                   const StopRequests& stop) {
+  // Should the store refuse, the job counts as interrupted and is taken up all the same.
+  static_cast<void>(once_the_disk_lets(job.id, stop, [&] { return store_.set_job_queued(job.id, attempt_counts); }));
+  JobProgress progress = progress_at(job, JobStage::kQueued);
+  progress.what = why;
+  book_.report(progress);
+  return End::kAgain;
+}
+
+JobRunner::Failed JobRunner::failed_by(const Computing& computing, const Error& error) const {
+  Failed failed{error, verdict_of(error), false, computing.cost()};
+  const auto breakdown = computing.breakdown();
+  if (!breakdown) return failed;
+  const bool over_limit =
+      breakdown->kind == Breakdown::Kind::kOverMemory || breakdown->kind == Breakdown::Kind::kOverTime;
+  failed.error = breakdown->error;
+  failed.verdict = over_limit ? JobVerdict::kOverLimit : JobVerdict::kBroken;
+  failed.again = !over_limit;
+  return failed;
+}
+
+template <typename Work>
+auto JobRunner::once_the_disk_lets(std::int64_t job, const StopRequests& stop, const Work& work) -> decltype(work()) {
+  const EitherStop either(stop);
+  for (auto length = kFirstPause;; length = std::min(2 * length, kLongestPause)) {
+    auto worked = work();
+    const bool of_the_disk = !worked && worked.error().code == ErrorCode::kBusy && store_.state().why_not_written;
+    if (!of_the_disk || stop.any()) return worked;
+    report_waiting(job, worked.error());
+    if (!pause(length, either.token()) || !store_.wait_until_writable(either.token())) return worked;
+  }
+}
+
+void JobRunner::report_waiting(std::int64_t job, const Error& why) {
+  auto progress = book_.find(job);
+  if (!progress) return;
+  progress->what = "waits for the disk: " + sentence(why);
+  book_.report(*progress);
+}
+
+std::function<bool(const std::string&, double)> JobRunner::reporter(const StoredJob& job, const StopRequests& stop) {
   auto reported = std::make_shared<std::chrono::steady_clock::time_point>();
   return [this, running = progress_at(job, JobStage::kTraining), reported, stop](const std::string& stage,
                                                                                  double share) mutable {
@@ -189,50 +299,8 @@ std::function<bool(const std::string&, double)> JobRunner::reporter(const Stored
       running.share = share;
       book_.report(running);
     }
-    return !stop.stop_requested();
+    return !stop.any();
   };
-}
-
-TrainOptions JobRunner::train_options(const StoredJob& job, const std::stop_token& stop) {
-  TrainOptions options;
-  if (!job.level.empty()) {
-    options.level = job.level;
-  } else if (const auto served = registry_.in_force(job.cell)) {
-    options.level = level_with_additions(*cells_.at(job.cell), served->model);
-  }
-  if (!job.bias.empty()) options.bias = job.bias;
-  options.seed = options_.seed;
-  options.trained_at = unix_now();
-  options.progress = reporter(job, stop);
-  return options;
-}
-
-Status JobRunner::keep(Candidate candidate) {
-  candidate.remarks += joined_by_semicolons(warnings_of(candidate.model, candidate.model.parts().validation));
-  const auto kept = history_.keep(candidate);
-  if (!kept) return tl::make_unexpected(kept.error());
-  JobProgress progress = progress_at(candidate.job, JobStage::kDone);
-  progress.what = kept->message;
-  progress.share = 1;
-  progress.model_version = kept->version;
-  progress.in_force = kept->in_force;
-  book_.report(progress);
-  return {};
-}
-
-void JobRunner::report_storing(const StoredJob& job) {
-  JobProgress progress = progress_at(job, JobStage::kStoring);
-  progress.share = 1;
-  book_.report(progress);
-}
-
-Status JobRunner::finish(const StoredJob& job, const std::string& outcome) {
-  if (const Status done = store_.set_job_done(job.id, outcome); !done) return done;
-  JobProgress progress = progress_at(job, JobStage::kDone);
-  progress.what = outcome;
-  progress.share = 1;
-  book_.report(progress);
-  return {};
 }
 
 }  // namespace trammel

@@ -4,62 +4,75 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
 
-#include "server/measurement/checked_batch.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
+#include "server/trainer/compute/compute_process.h"
 #include "server/trainer/job_progress.h"
-#include "server/trainer/pipeline/train.h"
 #include "server/trainer/served_cells.h"
 #include "server/trainer/trainer_options.h"
 
 namespace trammel {
 
-class JobBatches;
-struct Diagnosis;
+constexpr int kMaxAttempts = 3;  // of one job whose computing, or the process, breaks off
 
-/// A job that waits, with the batch that it came with where that is at hand: after a restart the store alone has it.
-struct QueuedJob {
-  std::int64_t id = 0;
-  std::optional<CheckedBatch> batch = {};
-};
-
-/// What is done for one job: it is taken from the store, its batches are looked at, a model is made or a batch is
-/// diagnosed, and the outcome is stored and reported. Of the queue's thread.
+/// What is done for one job: it is taken from the store, computed (in a process of its own), and the outcome is stored
+/// and reported. What the disk does not let be stored now waits for it: nothing is reported as over that the store does
+/// not have so. Of the queue's thread.
 class JobRunner {
  public:
   /// The references outlive it.
   JobRunner(const ServedCells& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
             ProgressBook& book, const TrainerOptions& options);
 
-  /// Ends the job, or puts it back where `stop` was requested.
-  void run(const QueuedJob& job, const std::stop_token& stop);
+  enum class End {
+    kOver,  ///< it has an outcome
+    kAgain  ///< it is queued again: its computing broke off, or the service stops
+  };
+  [[nodiscard]] End run(std::int64_t job, const StopRequests& stop);
 
  private:
-  [[nodiscard]] Status attempt(const QueuedJob& queued, const std::stop_token& stop);
-  [[nodiscard]] Status attempt_training(const StoredJob& job, JobBatches& batches, const std::stop_token& stop);
-  [[nodiscard]] Status attempt_diagnosis(const StoredJob& job, JobBatches& batches, bool apply,
-                                         const std::stop_token& stop);
-  [[nodiscard]] Status apply(const StoredJob& job, JobBatches& batches, const CheckedBatch& batch,
-                             const std::vector<std::string>& own, const Diagnosis& diagnosis,
-                             const std::stop_token& stop);
-  /// What the batch that this job came with says against the model in force; refuses, and puts the batch in quarantine,
-  /// when it must not be learned from. Empty where nothing is to be said.
-  [[nodiscard]] Result<std::string> hold_against_model_in_force(const StoredJob& job, JobBatches& batches);
-  /// Reports at most every few milliseconds; answers false once `stop` was requested.
-  [[nodiscard]] std::function<bool(const std::string&, double)> reporter(const StoredJob& job,
-                                                                         const std::stop_token& stop);
-  /// Of what the job asks for: level and bias, and where it asks for nothing special what the model in force has
-  /// besides.
-  [[nodiscard]] TrainOptions train_options(const StoredJob& job, const std::stop_token& stop);
-  /// Stores the candidate's model, in force if it is better, and reports the end of its job.
-  [[nodiscard]] Status keep(Candidate candidate);
-  void report_storing(const StoredJob& job);
+  /// How an attempt ended that made nothing.
+  struct Failed {
+    Error error;
+    JobVerdict verdict = JobVerdict::kRefused;
+    bool again = false;  ///< what broke off may do so once only
+    ComputeCost cost = {};
+  };
+  using Attempt = tl::expected<void, Failed>;
+
+  [[nodiscard]] Attempt attempt(std::int64_t id, const StopRequests& stop);
+  [[nodiscard]] Attempt compute(const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+                                const StopRequests& stop);
+  /// What the job is computed from, but its batches.
+  [[nodiscard]] Result<ComputeTask> task_of(const StoredJob& job, const std::optional<StoredDiagnosis>& asked) const;
+  /// Whether the job came with its batch: somebody else's training was asked for, knowing the batch.
+  [[nodiscard]] Result<bool> came_with_batch(const StoredJob& job) const;
+  [[nodiscard]] Status give_batches(Computing& computing, const StoredJob& job,
+                                    const std::optional<StoredDiagnosis>& asked) const;
+  [[nodiscard]] Attempt keep(const StoredJob& job, const Made& made, Computing& computing, const StopRequests& stop);
+  [[nodiscard]] Attempt quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
+                                   const StopRequests& stop);
   /// Ends a job that makes no model.
-  [[nodiscard]] Status finish(const StoredJob& job, const std::string& outcome);
+  [[nodiscard]] Attempt finish(const StoredJob& job, const Made& made, const ComputeCost& cost,
+                               const StopRequests& stop);
+
+  [[nodiscard]] End end(std::int64_t id, const Failed& failed, const StopRequests& stop);
+  [[nodiscard]] End put_back(const StoredJob& job, const std::string& why, bool attempt_counts,
+                             const StopRequests& stop);
+  [[nodiscard]] Failed failed_by(const Computing& computing, const Error& error) const;
+
+  /// Asks the store for something until it does it or refuses it; while its disk does not let it, waits for that. An
+  /// error of the disk comes back only once the job is to end.
+  template <typename Work>
+  [[nodiscard]] auto once_the_disk_lets(std::int64_t job, const StopRequests& stop, const Work& work)
+      -> decltype(work());
+  void report_waiting(std::int64_t job, const Error& why);
+  /// Reports at most every few milliseconds; answers false once the job is to end.
+  [[nodiscard]] std::function<bool(const std::string&, double)> reporter(const StoredJob& job,
+                                                                         const StopRequests& stop);
 
   const ServedCells& cells_;
   Store& store_;

@@ -1,40 +1,54 @@
 #include "server/trainer/trainer.h"
 
 #include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <set>
 #include <utility>
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
-#include "server/trainer/job_batches.h"
+#include "server/trainer/acceptance/judging.h"
+#include "server/trainer/compute/job_batches.h"
+#include "server/trainer/job_sources.h"
 
 namespace trammel {
 namespace {
 
-constexpr int kMaxAttempts = 3;           // of one job that takes the process down
-constexpr std::size_t kMaxBatchId = 128;  // bytes
-constexpr int kJobsListed = 20;           // of those done and of those failed, the last ones
+constexpr std::size_t kMaxBatchId = 128;            // bytes
+constexpr std::size_t kMaxLevel = 16384;            // bytes
+constexpr std::size_t kMaxSources = 500;            // as in a cell file
+constexpr std::size_t kMaxBatches = 1000;           // of one training
+constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
+constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
+constexpr std::chrono::seconds kKeeperTick{1};
+constexpr int kKeeperNiceness = 5;  // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
-  if (id.size() > kMaxBatchId)
-    return refused("batch id of {} bytes, limit {}", id.size(), kMaxBatchId).of("batch").beyond(id.size(), kMaxBatchId);
-  const bool printable = std::all_of(id.begin(), id.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!printable) return refused("batch id {:?} has control characters", id).of("batch").with_text(id);
-  return {};
+  return check_name(id, "batch", kMaxBatchId);
+}
+
+Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
+  if (asked <= most) return {};
+  return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
 }
 
 /// Level and bias of a training that is asked for; empty: as usual.
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
+    if (Status fits = check_most("level", level.size(), kMaxLevel, "bytes"); !fits) return fits;
     const auto specs = parse_level(level);
     if (!specs) return tl::make_unexpected(specs.error());
+    if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
     for (const std::string& spec : *specs) {
       if (auto source = make_error_source(spec, cell); !source) return tl::make_unexpected(source.error());
     }
@@ -49,37 +63,43 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       store_(store),
       registry_(registry),
       options_(options),
-      history_(cells_, store, registry, options.accept_ratio),
-      runner_(cells_, store, registry, history_, book_, options),
-      queue_(std::make_unique<BoundedQueue<QueuedJob>>(static_cast<std::size_t>(options.queue_capacity))) {}
+      history_(cells_, store, registry),
+      runner_(cells_, store, registry, history_, book_, options) {}
 
 Trainer::~Trainer() { stop(); }
 
-void Trainer::set_listeners(ProgressListener progress, ModelListener model) {
+void Trainer::set_listeners(ProgressListener progress, ModelListener model, TroubleListener trouble) {
   TRAMMEL_CHECK(!worker_.joinable());
   book_.set_listener(std::move(progress));
   history_.set_listener(std::move(model));
+  trouble_listener_ = std::move(trouble);
 }
 
 Result<std::vector<std::string>> Trainer::take_up() {
   TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
   std::vector<std::string> notices;
   for (const auto& [name, cell] : cells_) {
-    if (auto published = history_.publish_from_store(name); !published) notices.push_back(sentence(published.error()));
+    if (auto announced = history_.announce_from_store(name); !announced) notices.push_back(sentence(announced.error()));
   }
+  const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
+  for (auto cell = cells_.begin(); cell != cells_.end() && std::chrono::steady_clock::now() < until; ++cell)
+    static_cast<void>(registry_.in_force(cell->first));  // what fails is among the troubles
+  for (const std::string& trouble : troubles()) notices.push_back(trouble);
   auto unfinished = store_.unfinished_jobs();
-  if (!unfinished) return tl::make_unexpected(unfinished.error());
+  // The models are served all the same.
+  if (!unfinished) notices.push_back("the jobs cannot be read: " + sentence(unfinished.error()));
   std::vector<StoredJob> jobs;
-  for (StoredJob& job : *unfinished) {
+  for (StoredJob& job : unfinished.value_or(std::vector<StoredJob>())) {
     const auto wanted = can_take_up(job, notices);
-    if (!wanted) return tl::make_unexpected(wanted.error());
+    if (!wanted) {
+      notices.push_back(sentence(wanted.error()));
+      continue;
+    }
+    if (!*wanted) continue;
+    queue_.push({job.id, job.cell, was_asked_for(job).value_or(true)});
     job.state = JobState::kQueued;
-    if (*wanted) jobs.push_back(std::move(job));
+    jobs.push_back(std::move(job));
   }
-  // Accepted is accepted: those of before may be more than the queue takes now.
-  queue_ = std::make_unique<BoundedQueue<QueuedJob>>(
-      std::max(static_cast<std::size_t>(options_.queue_capacity), jobs.size()));
-  for (const StoredJob& job : jobs) TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id}));
   taken_up_ = std::move(jobs);
   return notices;
 }
@@ -91,7 +111,8 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
   }
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
-  if (auto failed = store_.set_job_failed(job.id, why); !failed) return tl::make_unexpected(failed.error());
+  const JobOutcome outcome = failed_outcome(failure(ErrorCode::kInternal, "{}", why).value(), JobVerdict::kBroken);
+  if (auto failed = store_.set_job_failed(job.id, why, outcome); !failed) return tl::make_unexpected(failed.error());
   notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
   return false;
 }
@@ -108,15 +129,78 @@ Result<std::vector<std::string>> Trainer::start() {
   taken_up_.reset();
   worker_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "trainer");
-    while (const auto job = queue_->pop(stop)) runner_.run(*job, stop);
+    while (const auto taken = queue_.take(stop)) {
+      const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
+      if (end == JobRunner::End::kAgain) queue_.push(taken->job);
+      queue_.put_down();
+    }
+  });
+  keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
+  reclaimer_ = std::jthread([this](const std::stop_token& stop) {
+    ::pthread_setname_np(::pthread_self(), "reclaimer");
+    registry_.free_models(stop);
   });
   return notices;
 }
 
+void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "keeper");
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kKeeperNiceness);  // of this thread alone
+  while (!stop.stop_requested()) {
+    registry_.load_for(stop, kKeeperTick);
+    const bool was_readable = store_.state().readable;
+    static_cast<void>(store_.try_again());  // what comes of it is the store's state
+    if (!was_readable && store_.state().readable) take_up_late();
+    tell_troubles(told);
+  }
+  registry_.stop_loading();
+}
+
+void Trainer::take_up_late() {
+  for (const auto& [name, cell] : cells_) {
+    const std::vector<int> versions = store_.versions_to_serve(name);
+    if (!versions.empty() && versions.front() != registry_.version_in_force(name))
+      registry_.announce(name, versions.front());
+  }
+  const MutexLock lock(submit_mutex_);
+  std::vector<std::string> notices;  // the next start says them again
+  for (StoredJob& job : store_.unfinished_jobs().value_or(std::vector<StoredJob>())) {
+    if (book_.find(job.id) || !can_take_up(job, notices).value_or(false)) continue;
+    job.state = JobState::kQueued;
+    enqueue(job, was_asked_for(job).value_or(true));
+  }
+}
+
+void Trainer::tell_troubles(std::vector<std::string>& told) {
+  std::vector<std::string> now = troubles();
+  if (now == told) return;
+  const auto missing = [](const std::vector<std::string>& among, const std::string& one) {
+    return std::find(among.begin(), among.end(), one) == among.end();
+  };
+  for (const std::string& trouble : now) {
+    if (trouble_listener_ && missing(told, trouble)) trouble_listener_(trouble, false);
+  }
+  for (const std::string& trouble : told) {
+    if (trouble_listener_ && missing(now, trouble)) trouble_listener_(trouble, true);
+  }
+  told = std::move(now);
+}
+
+std::vector<std::string> Trainer::troubles() const {
+  std::vector<std::string> all;
+  StoreState state = store_.state();
+  if (state.why_not_written) all.push_back("the store cannot be written: " + sentence(*state.why_not_written));
+  for (std::string& damage : state.damages) all.push_back(std::move(damage));
+  for (std::string& trouble : history_.troubles()) all.push_back(std::move(trouble));
+  return all;
+}
+
 void Trainer::stop() {
   if (!worker_.joinable()) return;
-  worker_.request_stop();
-  worker_.join();
+  for (std::jthread* thread : {&worker_, &keeper_}) thread->request_stop();
+  for (std::jthread* thread : {&worker_, &keeper_}) thread->join();
+  reclaimer_.request_stop();
+  reclaimer_.join();
 }
 
 Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
@@ -128,7 +212,8 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
   job.cell = cell_name;
   job.batch_ids = {batch_id};
   job.created_at = unix_now();
-  const auto batch = received_batch(csv, batch_id, job.created_at, **cell, held_out_to_judge(options_));
+  const auto batch = received_batch({batch_id, csv, job.created_at}, **cell,
+                                    held_out_by_service(options_.validation_share, options_.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   const int poses = static_cast<int>(batch->size());
   if (poses > options_.max_poses) {
@@ -140,17 +225,14 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
-  if (!repeated) {
-    if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  }
   const auto accepted = store_.add_batch(stored, job);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  if (!repeated) enqueue(*accepted, *batch);
+  if (!repeated) enqueue(*accepted, false);
   return accepted->id;
 }
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
-                                       const std::string& csv, bool apply) {
+                                       const std::string& csv, bool apply, const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
@@ -160,26 +242,28 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
   job.kind = JobKind::kDiagnose;
   job.cell = cell_name;
   job.created_at = unix_now();
-  std::optional<CheckedBatch> sent;
   if (csv.empty()) {
     const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
     if (!stored) return tl::make_unexpected(stored.error());
     job.batch_ids = {*stored};
   } else {
-    auto batch = sent_batch(csv, job.created_at, **cell, held_out_of_diagnosis(options_, apply));
+    const auto batch = received_batch({"", csv, job.created_at}, **cell,
+                                      held_out_of_diagnosis(options_.validation_share, options_.seed, apply));
     if (!batch) return tl::make_unexpected(batch.error());
     if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
           .of("poses")
           .beyond(poses, options_.max_poses);
     }
-    sent = std::move(*batch);
   }
   const MutexLock lock(submit_mutex_);
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""});
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
+  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::move(sent));
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -197,10 +281,13 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
 }
 
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
-                                      const std::string& level, const std::string& bias, Quarantine quarantine) {
+                                      const std::string& level, const std::string& bias, Quarantine quarantine,
+                                      const ChangeId& id) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
+  if (const Status fits = check_most("batches", batch_ids.size(), kMaxBatches, "batches in one training"); !fits)
+    return tl::make_unexpected(fits.error());
   const bool release = quarantine == Quarantine::kReleased;
   if (release && batch_ids.empty())
     return refused("to release a batch takes its id").of("batch").next("say which one is good");
@@ -218,10 +305,13 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
-  if (auto room = check_room(); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_job(job, release);
+  const auto before = queued_before(id);
+  if (!before) return tl::make_unexpected(before.error());
+  if (*before) return **before;
+  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
+  const auto accepted = store_.add_job(job, release, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, std::nullopt);
+  enqueue(*accepted, true);
   return accepted->id;
 }
 
@@ -242,9 +332,35 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
       .beyond(poses, options_.max_poses);
 }
 
-Status Trainer::release(const std::string& cell_name, const std::string& batch_id) {
+Status Trainer::cancel(std::int64_t id) {
+  const auto job = store_.job(id);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto asked_for = was_asked_for(*job);
+  if (!asked_for) return tl::make_unexpected(asked_for.error());
+  switch (queue_.cancel(id)) {
+    case JobQueue::Cancelled::kStopping:
+      return {};
+    case JobQueue::Cancelled::kUnknown:
+      return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id);
+    case JobQueue::Cancelled::kRemoved:
+      break;
+  }
+  const JobOutcome outcome = cancelled_outcome();
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome); !ended) {
+    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+    return ended;
+  }
+  JobProgress progress = progress_of(*job);
+  progress.stage = JobStage::kFailed;
+  progress.what = outcome.why;
+  progress.outcome = outcome;
+  book_.report(progress);
+  return {};
+}
+
+Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
   if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
-  return store_.set_quarantine(cell_name, batch_id, "");
+  return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
@@ -290,19 +406,33 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
   return jobs;
 }
 
-int Trainer::queued_jobs() const { return static_cast<int>(queue_->size()); }
+int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }
 
-Status Trainer::check_room() const {
-  if (queue_->size() < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} trainings are waiting, limit {}", queue_->size(), options_.queue_capacity)
+Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) const {
+  return store_.outcome_of(id).map(
+      [](const std::optional<ChangeOutcome>& made) { return made ? std::optional(made->job) : std::nullopt; });
+}
+
+Status Trainer::check_room(const std::string& cell) const {
+  const std::size_t waiting = queue_.asked_for(cell);
+  if (waiting < static_cast<std::size_t>(options_.queue_capacity)) return {};
+  return failure(ErrorCode::kBusy, "{} jobs that were asked for wait for cell {}, limit {}", waiting, cell,
+                 options_.queue_capacity)
       .of("queue")
-      .beyond(queue_->size(), options_.queue_capacity)
+      .beyond(waiting, options_.queue_capacity)
       .next("try again later");
 }
 
-void Trainer::enqueue(const StoredJob& job, std::optional<CheckedBatch> batch) {
+void Trainer::enqueue(const StoredJob& job, bool asked_for) {
   book_.report(progress_of(job));  // before the push: the worker's reports come after it
-  TRAMMEL_CHECK(queue_->try_push(QueuedJob{job.id, std::move(batch)}));
+  queue_.push({job.id, job.cell, asked_for});
+}
+
+Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
+  if (job.kind == JobKind::kDiagnose || job.batch_ids.size() != 1) return true;
+  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
+    return batch.job != job.id;
+  });
 }
 
 }  // namespace trammel

@@ -1,18 +1,19 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "server/base/bounded_queue.h"
 #include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
 #include "server/trainer/job_progress.h"
+#include "server/trainer/job_queue.h"
 #include "server/trainer/job_runner.h"
 #include "server/trainer/served_cells.h"
 #include "server/trainer/trainer_options.h"
@@ -32,29 +33,34 @@ class Trainer {
   /// Called by whichever thread changes the job; for one job never by two at a time.
   using ProgressListener = ProgressBook::Listener;
   using ModelListener = ModelHistory::Listener;
+  /// Something is wrong, or (`over`) no longer.
+  using TroubleListener = std::function<void(const std::string& trouble, bool over)>;
 
   /// `store` and `registry` outlive it.
   Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry, TrainerOptions options);
   ~Trainer();  ///< stops as stop()
 
   /// Set before start().
-  void set_listeners(ProgressListener progress, ModelListener model);
-  /// Publishes the models in force from the store and queues unfinished jobs. Returns what could not be taken up, for
-  /// the log: a model that does not load or was trained for another robot or tool, a job of a cell not served here, a
-  /// job that was interrupted too often and is now failed. Requests may come as soon as it returns.
+  void set_listeners(ProgressListener progress, ModelListener model, TroubleListener trouble = nullptr);
+  /// Announces the models in force of the store, loads as many as a second allows (the rest when they are asked for, or
+  /// in the background), and queues unfinished jobs. Returns what could not be taken up, for the log: a model that does
+  /// not load or was trained for another robot or tool, a job of a cell not served here, a job that was interrupted too
+  /// often and is now failed. Requests may come as soon as it returns.
   [[nodiscard]] Result<std::vector<std::string>> take_up();
-  /// Reports the jobs taken up and starts the worker. Does take_up() itself where that has not been done.
+  /// Reports the jobs taken up and starts the threads. Does take_up() itself where that has not been done.
   [[nodiscard]] Result<std::vector<std::string>> start();
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
   [[nodiscard]] const ServedCells& cells() const { return cells_; }
+  /// What is wrong now: with the store, with its disk, with the models of cells; one sentence each. Never waits.
+  [[nodiscard]] std::vector<std::string> troubles() const;
 
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
   /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
   /// Returns the job id; the same request again returns the same. Refuses what the batch reader and the cell refuse, an
-  /// unknown cell (kNotFound), an id that the cell already has (kConflict), too many poses (kTooLarge) and, while the
-  /// queue is full, everything new (kBusy).
+  /// unknown cell (kNotFound), an id that the cell already has (kConflict) and too many poses (kTooLarge). However many
+  /// jobs wait, a batch is taken.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv, const std::string& request_id);
   /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by
@@ -62,27 +68,38 @@ class Trainer {
   /// better.
   enum class Quarantine { kStays, kReleased };
   /// Trains again from stored batches, together; none named = the newest one. Level and bias empty: as the cell says,
-  /// and what the model in force has besides. Refuses batches that stay in quarantine.
+  /// and what the model in force has besides. Refuses batches that stay in quarantine and, where as many jobs that were
+  /// asked for wait for this cell as may, everything (kBusy). Refuses, with the limit, what no training may ask for:
+  /// more than max_poses, 1000 batches, 500 error sources, a bias of more than 32 kernels.
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
                                              const std::string& level, const std::string& bias,
-                                             Quarantine quarantine = Quarantine::kStays);
+                                             Quarantine quarantine = Quarantine::kStays, const ChangeId& id = {});
   /// Diagnoses a stored batch (`batch_id`; empty: the newest) or `csv`: what the error sources of the model in force
   /// (of the cell, where there is none) do not explain. With `apply` trains the causes found beside them and puts the
   /// model in force only if it is better on the rows held out beyond chance. Returns the job; its findings are
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
-                                              const std::string& csv, bool apply);
+                                              const std::string& csv, bool apply, const ChangeId& id = {});
   /// Of a job whose diagnosis is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
+  /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
+  /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
+  /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
+  /// that is over (kConflict).
+  [[nodiscard]] Status cancel(std::int64_t job);
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
-  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id);
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
-  [[nodiscard]] Status activate(const std::string& cell, int version) { return history_.activate(cell, version); }
-  [[nodiscard]] Result<int> rollback(const std::string& cell) { return history_.rollback(cell); }
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) {
-    return history_.import_model(cell, text);
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {}) {
+    return history_.activate(cell, version, request);
+  }
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
+    return history_.rollback(cell, request);
+  }
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
+    return history_.import_model(cell, text, id);
   }
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
@@ -101,8 +118,19 @@ class Trainer {
   [[nodiscard]] int queued_jobs() const;
 
  private:
-  [[nodiscard]] Status check_room() const;
-  void enqueue(const StoredJob& job, std::optional<CheckedBatch> batch);
+  /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
+  /// `told`.
+  void keep_up(std::vector<std::string> told, const std::stop_token& stop);
+  /// Of a store that can be read only now.
+  void take_up_late();
+  void tell_troubles(std::vector<std::string>& told);
+  /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
+  [[nodiscard]] Status check_room(const std::string& cell) const;
+  /// The job that was queued under this id before; empty: none.
+  [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
+  void enqueue(const StoredJob& job, bool asked_for);
+  /// Whether somebody asked for the job; else it came with its batch.
+  [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
   /// Whether the stored batches may be trained from together.
@@ -115,15 +143,16 @@ class Trainer {
 
   const ServedCells cells_;
   Store& store_;
-  const ModelRegistry& registry_;
+  ModelRegistry& registry_;
   const TrainerOptions options_;
   ModelHistory history_;
+  TroubleListener trouble_listener_;
   ProgressBook book_;
   JobRunner runner_;
-  std::unique_ptr<BoundedQueue<QueuedJob>> queue_;
+  JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
-  Mutex submit_mutex_;  // one at a time between the look at the queue's room and the push: who may push
-  std::jthread worker_;
+  Mutex submit_mutex_;  // one at a time between the look at what is there and the push: who may push
+  std::jthread worker_, keeper_, reclaimer_;
 };
 
 }  // namespace trammel

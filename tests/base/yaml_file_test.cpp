@@ -71,6 +71,25 @@ TEST(YamlFile, AliasesThatUnfoldToBillionsAreHarmless) {
   EXPECT_FALSE(keys_of("&self [*self]"));
 }
 
+TEST(YamlFile, ASyntaxErrorHasItsColumn) {
+  const auto read = keys_of("a: 1\nb: [1, 2}\n");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(sentence(read.error()).substr(0, 23), "x.yaml row 2: column 9:");
+}
+
+TEST(YamlFile, TextThatIsNoneAndNumbersBeyondReasonAreRefused) {
+  const auto text = [](const YamlMap& map) { return map.text("a"); };
+  const auto number = [](const YamlMap& map) { return map.number("a"); };
+  const auto refused_text = [&](const std::string& yaml) { return refusal_of(read_yaml(yaml, "x.yaml", text)); };
+  EXPECT_EQ(refused_text("a: \xff\n"), Refusal("x.yaml"));
+  EXPECT_EQ(refused_text("a: \"\\e[2J\"\n"), Refusal("x.yaml", 1, "a").text("\\u001b[2J"));
+  EXPECT_EQ(refused_text("a: \"b\\nc\"\n"), Refusal("x.yaml", 1, "a").text("b\\u000ac"));
+  EXPECT_EQ(refused_text("a: Fräser\n"), Refusal::none());
+  EXPECT_FALSE(keys_of("\"a\\eb\": 1\n"));
+  EXPECT_EQ(refusal_of(read_yaml("a: 1e300\n", "x.yaml", number)), Refusal("x.yaml", 1, "a").beyond(1e300, 1e12));
+  EXPECT_EQ(refusal_of(read_yaml("a: .inf\n", "x.yaml", number)), Refusal("x.yaml", 1, "a").text(".inf"));
+}
+
 TEST(YamlFile, AnyBytesEndInAnAnswer) {
   const std::string good = "version: 1\ncell: a\nlist: [1, {b: \"c\"}, 'd']\nmap:\n  - x\n  - &y {z: 1}\n  - *y\n";
   for (std::size_t i = 0; i < good.size(); ++i) {

@@ -54,7 +54,7 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   kept_out.verdict = "quarantined";
   EXPECT_NE(next_step(kept_out).find("--release"), std::string::npos);
   client::JobStatus failed{3, "cell-7", "failed", "a file called quarantine.csv is missing", 0, 0, false};
-  failed.verdict = "failed";
+  failed.verdict = "refused";
   EXPECT_EQ(next_step(failed), "") << "words decide nothing";
   failed.next = "measure more poses";
   EXPECT_EQ(next_step(failed), "next: measure more poses");

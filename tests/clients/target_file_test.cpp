@@ -55,6 +55,20 @@ TEST(TargetFile, ReadsJointTargetsAlone) {
   EXPECT_TRUE(file->rows[0].target.seed.value().isApprox(Eigen::Vector2d(kPi, .25)));
 }
 
+TEST(TargetFile, ReadsHowTheArmComesToATarget) {
+  const auto file =
+      parse_targets_csv("conf," + kPose + ",dir1,dir2,temperature_c,time_s\n3,1,2,3,1,0,0,0,1,-1,31.5,60\n", "t.csv");
+  ASSERT_TRUE(file) << file.error().message;
+  const Target& target = file->rows[0].target;
+  EXPECT_EQ(target.direction, (std::vector<int>{1, -1}));
+  EXPECT_EQ(target.temperature, 31.5);
+  EXPECT_EQ(target.time, 60);
+  EXPECT_EQ(refusal_of(check_targets(*file, test::small_cell("cell-7")->robot)),
+            Refusal("t.csv", {}, "dir2").beyond(2, 6));
+  EXPECT_EQ(refusal("conf," + kPose + ",dir1\n3,1,2,3,1,0,0,0,2\n").of(ErrorCode::kRefused),
+            Refusal("t.csv", 2, "dir1").beyond(2, 1));
+}
+
 TEST(TargetFile, RefusesWhatIsNoTarget) {
   EXPECT_EQ(refusal(""), Refusal("t.csv").beyond(0, 1));
   EXPECT_EQ(refusal("a,b\n1,2\n"), Refusal("t.csv", {}, "x_mm"));

@@ -64,6 +64,7 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->trainer.validation_share, minimal.trainer.validation_share);
   EXPECT_EQ(shipped->trainer.accept_ratio, minimal.trainer.accept_ratio);
   EXPECT_EQ(shipped->trainer.seed, minimal.trainer.seed);
+  EXPECT_EQ(shipped->models_in_memory, minimal.models_in_memory);
   EXPECT_EQ(shipped->log.level, minimal.log.level);
   EXPECT_EQ(shipped->log.file, minimal.log.file);
 }
@@ -86,12 +87,14 @@ TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
 
 TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
+      "models_in_memory_mb: 512\n"
       "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
       "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9}\n"
       "log: {level: debug, file: trammel.log}\n");
   EXPECT_EQ(config.dds.server_id, "a");
   EXPECT_EQ(config.store, folder_.file("t.db")) << "relative to the file";
+  EXPECT_EQ(config.models_in_memory, std::size_t{512} << 20);
   EXPECT_EQ(config.dds.domain, 3u);
   EXPECT_EQ(config.dds.address, "127.0.0.2");
   EXPECT_EQ(config.dds.port, 18000);

@@ -61,6 +61,7 @@ class HandlersTest : public testing::Test {
   wire::ManageModelsRequest manage_request(wire::ManageAction action, int version = 0) const {
     wire::ManageModelsRequest request;
     request.about().cell("cell-7");
+    request.change().expected_version(-1);
     request.action(action);
     request.version(version);
     return request;
@@ -75,6 +76,7 @@ class HandlersTest : public testing::Test {
   wire::ReleaseBatchesRequest release_request(wire::ReleaseAction action, std::vector<std::string> batches) const {
     wire::ReleaseBatchesRequest request;
     request.about().cell("cell-7");
+    request.change().expected_version(-1);
     request.action(action);
     request.batch_ids(std::move(batches));
     return request;
@@ -315,6 +317,7 @@ TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
 TEST_F(HandlersTest, TrainQueuesWhatIsStored) {
   wire::TrainRequest request;
   request.about().cell("cell-7");
+  request.change().expected_version(-1);
   EXPECT_EQ(refusal(request), Refusal("", {}, "batch").of(ErrorCode::kNotFound));
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   request.batch_ids({"lt-07"});
@@ -368,6 +371,129 @@ TEST_F(HandlersTest, ModelsAreListedActivatedRolledBackAndCarriedElsewhere) {
   EXPECT_FALSE(handlers_.answer(import));
 }
 
+TEST_F(HandlersTest, AChangeHappensOnceUnderItsIdAndOnlyWhereTheExpectedVersionIsInForce) {
+  for (const int version : {1, 2, 3}) {
+    ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, version * 1e-4), 0, false, ""));
+    ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, version)));
+  }
+  auto back = manage_request(wire::MANAGE_ROLLBACK);
+  back.change().id("r-1");
+  back.change().expected_version(3);
+  EXPECT_EQ(handlers_.answer(back)->version(), 2);
+  Handlers after_a_restart(*backend_.trainer, *backend_.store, backend_.registry);
+  EXPECT_EQ(after_a_restart.answer(back)->version(), 2);
+  EXPECT_EQ(backend_.registry.in_force("cell-7")->version, 2);
+  back.change().id("r-2");
+  EXPECT_EQ(handlers_.answer(back).error().code, ErrorCode::kConflict) << "version 3 is not in force any more";
+  auto other = manage_request(wire::MANAGE_ACTIVATE, 3);
+  other.change().id("r-1");
+  EXPECT_EQ(handlers_.answer(other).error().code, ErrorCode::kConflict) << "the id is of a rollback";
+  other.change().id("");
+  other.change().expected_version(-2);
+  EXPECT_EQ(handlers_.answer(other).error().code, ErrorCode::kUsage);
+
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  wire::TrainRequest train;
+  train.about().cell("cell-7");
+  train.change().id("t-1");
+  train.change().expected_version(2);
+  const auto job = handlers_.answer(train);
+  ASSERT_TRUE(job) << job.error().message;
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
+  EXPECT_EQ(after_a_restart.answer(train)->job(), job->job()) << "the repeat of what was done is no conflict";
+  train.change().id("t-2");
+  EXPECT_EQ(handlers_.answer(train).error().code, ErrorCode::kConflict);
+}
+
+TEST_F(HandlersTest, ToActivateWhatIsInForcePublishesNothing) {
+  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
+  const auto served = backend_.registry.in_force("cell-7");
+  const auto again = handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1));
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->version(), 1);
+  EXPECT_EQ(backend_.registry.in_force("cell-7"), served);
+}
+
+TEST_F(HandlersTest, AJobIsCancelledByTheCellThatHasIt) {
+  const auto job = handlers_.answer(submit_request("lt-07"));
+  ASSERT_TRUE(job) << job.error().message;
+  auto cancel = manage_request(wire::MANAGE_CANCEL_JOB);
+  cancel.job(job->job());
+  cancel.about().cell("cell-8");
+  EXPECT_EQ(handlers_.answer(cancel).error().code, ErrorCode::kNotFound);
+  cancel.about().cell("cell-7");
+  const auto cancelled = handlers_.answer(cancel);
+  ASSERT_TRUE(cancelled) << cancelled.error().message;
+  auto look = read_request(wire::READ_JOB);
+  look.job(job->job());
+  const wire::Job state = handlers_.answer(look)->jobs().front();
+  EXPECT_EQ(state.stage(), wire::JOB_CANCELLED);
+  EXPECT_EQ(state.outcome().verdict(), wire::VERDICT_CANCELLED);
+}
+
+/// A model whose second joint has play, and whose links grow as they warm up.
+CompensatedModel model_with_play_and_heat(const std::shared_ptr<const Cell>& cell) {
+  CompensatedModel::Parts parts = test::shifted_model(cell, 0).parts();
+  parts.physics = make_physical_model(cell, {"base", "thermal_growth", "backlash:2"}).value();
+  parts.parameters.clear();
+  const auto parameters = parts.physics.parameters();
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    double& value = parts.physics.values[static_cast<Eigen::Index>(i)];
+    if (parameters[i].name == "b2") value = 1e-3;
+    if (parameters[i].name == "growth") value = 2e-5;
+    IdentifiedParameter identified;
+    identified.parameter = parameters[i];
+    identified.value = value;
+    parts.parameters.push_back(identified);
+  }
+  parts.covariance = Eigen::MatrixXd::Zero(parts.physics.values.size(), parts.physics.values.size());
+  parts.temperature_mean = 20;
+  parts.temperature_stddev = 5;
+  return CompensatedModel::make(std::move(parts)).value();
+}
+
+TEST_F(HandlersTest, TheSideAJointComesFromAndTheTemperatureReachThePhysics) {
+  backend_.registry.publish(
+      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
+  auto request = predict_request(4);
+  request.poses()[1].approach().directions({0, 1, 0, 0, 0, 0});
+  request.poses()[2].approach().directions({0, -1, 0, 0, 0, 0});
+  request.poses()[3].approach().temperature_c(40);
+  const auto reply = handlers_.answer(request);
+  ASSERT_TRUE(reply) << reply.error().message;
+  const auto z = [&](std::size_t i) { return reply->predictions()[i].predicted().z_mm(); };
+  EXPECT_GT(std::abs(z(1) - z(2)), 0.5) << "a milliradian of play either way";
+  EXPECT_NEAR((z(1) + z(2)) / 2, z(0), 1e-2) << "what is not said is neutral";
+  EXPECT_GT(std::abs(z(3) - z(0)), 0.05);
+  EXPECT_GT(reply->predictions()[0].slz_mm(), reply->predictions()[1].slz_mm()) << "and stands in the deviation";
+
+  auto correct = correct_request();
+  correct.targets().resize(3, correct.targets().front());
+  correct.targets()[1].approach().directions({0, 1, 0, 0, 0, 0});
+  correct.targets()[2].approach().directions({0, -1, 0, 0, 0, 0});
+  const auto corrected = handlers_.answer(correct);
+  ASSERT_TRUE(corrected) << corrected.error().message;
+  const auto commanded = [&](std::size_t i) { return corrected->corrections()[i].commanded().z_mm(); };
+  EXPECT_GT(std::abs(commanded(1) - commanded(2)), 0.5);
+  EXPECT_GT(std::abs(commanded(1) - commanded(0)), 0.2);
+}
+
+TEST_F(HandlersTest, ACorrectionTellsItsOrientationAndOneMeasurementBesideTheTruth) {
+  backend_.registry.publish(
+      std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, model_with_play_and_heat(backend_.cell)}));
+  auto request = correct_request();
+  request.targets()[0].approach().directions({0, 1, 0, 0, 0, 0});
+  const auto reply = handlers_.answer(request);
+  ASSERT_TRUE(reply) << reply.error().message;
+  const wire::CorrectedTarget& corrected = reply->corrections().front();
+  ASSERT_EQ(corrected.status(), wire::TARGET_OK) << corrected.message();
+  EXPECT_NEAR(corrected.turn_before_rad(), 1e-3, 1e-4) << "the play turns the tool";
+  EXPECT_LT(corrected.turn_after_rad(), 1e-6);
+  EXPECT_NEAR(corrected.sigma_measured_mm(), std::hypot(corrected.sigma_mm(), to_mm(backend_.cell->tracker.sigma)),
+              1e-9);
+}
+
 TEST_F(HandlersTest, DiagnoseIsQueuedAndAnswersWhenItIsDone) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   wire::DiagnoseRequest request;
@@ -391,6 +517,7 @@ TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   wire::TrainRequest request;
   request.about().cell("cell-7");
+  request.change().expected_version(-1);
   request.kind(wire::TRAIN_DIAGNOSED);
   request.batch_ids({"lt-07"});
   const auto queued = handlers_.answer(request);
@@ -409,8 +536,7 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
                           wire::READ_REPLAY}) {
     EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
   }
-  for (const auto action : {wire::MANAGE_CANCEL_JOB, wire::MANAGE_BACKUP})
-    EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(action)))) << action;
+  EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
   auto forced = manage_request(wire::MANAGE_ACTIVATE, 1);
   forced.force(true);
   EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
@@ -554,6 +680,7 @@ TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   test::Answered<wire::Train> calls(handlers_, "server-a");
   wire::TrainRequest request;
+  request.change().expected_version(-1);
   request.header().contract_version(wire::CONTRACT_VERSION);
   request.header().request_id().sequence_number(8);
   request.about().cell("cell-7");

@@ -31,6 +31,20 @@ TEST(PortLock, ASecondServerOnThePortIsRefused) {
   EXPECT_TRUE(PortLock::take(kHere, port));
 }
 
+TEST(PortLock, ASecondServerOfANameIsRefusedInTheSameDomainOnly) {
+  const std::string name = fmt::format("server-{}", ::getpid());
+  {
+    const auto first = PortLock::take_name(1, name);
+    ASSERT_TRUE(first) << first.error().message;
+    const auto second = PortLock::take_name(1, name);
+    ASSERT_FALSE(second);
+    EXPECT_EQ(refusal_of(second), Refusal("", {}, "server").of(ErrorCode::kConflict).text(name));
+    EXPECT_TRUE(PortLock::take_name(2, name));
+    EXPECT_TRUE(PortLock::take_name(1, name + "-b"));
+  }
+  EXPECT_TRUE(PortLock::take_name(1, name));
+}
+
 TEST(PortLock, APortOfAnotherProgramIsRefused) {
   const std::uint16_t port = test::test_dds_options().port;
   const int other = ::socket(AF_INET, SOCK_DGRAM, 0);

@@ -90,9 +90,11 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     return matched_ > 0 && answers_ > 0;
   }
   void send(Bytes bytes) { writer_->write(&bytes); }
-  /// With its header filled in.
-  void send(Request request, std::int64_t sequence_number) {
-    send_for(partition_, std::move(request), sequence_number);
+  void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
+    header.request_id().writer_guid(wire::octets_of(writer_->guid()));
+    header.request_id().sequence_number(sequence_number);
+    header.reply_partition(partition_);
+    header.contract_version(wire::CONTRACT_VERSION);
   }
   /// As a client that listens in `partition`.
   void send_for(const std::string& partition, Request request, std::int64_t sequence_number) {
@@ -100,11 +102,9 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     request.header().reply_partition(partition);
     send(to_bytes<typename Operation::Request>(std::move(request)));
   }
-  void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
-    header.request_id().writer_guid(wire::octets_of(writer_->guid()));
-    header.request_id().sequence_number(sequence_number);
-    header.reply_partition(partition_);
-    header.contract_version(wire::CONTRACT_VERSION);
+  /// With its header filled in.
+  void send(Request request, std::int64_t sequence_number) {
+    send_for(partition_, std::move(request), sequence_number);
   }
   [[nodiscard]] std::size_t replies() {
     const std::lock_guard lock(mutex_);

@@ -10,6 +10,7 @@
 #include "server/measurement/files/csv_table.h"
 #include "tests/support/daemon.h"
 #include "tests/support/process.h"
+#include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_cell.h"
 
@@ -194,6 +195,40 @@ TEST_F(CommandLine, ALevelThatDoesNotExistIsWrongUsage) {
   const Finished finished = trammel({"train", "--cell", cell_, "--batch", batch, "--level", "M9", "-o", file("out")});
   EXPECT_EQ(finished.exit_code, kWrongUsage);
   EXPECT_NE(finished.err.find("M9"), std::string::npos) << finished.err;
+}
+
+TEST_F(CommandLine, AModelThatTheCellFileSpellsWrongIsRefusedWithItsRow) {
+  const std::string batch = folder_.write("b.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm\n");
+  const auto cell_with = [&](const std::string& model) {
+    std::string text = test::small_cell_yaml("cell-7");
+    text.replace(text.find("model:"), std::string::npos, "model:\n  " + model + "\n");
+    folder_.write("robot.yaml", test::small_robot_yaml());
+    return folder_.write("cell.yaml", text);
+  };
+  for (const char* model :
+       {"error_sources: [base, complience]", "error_sources: [base, base]", "bias: sse", "bias: \"se +\""}) {
+    const std::string cell = cell_with(model);
+    for (const std::string command : {"train", "diagnose"}) {
+      expect_refused({command, "--cell", cell, "--batch", batch, command == "train" ? "-o" : "--report", file("out")},
+                     {cell + " row 8: model: " + std::string(model).substr(0, std::string(model).find(':'))});
+    }
+  }
+  const Finished seed = trammel({"train", "--cell", cell_, "--batch", batch, "--seed", "-1", "-o", file("out")});
+  EXPECT_EQ(seed.exit_code, kWrongUsage);
+  EXPECT_NE(seed.err.find("--seed: '-1', expected a whole number from 0"), std::string::npos) << seed.err;
+}
+
+TEST_F(CommandLine, WhatForeignFilesSayControlsNoTerminal) {
+  const std::string batch = folder_.write("b.csv",
+                                          "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,pose_id\n"
+                                          "1,2,3,4,5,6,1,2,3,\x1b]0;owned\a\n");
+  const Finished finished = trammel({"train", "--cell", cell_, "--batch", batch, "-o", file("out")});
+  EXPECT_EQ(finished.exit_code, kRefusedData);
+  EXPECT_NE(finished.err.find("row 2: '\\u001b]0;owned\\u0007'"), std::string::npos) << finished.err;
+  EXPECT_EQ((finished.err + finished.out).find('\x1b'), std::string::npos);
+  const Finished usage = trammel({"train", "\x1b[2J"});
+  EXPECT_EQ((usage.err + usage.out).find('\x1b'), std::string::npos);
+  EXPECT_NE(usage.err.find("\\u001b[2J"), std::string::npos) << usage.err;
 }
 
 TEST_F(CommandLine, RefittingTheBaseOnThreePositionsKeepsAToolThatTheCellDoesNotKnowAndAllElse) {

@@ -104,7 +104,7 @@ TEST_F(DaemonTest, EndsCleanlyWhileTrainingAndFinishesTheJobAfterwards) {
   EXPECT_EQ(model().version, done.model_version);
 }
 
-TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortIsRefused) {
+TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortOrOfTheSameNameIsRefused) {
   auto same_store = daemon_.command_line();
   same_store[4] = std::to_string(daemon_.port() + 2);
   const auto second = test::run(same_store);
@@ -116,6 +116,12 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortIsRefused) {
   const auto third = test::run(same_port);
   EXPECT_EQ(third.exit_code, 3);
   EXPECT_NE(third.err.find(std::to_string(daemon_.port())), std::string::npos) << third.err;
+
+  auto same_name = same_store;
+  same_name.insert(same_name.end(), {"--store", daemon_.store_path() + "2"});
+  const auto fourth = test::run(same_name);
+  EXPECT_EQ(fourth.exit_code, 3);
+  EXPECT_NE(fourth.err.find("is called"), std::string::npos) << fourth.err;
   EXPECT_EQ(daemon_.stop(), 0);
 }
 
@@ -128,10 +134,42 @@ TEST_F(DaemonTest, AnImportOfAnyBytesIsRefusedAndTheDaemonGoesOn) {
     const auto imported = session_->import_model("cell-7", text);
     ASSERT_FALSE(imported);
     EXPECT_EQ(imported.error().message.find("no server"), std::string::npos) << imported.error().message;
-    EXPECT_EQ(imported.error().message.rfind("imported model: ", 0), 0u) << imported.error().message;
+    EXPECT_EQ(imported.error().file, "imported model") << imported.error().message;
   }
   EXPECT_EQ(model().hash, before.hash);
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
+}
+
+TEST_F(DaemonTest, ARollbackThatIsRepeatedAfterACrashGoesBackOnce) {
+  wait_for(submit("lt-07", 60));
+  const int first = model().version;
+  const auto text = session_->export_model("cell-7", first);
+  ASSERT_TRUE(text) << text.error().message;
+  for (const int poses : {80, 100}) wait_for(submit(fmt::format("lt-{}", poses), poses));
+  const auto versions = session_->models("cell-7");
+  ASSERT_TRUE(versions) << versions.error().message;
+  ASSERT_EQ(versions->size(), 3u);
+  for (const client::ModelInfo& version : *versions) {
+    ASSERT_TRUE(session_->activate("cell-7", version.version)) << version.version;
+  }
+  const int last = model().version;
+  client::ChangeOptions once;
+  once.id = "rollback-of-this-test";
+  once.expected_version = last;
+  const auto back = session_->rollback("cell-7", once);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_NE(*back, last);
+  daemon_.kill();
+  daemon_.start();
+  const auto repeated = session_->rollback("cell-7", once);
+  ASSERT_TRUE(repeated) << repeated.error().message;
+  EXPECT_EQ(*repeated, *back);
+  EXPECT_EQ(model().version, *back) << "it went back twice";
+  once.id = "another one";
+  EXPECT_EQ(session_->rollback("cell-7", once).error().code, ErrorCode::kConflict) << "another version is in force";
+  once.id = "rollback-of-this-test";
+  EXPECT_EQ(session_->activate("cell-7", last, once).error().code, ErrorCode::kConflict) << "the id is of a rollback";
+  EXPECT_EQ(model().version, *back);
 }
 
 TEST_F(DaemonTest, AClientOfAnotherDomainIsNotAnswered) {

@@ -60,6 +60,16 @@ TEST(WatchdogTest, AStatusThreadThatHangsEndsTheDaemonAndIsNamed) {
   EXPECT_TRUE(answers(daemon));
 }
 
+TEST(WatchdogTest, AThreadOfRepliesThatHangsEndsTheDaemonAndIsNamed) {
+  test::Daemon daemon;
+  daemon.start();
+  const auto replies = named(daemon.process().pid(), "replies");
+  ASSERT_EQ(replies.size(), 1u);
+  EXPECT_EQ(end_without(daemon.process(), replies[0].id, kLimit), kExitHung);
+  EXPECT_NE(daemon.process().standard_error().find("in: replies;"), std::string::npos)
+      << daemon.process().standard_error();
+}
+
 TEST(WatchdogTest, AnyThreadOfTheLibraryThatHangsEndsTheDaemon) {
   test::Daemon daemon;
   daemon.start();
@@ -75,7 +85,7 @@ TEST(WatchdogTest, AnyThreadOfTheLibraryThatHangsEndsTheDaemon) {
   EXPECT_TRUE(answers(daemon));
 }
 
-TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirOperationIsNamed) {
+TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirKindIsNamed) {
   test::Daemon daemon;
   daemon.start();
   std::vector<std::unique_ptr<test::StoppedThread>> stopped;
@@ -86,7 +96,7 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirOperationIsNamed) 
   EXPECT_FALSE(daemon.process().wait(Watchdog::kLimit + std::chrono::seconds(1))) << "nobody asked for anything yet";
   test::Process client({TRAMMEL_BINARY_DIR "/clients/trammel", "models", "--service", "--cell", "cell-7", "--port",
                         std::to_string(daemon.port()), "--domain", std::to_string(daemon.domain()), "--timeout", "20"});
-  ASSERT_TRUE(daemon.process().wait_for_line("ManageModels; ends at once", kLimit))
+  ASSERT_TRUE(daemon.process().wait_for_line("reading requests; ends at once", kLimit))
       << daemon.process().standard_error();
   for (const auto& thread : stopped) thread->bury();
   EXPECT_EQ(daemon.process().wait(kLimit), kExitHung);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
+#include "server/measurement/files/point_list.h"
 #include "tests/support/refusal.h"
 
 namespace trammel {
@@ -99,6 +100,52 @@ TEST(RoboDkCsv, RefusalsNameFileRowColumnValueAndLimit) {
   EXPECT_EQ(refusal("J1,X,Y,Z\n1,2,3\n"), Refusal("rdk.csv", 2).beyond(3, 4));
   EXPECT_EQ(refusal("J1 (mm),J2 (turns),X,Y,Z\n1,2,3,4,5\n"), Refusal("rdk.csv", {}, "J2 (turns)").text("turns"));
   EXPECT_EQ(refusal("id,J1,X,Y,Z\na,1,2,3,4\na,1,2,3,4\n"), Refusal("rdk.csv", 3, "pose_id").text("a"));
+}
+
+std::string repeated(const std::string& part, std::size_t times) {
+  std::string text;
+  text.reserve(part.size() * times);
+  for (std::size_t i = 0; i < times; ++i) text += part;
+  return text;
+}
+
+ErrorCode code_of(const std::string& text) {
+  const auto batch = parse_batch(text, "b.csv");
+  return batch ? ErrorCode::kBusy : batch.error().code;
+}
+
+// Each of these used up the stack, the memory or the time of the daemon.
+TEST(BatchFile, OfMillionsOfBytesEndsSoonWhateverItsKind) {
+  EXPECT_EQ(code_of("# " + std::string(2'000'000, 'x') + "\np1 1 2 3\n"), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("p1 1 2 3 " + std::string(2'000'000, '4') + "\n"), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("p1 1 2 3 " + repeated("a:", 1'000'000) + "\n"), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("p1;1;2;3\n" + repeated("# units                                   \n", 500'000)),
+            ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of(repeated("1\n", 4'000'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of(repeated("1 ", 4'000'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of(repeated(",", 4'000'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm\n" + repeated("1,2,3,4\n", 200'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("J1,X,Y,Z\n" + repeated("1,2,3,4\n", 200'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("J1;X;Y;Z\n" + repeated("1;", 2'000'000)), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("q1_deg,x_mm,y_mm,z_mm,note\n1,2,3,4," + std::string(100'000, 'x') + "\n"), ErrorCode::kTooLarge);
+}
+
+TEST(BatchFile, WhoseIdsAreNoNamesIsRefusedByEveryReader) {
+  const std::string escape = "\x1b[2J";
+  const std::string columns = "q1_deg,x_mm,y_mm,z_mm";
+  for (const char* name : {"pose_id", "tool_id", "payload_id", "note"}) {
+    const auto batch = parse_batch(columns + "," + name + "\n1,2,3,4," + escape + "\n", "b.csv");
+    ASSERT_FALSE(batch) << name;
+    EXPECT_EQ(batch.error().row, 2) << name;
+    EXPECT_EQ(sentence(batch.error()).find('\x1b'), std::string::npos) << name;
+  }
+  EXPECT_FALSE(parse_batch("J1,X,Y,Z,Name\n1,2,3,4,a" + escape + "\n", "b.csv"));
+  EXPECT_FALSE(parse_points("a" + escape + " 1 2 3\n", "p.txt"));
+  EXPECT_FALSE(parse_batch(columns + ",\"a\tb\"\n1,2,3,4,5\n", "b.csv"));
+  EXPECT_FALSE(parse_batch(columns + ",pose_id\n1,2,3,4,\"a\nb\"\n", "b.csv"));
+  EXPECT_TRUE(parse_batch(columns + ",note\n1,2,3,4,\"a\nb\"\n", "b.csv"));
+  EXPECT_FALSE(parse_batch(columns + ",pose_id\n1,2,3,4,\xff\n", "b.csv"));
+  EXPECT_FALSE(parse_batch(columns + ",pose_id\n1,2,3,4," + std::string(300, 'x') + "\n", "b.csv"));
 }
 
 TEST(BatchFile, RecognisesKindsByTheirContent) {

@@ -461,10 +461,11 @@ TEST_F(StoreTest, ADamagedFileIsAnErrorThatNamesIt) {
       file << std::string(512, '\x5A');
     }
   }
-  const auto opened = Store::open(path_);
-  ASSERT_FALSE(opened);
-  EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
-  EXPECT_EQ(refusal_of(opened), Refusal(path_).of(ErrorCode::kInternal));
+  open();
+  const auto batches = store_->batches("cell-7");
+  ASSERT_FALSE(batches);
+  EXPECT_EQ(batches.error().code, ErrorCode::kInternal);
+  EXPECT_EQ(refusal_of(batches), Refusal(path_).of(ErrorCode::kInternal));
 }
 
 TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
@@ -478,7 +479,7 @@ TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
 }
 
 TEST_F(StoreTest, AModelWhoseContentWasChangedIsNotHandedOut) {
-  add_model(10, true);
+  add_model(10);
   store_.reset();
   { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = replace(content, '10', '11')"); }
   open();

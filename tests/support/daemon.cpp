@@ -35,8 +35,10 @@ std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
 
 Daemon::Daemon() : port_(port_of_this_process()), domain_(domain_of_this_process()) {
   folder_.write("cell-7.yaml", cell_with_a_bias());
-  folder_.write("server.yaml",
-                "version: 1\nserver: test\ncells: [cell-7.yaml]\nstore: trammel.db\nlog: {level: debug}\n");
+  folder_.write(
+      "server.yaml",
+      fmt::format("version: 1\nserver: test-{}\ncells: [cell-7.yaml]\nstore: trammel.db\nlog: {{level: debug}}\n",
+                  port_));
 }
 
 std::vector<std::string> Daemon::command_line() const {

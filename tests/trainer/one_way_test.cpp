@@ -69,6 +69,7 @@ BatchSplit wrap_split(const MeasurementBatch& batch, const std::vector<bool>& he
 namespace {
 
 constexpr Calls kOnce{1, 1, 1};
+constexpr Calls kOnceEach{2, 2, 2};  // when it is accepted, and when its turn comes: meanwhile the store alone has it
 
 class OneWay : public testing::Test {
  protected:
@@ -86,10 +87,10 @@ class OneWay : public testing::Test {
   test::LearningCell learning_;
 };
 
-TEST_F(OneWay, ABatchIsParsedCheckedAndSplitOnceFromItsSubmissionToTheModelInForce) {
+TEST_F(OneWay, ABatchIsParsedCheckedAndSplitOnceAsItIsAcceptedAndOnceOnItsWayToTheModelInForce) {
   const JobProgress first = submit({.poses = 120}, "a");
   ASSERT_TRUE(first.in_force) << first.what;
-  EXPECT_EQ(of(seen(), "day-1"), kOnce);
+  EXPECT_EQ(of(seen(), "day-1"), kOnceEach);
 }
 
 TEST_F(OneWay, ABatchThatMeetsAModelInForceIsTooAndEachBatchThatJudgesIsOnce) {
@@ -98,7 +99,7 @@ TEST_F(OneWay, ABatchThatMeetsAModelInForceIsTooAndEachBatchThatJudgesIsOnce) {
   ASSERT_EQ(second.stage, JobStage::kDone) << second.what;
   ASSERT_EQ(second.model_version, 2);
   const auto all = seen();
-  EXPECT_EQ(of(all, "day-2"), kOnce);
+  EXPECT_EQ(of(all, "day-2"), kOnceEach);
   EXPECT_EQ(of(all, "day-1"), kOnce) << "it judges";
 }
 
@@ -122,14 +123,14 @@ TEST_F(OneWay, ADiagnosisThatIsAppliedReadsItsBatchOnce) {
   EXPECT_EQ(of(seen(), "day-1"), kOnce);
 }
 
-TEST_F(OneWay, ABatchThatIsSentToBeDiagnosedIsReadOnce) {
+TEST_F(OneWay, ABatchThatIsSentToBeDiagnosedIsReadAsItIsAcceptedAndOnItsTurn) {
   const std::string csv = test::small_batch_csv(*cell_, {.poses = 60});
   static_cast<void>(seen());
   const JobProgress done = learning_.finished(test::demand(learning_.trainer().diagnose("cell-7", "", csv, false)));
   ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
   const auto all = seen();
   ASSERT_EQ(all.size(), 1U);
-  EXPECT_EQ(all.begin()->second, kOnce);
+  EXPECT_EQ(all.begin()->second, kOnceEach);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <new>
 #include <thread>
 
@@ -52,6 +53,15 @@ class Watch {
     return wait_for([job](const JobProgress& p) {
       return p.job == job && (p.stage == JobStage::kDone || p.stage == JobStage::kFailed);
     });
+  }
+  /// How many reports came before that of its end.
+  std::ptrdiff_t place_of_the_end(std::int64_t job) {
+    const std::lock_guard lock(mutex_);
+    return std::find_if(reports_.begin(), reports_.end(),
+                        [job](const JobProgress& p) {
+                          return p.job == job && (p.stage == JobStage::kDone || p.stage == JobStage::kFailed);
+                        }) -
+           reports_.begin();
   }
   std::vector<JobStage> stages(std::int64_t job) {
     const std::lock_guard lock(mutex_);
@@ -224,7 +234,7 @@ TEST_F(TrainerTest, ARowHeldOutOnceIsHeldOutInEveryTrainingOfItsBatch) {
   EXPECT_EQ(of_both, one_after_the_other);
 }
 
-TEST_F(TrainerTest, TheSameRequestAgainIsTheSameJobEvenWhenTheQueueIsFull) {
+TEST_F(TrainerTest, TheSameRequestAgainIsTheSameJobHoweverManyWait) {
   options_.queue_capacity = 1;
   make_trainer();
   const auto first = trainer_->submit("cell-7", "lt-07", csv(), "client:1");
@@ -237,25 +247,28 @@ TEST_F(TrainerTest, TheSameRequestAgainIsTheSameJobEvenWhenTheQueueIsFull) {
   EXPECT_EQ(other.error().code, ErrorCode::kConflict);
 }
 
-TEST_F(TrainerTest, AFullQueueRefusesAndStoresNothing) {
+TEST_F(TrainerTest, HoweverManyJobsWaitABatchIsTakenAndOneMoreRequestIsNot) {
   options_.queue_capacity = 1;
   make_trainer();
   submit("lt-07");
-  const auto second = trainer_->submit("cell-7", "lt-08", csv({.seed = 2}), "client:2");
-  ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().code, ErrorCode::kBusy);
-  EXPECT_EQ(store_->batches("cell-7")->size(), 1u);
+  submit("lt-08", {.seed = 2});
+  ASSERT_TRUE(trainer_->retrain("cell-7", {}, "", "")) << "what came with batches does not count";
   const auto again = trainer_->retrain("cell-7", {}, "", "");
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().code, ErrorCode::kBusy);
-  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+  EXPECT_EQ(again.error().limit, 1);
+  EXPECT_EQ(trainer_->diagnose("cell-7", "", "", false).error().code, ErrorCode::kBusy);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 3u);
+  submit("lt-09", {.seed = 3});
+  EXPECT_EQ(trainer_->queued_jobs(), 4);
 }
 
 TEST_F(TrainerTest, RefusedInputStoresNothing) {
   const std::string good = csv();
   EXPECT_EQ(trainer_->submit("cell-9", "a", good, "r").error().code, ErrorCode::kNotFound);
   EXPECT_FALSE(trainer_->submit("cell-7", "", good, "r"));
-  EXPECT_FALSE(trainer_->submit("cell-7", "two\nlines", good, "r"));
+  for (const char* id : {"two\nlines", "\xff", "caf\xe9", "\x1b[2J", "\xc2\x9b", "\xe2\x80\xae"})
+    EXPECT_FALSE(trainer_->submit("cell-7", id, good, "r")) << id;
   EXPECT_FALSE(trainer_->submit("cell-7", std::string(200, 'x'), good, "r"));
   EXPECT_FALSE(trainer_->submit("cell-7", "a", "no,batch\n1,2\n", "r"));
   std::string beyond = good;
@@ -285,6 +298,25 @@ TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
   EXPECT_FALSE(trainer_->retrain("cell-7", {"a"}, "M1,no_such_cause", ""));
   EXPECT_FALSE(trainer_->retrain("cell-7", {"a"}, "", "no_such_kernel"));
   EXPECT_EQ(trainer_->retrain("cell-9", {}, "", "").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
+}
+
+TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor) {
+  submit("a");
+  std::string kernel = "se", sources = "M1";
+  for (int i = 0; i < 200; ++i) kernel += " + se";
+  for (int i = 0; i < 600; ++i) sources += ",gear_transmission:3";
+  const auto refused_with = [this](const std::vector<std::string>& batches, const std::string& level,
+                                   const std::string& bias) {
+    const auto job = trainer_->retrain("cell-7", batches, level, bias);
+    EXPECT_EQ(job ? ErrorCode::kInternal : job.error().code, ErrorCode::kTooLarge);
+    return job ? 0 : job.error().limit.value_or(0);
+  };
+  EXPECT_EQ(refused_with({"a"}, "", kernel), 32);
+  EXPECT_EQ(refused_with({"a"}, "", std::string(100'000, '(')), 1000);
+  EXPECT_EQ(refused_with({"a"}, sources, ""), 500);
+  EXPECT_EQ(refused_with({"a"}, std::string(1'000'000, 'x'), ""), 16384);
+  EXPECT_EQ(refused_with(std::vector<std::string>(1001, "a"), "", ""), 1000);
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }
 
@@ -373,12 +405,65 @@ TEST_F(TrainerTest, AJobThatTookTheProcessDownThreeTimesIsNotTriedAgain) {
   EXPECT_EQ(watch_.wait_until_finished(good).stage, JobStage::kDone);
 }
 
-TEST_F(TrainerTest, TakesUpMoreJobsThanTheQueueTakesNow) {
-  for (int i = 0; i < 4; ++i) submit(std::to_string(i), {.seed = static_cast<std::uint64_t>(i)});
+TEST_F(TrainerTest, TakesUpMoreRequestsThanMayWaitNow) {
+  submit("a");
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(trainer_->retrain("cell-7", {"a"}, "", ""));
   options_.queue_capacity = 1;
   restart();
   start();
   EXPECT_EQ(watch_.wait_until_finished(4).stage, JobStage::kDone);
+}
+
+TEST_F(TrainerTest, TheOutcomeOfAJobIsDataAndSurvivesARestart) {
+  start();
+  const JobProgress first = train("lt-07");
+  const JobProgress worse = retrain({"lt-07"}, "M0");
+  const JobProgress found = watch_.wait_until_finished(trainer_->diagnose("cell-7", "lt-07", "", false).value());
+  EXPECT_EQ(first.outcome.verdict, JobVerdict::kInForce);
+  EXPECT_GT(*first.outcome.before, 1e-3) << "nominal, m";
+  EXPECT_LT(*first.outcome.after, 1e-4) << "m";
+  EXPECT_FALSE(first.outcome.code);
+  EXPECT_NE(worse.outcome.verdict, JobVerdict::kInForce);
+  EXPECT_EQ(worse.outcome.next, "activate it if it is wanted");
+  EXPECT_EQ(found.outcome.verdict, JobVerdict::kDiagnosed);
+  EXPECT_FALSE(found.outcome.why.empty());
+  restart();
+  for (const JobProgress& heard : {first, worse, found}) {
+    const JobOutcome stored = trainer_->progress(heard.job)->outcome;
+    EXPECT_EQ(stored.verdict, heard.outcome.verdict);
+    EXPECT_EQ(stored.before, heard.outcome.before);
+    EXPECT_EQ(stored.after, heard.outcome.after);
+    EXPECT_EQ(stored.limit, heard.outcome.limit);
+    EXPECT_EQ(stored.why, heard.outcome.why);
+    EXPECT_EQ(stored.next, heard.outcome.next);
+  }
+}
+
+TEST_F(TrainerTest, AJobThatWaitsIsCancelledAtOnce) {
+  const std::int64_t first = submit("a");
+  const std::int64_t second = submit("b", {.seed = 2});
+  ASSERT_TRUE(trainer_->cancel(first));
+  EXPECT_EQ(trainer_->queued_jobs(), 1);
+  EXPECT_EQ(store_->job(first)->state, JobState::kFailed);
+  EXPECT_EQ(trainer_->progress(first)->outcome.verdict, JobVerdict::kCancelled);
+  EXPECT_EQ(trainer_->cancel(first).error().code, ErrorCode::kConflict);
+  EXPECT_EQ(trainer_->cancel(99).error().code, ErrorCode::kNotFound);
+  start();
+  EXPECT_EQ(watch_.wait_until_finished(second).stage, JobStage::kDone);
+  EXPECT_EQ(retrain({"a"}).stage, JobStage::kDone) << "the batch is still there";
+}
+
+TEST_F(TrainerTest, TheCellsHaveTheirTurnsHoweverManyJobsOneOfThemHas) {
+  cells_["cell-8"] = test::small_cell("cell-8");
+  make_trainer();
+  for (int i = 0; i < 5; ++i) submit(std::to_string(i), {.seed = static_cast<std::uint64_t>(i + 1)});
+  const std::int64_t other =
+      trainer_->submit("cell-8", "a", test::small_batch_csv(*cells_.at("cell-8"), {}), "client:a").value();
+  start();
+  watch_.wait_until_finished(5);
+  watch_.wait_until_finished(other);
+  EXPECT_LT(watch_.place_of_the_end(other), watch_.place_of_the_end(2)) << "one job of the other cell was before it";
+  EXPECT_LT(watch_.place_of_the_end(1), watch_.place_of_the_end(2));
 }
 
 TEST_F(TrainerTest, AJobOfACellThatIsNotServedHereWaits) {
@@ -462,7 +547,7 @@ TEST_F(TrainerTest, RollsBackAndActivatesWhatIsThenServed) {
   EXPECT_EQ(in_force(), 2);
 }
 
-TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbackStepsPastIt) {
+TEST_F(TrainerTest, WhereNoModelCanBeLoadedTheRecordOfTheOneInForceJudges) {
   start();
   train("first");
   for (const int version : {2, 3}) {
@@ -470,7 +555,9 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
     ASSERT_TRUE(trainer_->activate("cell-7", version));
   }
   SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
-      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version > 1");
+      .exec("UPDATE models SET content = replace(content, '10', '11')");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
   restart();
   ASSERT_TRUE(trainer_->start());
   ASSERT_EQ(in_force(), 0);
@@ -479,6 +566,22 @@ TEST_F(TrainerTest, WhereTheModelInForceCannotBeLoadedItsRecordJudgesAndARollbac
   EXPECT_NE(worse.what.find("version 3 had on its own, which is marked in force but cannot be loaded"),
             std::string::npos)
       << worse.what;
+}
+
+TEST_F(TrainerTest, ARollbackStepsPastWhatCannotBeLoaded) {
+  start();
+  train("first");
+  for (const int version : {2, 3}) {
+    train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
+    ASSERT_TRUE(trainer_->activate("cell-7", version));
+  }
+  SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version = 2");
+  trainer_.reset();
+  std::filesystem::remove_all(folder_.file("trammel.db.models"));
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  ASSERT_EQ(in_force(), 3);
   EXPECT_EQ(trainer_->rollback("cell-7").value(), 1);
   EXPECT_EQ(in_force(), 1);
   EXPECT_EQ(*store_->version_in_force("cell-7"), 1);
@@ -615,7 +718,7 @@ TEST_F(TrainerTest, ABatchThatNothingExplainsIsKeptApartUntilItIsReleased) {
 }
 
 TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsRefused) {
-  options_.queue_capacity = 2;
+  options_.queue_capacity = 1;
   make_trainer();
   submit("lt-07");
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
@@ -630,10 +733,11 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereTheTrainingThatWasToReleaseItIsR
   EXPECT_FALSE(released({"lt-07", "lt-07"}, "", ""));
   EXPECT_FALSE(released({}, "", "")) << "which one is good must be said";
   submit("lt-08", {.seed = 2});
+  ASSERT_TRUE(trainer_->retrain("cell-7", {"lt-08"}, "", ""));
   const auto busy = released({"lt-07"}, "", "");
   ASSERT_FALSE(busy);
   EXPECT_EQ(busy.error().code, ErrorCode::kBusy);
-  options_.queue_capacity = 3;
+  options_.queue_capacity = 2;
   make_trainer();
   EXPECT_TRUE(released({"lt-07"}, "", ""));
 }

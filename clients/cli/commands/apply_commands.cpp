@@ -6,6 +6,7 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/plain_text.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
@@ -186,7 +187,7 @@ Result<Extent> correct(const CorrectArguments& arguments) {
   if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
     return tl::make_unexpected(written.error());
   }
-  fmt::print(stderr, "{}{}", corrections_summary(*corrections), left_alone);
+  fmt::print(stderr, "{}", shown_lines(corrections_summary(*corrections) + left_alone));
   const Status written = write_json(arguments.json, corrections_json(*file, *corrections));
   if (!written) return tl::make_unexpected(written.error());
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;

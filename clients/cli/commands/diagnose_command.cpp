@@ -1,10 +1,12 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/service/diagnose_service.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
+#include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/diagnose/diagnose.h"
@@ -100,7 +102,7 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
   if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
-  Result<Cell> read = read_cell(arguments.cell);
+  Result<Cell> read = read_cell_to_train(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
   const Result<CheckedBatch> batch = batch_to_diagnose(arguments, *cell);
@@ -142,8 +144,8 @@ Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outp
   outputs.put("--json", json_text(json));
   if (const Status written = outputs.write(); !written) return written;
   if (!poses && !arguments.next_poses.empty()) {
-    fmt::print(stderr, "{}: not written, no poses are suggested: {}\n", arguments.next_poses,
-               json.at("next_poses_for").at("none_because").get<std::string>());
+    fmt::print(stderr, "{}: not written, no poses are suggested: {}\n", shown(arguments.next_poses),
+               shown_lines(json.at("next_poses_for").at("none_because").get<std::string>()));
   }
   return {};
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
@@ -60,7 +61,8 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
 }
 
 Status train_model(const TrainArguments& arguments) {
-  Result<Cell> cell = read_cell(arguments.cell);
+  Result<Cell> cell = read_cell_to_train(
+      arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<CheckedBatch> batch =
       read_checked_batch(arguments.batch, *cell, drawn(arguments.validation_share, arguments.seed));

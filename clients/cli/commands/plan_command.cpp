@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/measurement/files/joint_list.h"
@@ -159,7 +160,7 @@ Status plan(PlanArguments arguments) {
   }
   if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
   arguments.options.orientation = !arguments.positions_only;
-  Result<Cell> read = read_cell(arguments.cell);
+  Result<Cell> read = read_cell_to_train(arguments.cell, {.bias = false});
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
   const Result<Plan> planned =

@@ -107,6 +107,14 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
   if (!file.joint_types.empty()) {
     if (const Status joints = check_joint_columns(file.joint_types, robot, file.where); !joints) return joints;
   }
+  for (const TargetRow& row : file.rows) {
+    const auto directions = static_cast<int>(row.target.direction.size());
+    if (directions == 0 || directions == robot.size()) continue;
+    return refused("{} direction columns, robot {} has {} joints", directions, robot.name(), robot.size())
+        .in(file.where)
+        .of(fmt::format("dir{}", directions))
+        .beyond(directions, robot.size());
+  }
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;

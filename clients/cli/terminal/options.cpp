@@ -52,7 +52,7 @@ void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& 
       [](const std::string& text) {
         const bool digits = !text.empty() &&
                             std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= '0' && c <= '9'; });
-        return digits ? std::string() : "--seed " + text + ": expected a whole number from 0";
+        return digits ? std::string() : "'" + text + "', expected a whole number from 0";
       },
       "");
   command.add_option("--seed", seed, help)->check(whole)->capture_default_str();

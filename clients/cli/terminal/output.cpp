@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 
 namespace trammel::cli {
@@ -70,12 +71,13 @@ Status write_json(const std::string& path, const nlohmann::ordered_json& value) 
 }
 
 std::string json_text(const nlohmann::ordered_json& value) {
-  return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  // What JSON leaves as it is may still control a terminal; its escapes are JSON's own.
+  return shown_lines(value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) + "\n";
 }
 
 void tell(const std::string& text, std::initializer_list<std::string> paths) {
   if (std::any_of(paths.begin(), paths.end(), is_standard_output)) return;
-  std::fputs(text.c_str(), stdout);
+  std::fputs(shown_lines(text).c_str(), stdout);
 }
 
 void Outputs::add(const std::string& option, const std::string& path, const std::string& may_replace) {
@@ -130,7 +132,7 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::show(const std::string& what, double share) {
   if (!terminal_) return;
-  const std::string line = fmt::format("{} {:.0f} %", what, 100 * std::clamp(share, 0.0, 1.0));
+  const std::string line = fmt::format("{} {:.0f} %", shown(what), 100 * std::clamp(share, 0.0, 1.0));
   if (line == shown_) return;
   fmt::print(stderr, "\r\033[K{}", line);
   std::fflush(stderr);

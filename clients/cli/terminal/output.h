@@ -24,7 +24,7 @@ void tell_refusal(const Error& error, const std::string& json_path);
 
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& value);
 
-/// Text for people on standard output, left out when a result for programs goes there (`paths`: where results go).
+/// Text for people on standard output, control characters of foreign text spelled out; left out when a result for programs goes there (`paths`: where results go).
 void tell(const std::string& text, std::initializer_list<std::string> paths);
 
 /// What one command reads or writes, and the option that names it.

@@ -66,7 +66,6 @@ ordered_json job_json(const client::JobStatus& job) {
           {"model_version", job.model_version},
           {"in_force", job.in_force},
           {"verdict", job.verdict},
-          {"judged_on", job.judged_on},
           {"before_mm", if_known(job.before_mm)},
           {"after_mm", if_known(job.after_mm)},
           {"limit_mm", if_known(job.limit_mm)},
@@ -129,7 +128,8 @@ std::string server_text(const client::ServerStatus& server) {
   return fmt::format("server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
                      server.server_id, server.version, server.state, server.uptime_s, server.requests, server.refused,
                      server.queued_jobs,
-                     server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " ")));
+                     server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " "))) +
+         (server.trouble.empty() ? "" : fmt::format("server {} in trouble: {}\n", server.server_id, server.trouble));
 }
 
 ordered_json server_json(const client::ServerStatus& server) {
@@ -143,6 +143,8 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"unheard", server.unheard},
           {"misdirected", server.misdirected},
           {"unreadable", server.unreadable},
+          {"lost", server.lost},
+          {"trouble", server.trouble},
           {"uptime_s", server.uptime_s},
           {"queued_jobs", server.queued_jobs}};
 }

@@ -76,7 +76,8 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 
 /// Independent outputs. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
-                                                   const std::vector<GpHyperparameters>& at);
+                                                   const std::vector<GpHyperparameters>& at,
+                                                   VarianceForm form = VarianceForm::kCompressed);
 /// The most probable hyperparameters of independent outputs; those of another unit (from the fourth on) are searched
 /// apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there are no other starts. Empty when no
 /// start gave a positive definite covariance.

@@ -117,10 +117,11 @@ class IndependentOutputs final : public BiasOutputs {
 }  // namespace
 
 BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
-                                     const std::vector<GpHyperparameters>& at) {
+                                     const std::vector<GpHyperparameters>& at, VarianceForm form) {
   std::vector<LocalExperts> outputs;
   for (std::size_t d = 0; d < at.size(); ++d) {
-    auto output = LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)), data.noise_shape, at[d]);
+    auto output =
+        LocalExperts::condition(kernel, data.q, data.y.col(static_cast<Index>(d)), data.noise_shape, at[d], form);
     if (!output) return nullptr;
     outputs.push_back(*std::move(output));
   }

@@ -190,7 +190,19 @@ void GaussianProcess::finish(VarianceForm form) {
   kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
   leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
-  if (form == VarianceForm::kCompressed) compress();
+  if (form != VarianceForm::kExact) compress();
+  if (form == VarianceForm::kCompressedOnly && compressed_) exact_ = {};
+}
+
+std::vector<double> GaussianProcess::root_rows(Index more) const {
+  if (exact_.size() == size_) return exact_.rows(more);
+  AlignedMatrix matrix = augmented_storage(size_, 1);
+  AlignedMatrix work(numerics().work_size(size_ + 1), 1);
+  assemble_augmented(*kernel_, parameters_, features_, 1.0, noise_, y_, &matrix);
+  double log_det = 0;
+  const bool positive = numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
+  TRAMMEL_CHECK(positive);  // it was before
+  return VarianceTable(features_.copy(), size_, std::move(matrix)).rows(more);
 }
 
 void GaussianProcess::compress() {

@@ -82,6 +82,9 @@ enum class VarianceForm {
   /// small (bound: DECISIONS.md). Exact where many points would be needed.
   kCompressed,
   kExact,
+  /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of the points and is
+  /// for with(), without() and left_out_error() alone is computed anew when one of them is called.
+  kCompressedOnly,
 };
 
 /// One output, conditioned on its data (eq. 3.17). Immutable, thread-safe.
@@ -134,6 +137,8 @@ class GaussianProcess {
   // Computes what follows from data, weights, inverse diagonal and root.
   void finish(VarianceForm form);
   void compress();
+  // Of the exact variance table; VarianceTable::rows().
+  [[nodiscard]] std::vector<double> root_rows(Eigen::Index more) const;
 
   std::shared_ptr<const Kernel> kernel_;
   Eigen::VectorXd parameters_;
@@ -144,7 +149,7 @@ class GaussianProcess {
   AlignedMatrix weights_;             // M⁻¹ y
   Eigen::VectorXd inverse_diagonal_;  // of M⁻¹
   double log_det_ = 0;                // of M
-  VarianceTable exact_;               // of all points
+  VarianceTable exact_;               // of all points; empty where only the compressed one is kept
   std::optional<VarianceTable> compressed_;
   double signal_variance_ = 0;
   double noise_variance_ = 0;

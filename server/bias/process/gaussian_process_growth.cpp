@@ -41,7 +41,7 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   gp.weights_.map().topRows(size_) = weights_.map().topRows(size_);
   gp.inverse_diagonal_.head(size_) = inverse_diagonal_;
 
-  InverseRoot root(exact_.rows(q.rows()), size_);
+  InverseRoot root(root_rows(q.rows()), size_);
   AlignedMatrix covariance(gp.features_.rows(), 1);
   for (Index i = size_; i < size; ++i) {
     const FeatureBlock before = {gp.features_.data(), i, gp.features_.rows()};
@@ -63,7 +63,7 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
 // (M⁻¹)_pp⁻¹ (M⁻¹ y)_p with M⁻¹ = Gᵀ G, G = L⁻¹: Rasmussen & Williams, eqs. 5.10-5.12, for several points at once.
 VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<Index>& points) const {
   TRAMMEL_CHECK(y.size() == size_);
-  const std::vector<double> rows = exact_.rows(0);
+  const std::vector<double> rows = root_rows(0);
   const auto count = static_cast<Index>(points.size());
   MatrixXd columns = MatrixXd::Zero(size_, count);
   VectorXd whitened(size_);
@@ -81,7 +81,7 @@ VectorXd GaussianProcess::left_out_error(const VectorXd& y, const std::vector<In
 }
 
 GaussianProcess GaussianProcess::without(const std::vector<Index>& points, VarianceForm form) const {
-  InverseRoot root(exact_.rows(0), size_);
+  InverseRoot root(root_rows(0), size_);
   VectorXd weights = weights_.map().col(0).head(size_);
   VectorXd inverse_diagonal = inverse_diagonal_;
   std::vector<Index> kept(static_cast<std::size_t>(size_));

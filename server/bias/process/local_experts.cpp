@@ -39,13 +39,13 @@ std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const Vecto
 
 std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const Kernel>& kernel, const MatrixXd& q,
                                                     const VectorXd& y, const VectorXd& noise_shape,
-                                                    const GpHyperparameters& hyperparameters) {
+                                                    const GpHyperparameters& hyperparameters, VarianceForm form) {
   LocalExperts local;
   local.size_ = q.rows();
   local.members_ = neighbourhoods(*kernel, hyperparameters.kernel, q);
   for (const std::vector<Index>& points : local.members_) {
-    auto expert =
-        GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points), hyperparameters);
+    auto expert = GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points),
+                                             hyperparameters, form);
     if (!expert) return std::nullopt;
     local.experts_.push_back(*std::move(expert));
   }

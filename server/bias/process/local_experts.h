@@ -18,7 +18,8 @@ class LocalExperts {
   [[nodiscard]] static std::optional<LocalExperts> condition(const std::shared_ptr<const Kernel>& kernel,
                                                              const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                              const Eigen::VectorXd& noise_shape,
-                                                             const GpHyperparameters& hyperparameters);
+                                                             const GpHyperparameters& hyperparameters,
+                                                             VarianceForm form = VarianceForm::kCompressed);
 
   /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the expert that knows it
   /// best. without() takes points out of their experts, and drops an expert without points.

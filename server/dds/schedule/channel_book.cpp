@@ -153,7 +153,8 @@ std::vector<ChannelBook::Change> ChannelBook::changes(SteadyTime now) {
   for (auto& [partition, client] : clients_) {
     if (!client.is_open) continue;
     for (const std::string& topic : client.topics) {
-      if (client.opened.insert(topic).second) changes.push_back({Change::Kind::kOpen, partition, topic});
+      if (client.opened.insert(topic).second)
+        changes.push_back({Change::Kind::kOpen, partition, topic, client.participant});
     }
   }
   return changes;

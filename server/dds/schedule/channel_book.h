@@ -45,7 +45,8 @@ class ChannelBook {
   struct Change {
     enum class Kind { kOpen, kClose } kind;
     std::string partition;
-    std::string topic;  ///< of kOpen: one of those that the client listens to
+    std::string topic;             ///< of kOpen: one of those that the client listens to
+    std::string participant = {};  ///< of kOpen: the client's
   };
   [[nodiscard]] std::vector<Change> changes(SteadyTime now);
   /// Whether clients wait for a channel.

@@ -15,7 +15,7 @@ using Cost = std::chrono::duration<double>;
 struct Shed {
   std::string why;  ///< one clause
   std::chrono::milliseconds retry_after{0};
-  bool is_over = false;  ///< the time that the client gave is over
+  bool too_late = false;  ///< it was taken in, and its time is over now
 };
 
 /// A request that is worked on in portions. Its items (targets, joint vectors) do not depend on each other. begin(),

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
 constexpr double kSigmaLimitMm = 1e3;
+constexpr std::size_t kMostMeasurements = 100'000;  // of one file: five times what one training takes
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
 const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
@@ -90,7 +91,9 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   Result<PoseContext> context = columns.pose.read(table, row);
   if (!context) return tl::make_unexpected(context.error());
   measurement.context = std::move(*context);
-  measurement.pose_id = columns.pose.pose_id(table, row);
+  Result<std::string> pose_id = columns.pose.pose_id(table, row);
+  if (!pose_id) return tl::make_unexpected(pose_id.error());
+  measurement.pose_id = std::move(*pose_id);
   measurement.row = table.line(row);
   if (const Status position = read_position(table, row, columns, measurement); !position) {
     return tl::make_unexpected(position.error());
@@ -105,7 +108,7 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
 }  // namespace
 
 Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
+  const Result<CsvTable> table = CsvTable::parse(text, where, kMostMeasurements);
   if (!table) return tl::make_unexpected(table.error());
   const Result<BatchColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());

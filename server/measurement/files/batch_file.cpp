@@ -29,9 +29,9 @@ bool is_text(const std::string& field) { return !field.empty() && !is_number(fie
 }  // namespace
 
 BatchKind recognise_batch(const std::string& text) {
-  std::vector<TextLine> lines = text_lines(text);
-  std::erase_if(lines, [](const TextLine& line) { return line.comment; });
-  if (lines.empty()) return BatchKind::kTrammel;
+  const std::vector<TextLine> lines = first_lines(text, 2);
+  const auto is_long = [](const TextLine& line) { return line.text.size() > kLongestLine; };
+  if (lines.empty() || std::any_of(lines.begin(), lines.end(), is_long)) return BatchKind::kTrammel;
   const char separator = separator_of(lines[0].text);
   const std::vector<std::string> first = split_fields(lines[0].text, separator);
   if (any_of(first, is_first_joint)) {

@@ -7,6 +7,8 @@
 #include <limits>
 #include <set>
 
+#include "server/base/plain_text.h"
+
 namespace trammel {
 
 namespace {
@@ -19,31 +21,26 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// Length of the UTF-8 sequence that starts `text`, 0 when there is none (RFC 3629; NUL is no text either).
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte(0);
-  if (lead != 0 && lead < 0x80) return 1;
-  const std::size_t length = lead >= 0xC2 && lead < 0xE0   ? 2
-                             : lead >= 0xE0 && lead < 0xF0 ? 3
-                             : lead >= 0xF0 && lead < 0xF5 ? 4
-                                                           : 0;
-  if (length == 0 || length > text.size()) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return 0;
-  }
-  const bool overlong = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
-  const bool surrogate_or_beyond = (lead == 0xED && byte(1) >= 0xA0) || (lead == 0xF4 && byte(1) >= 0x90);
-  return overlong || surrogate_or_beyond ? 0 : length;
-}
+constexpr std::size_t kMostValueBytes = 65'536;  // of one value
 
-bool is_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t length = utf8_length(text);
-    if (length == 0) return false;
-    text.remove_prefix(length);
+/// Whether the values of a row may stand in a table.
+Status check_values(const CsvTable::Row& row, const std::string& where) {
+  if (row.fields.size() > CsvTable::kMostColumns)
+    return failure(ErrorCode::kTooLarge, "more than {} values in one row", CsvTable::kMostColumns)
+        .in(where)
+        .at_row(row.line)
+        .beyond(row.fields.size(), CsvTable::kMostColumns);
+  for (const std::string& field : row.fields) {
+    if (field.size() > kMostValueBytes)
+      return failure(ErrorCode::kTooLarge, "a value of {} bytes, limit {}", field.size(), kMostValueBytes)
+          .in(where)
+          .at_row(row.line)
+          .beyond(field.size(), kMostValueBytes);
+    if (!is_utf8(field)) return refused("not UTF-8 text").in(where).at_row(row.line);
+    if (!is_plain_lines(field))
+      return refused("'{}' has control characters", shown_short(field)).in(where).at_row(row.line);
   }
-  return true;
+  return {};
 }
 
 /// Reads the text record by record.
@@ -61,8 +58,8 @@ class Scanner {
     while (!text_.empty()) {
       Result<std::string> field = trimmed_start() == '"' ? quoted() : plain();
       if (!field) return tl::make_unexpected(field.error());
-      if (!is_utf8(*field)) return refused("not UTF-8 text").in(where_).at_row(record.line);
       record.fields.push_back(std::move(*field));
+      if (record.fields.size() > CsvTable::kMostColumns) break;
       if (text_.empty()) break;
       const char separator = text_.front();
       text_.remove_prefix(1);
@@ -72,6 +69,7 @@ class Scanner {
       }
       if (text_.empty()) record.fields.emplace_back();  // the file ends with a separator
     }
+    if (const Status fine = check_values(record, where_); !fine) return tl::make_unexpected(fine.error());
     return record;
   }
 
@@ -116,7 +114,7 @@ class Scanner {
   Result<std::string> rest_after_quote(int first_line, std::string field) {
     const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
     if (const std::string_view rest = trimmed(text_.substr(0, end)); !rest.empty()) {
-      return refused("'{}' after a closing quote, expected ','", rest).in(where_).at_row(first_line);
+      return refused("'{}' after a closing quote, expected ','", shown_short(rest)).in(where_).at_row(first_line);
     }
     text_.remove_prefix(end);
     return field;
@@ -126,9 +124,6 @@ class Scanner {
   const std::string& where_;
   int line_ = 1;
 };
-
-/// A value as it is shown in messages: unchanged, but cut when long.
-std::string shown(const std::string& field) { return field.size() <= 40 ? field : field.substr(0, 40) + "..."; }
 
 }  // namespace
 
@@ -140,8 +135,10 @@ Status CsvTable::set_columns(Row header) {
           .in(where_)
           .at_row(header.line)
           .with_value(seen.size() + 1);
+    if (const Status plain = check_name(name, "column name"); !plain)
+      return Failure(plain.error()).in(where_).at_row(header.line);
     if (!seen.insert(name).second) {
-      return refused("column {} appears twice", shown(name)).in(where_).at_row(header.line).of(shown(name));
+      return refused("column {} appears twice", shown_short(name)).in(where_).at_row(header.line).of(shown_short(name));
     }
   }
   columns_ = std::move(header.fields);
@@ -155,13 +152,24 @@ Status CsvTable::add_row(Row row) {
         .beyond(row.fields.size(), columns_.size())
         .at_row(row.line);
   }
+  if (rows_.size() == most_rows_)
+    return failure(ErrorCode::kTooLarge, "more than {} rows", most_rows_)
+        .in(where_)
+        .at_row(row.line)
+        .beyond(rows_.size() + 1, most_rows_);
+  if ((rows_.size() + 1) * columns_.size() > kMostValues)
+    return failure(ErrorCode::kTooLarge, "more than {} values", kMostValues)
+        .in(where_)
+        .at_row(row.line)
+        .beyond((rows_.size() + 1) * columns_.size(), kMostValues);
   rows_.push_back(std::move(row));
   return {};
 }
 
-Result<CsvTable> CsvTable::parse(std::string_view text, std::string where) {
+Result<CsvTable> CsvTable::parse(std::string_view text, std::string where, std::size_t most_rows) {
   CsvTable table;
   table.where_ = std::move(where);
+  table.most_rows_ = most_rows;
   Scanner scanner(text, table.where_);
   Result<Row> header = scanner.next();
   if (!header) return tl::make_unexpected(header.error());
@@ -181,9 +189,7 @@ Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const
   table.where_ = std::move(where);
   if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
   for (const Row& row : rows) {
-    if (!std::all_of(row.fields.begin(), row.fields.end(), is_utf8)) {
-      return refused("not UTF-8 text").in(table.where_).at_row(row.line);
-    }
+    if (const Status fine = check_values(row, table.where_); !fine) return tl::make_unexpected(fine.error());
     if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
   }
   return table;
@@ -197,7 +203,7 @@ std::optional<std::size_t> CsvTable::find(std::string_view column) const {
 
 Result<std::size_t> CsvTable::require(std::string_view column) const {
   if (const auto at = find(column)) return *at;
-  const std::string names = shown(fmt::format("{}", fmt::join(columns_, ",")));
+  const std::string names = shown_short(fmt::format("{}", fmt::join(columns_, ",")));
   const bool semicolons = columns_.size() == 1 && columns_[0].find(';') != std::string::npos;
   return refused("missing column {}", column)
       .in(where_)
@@ -222,6 +228,13 @@ Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::st
       .next(fmt::format("{} come all together or not at all", fmt::join(columns, ", ")));
 }
 
+Result<std::string> CsvTable::name(std::size_t row, std::size_t column) const {
+  const std::string& text = field(row, column);
+  if (const Status plain = check_name(text, columns_[column].c_str()); !plain)
+    return Failure(plain.error()).in(where_).at_row(line(row));
+  return text;
+}
+
 Result<double> CsvTable::number(std::size_t row, std::size_t column, double limit) const {
   std::string_view text = field(row, column);
   if (text.empty()) return refuse(row, "{} is empty, expected a number", columns_[column]).of(columns_[column]);
@@ -229,15 +242,15 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc::result_out_of_range) {
-    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown(field(row, column)), limit)
+    return refuse(row, "{} is {}, limit {:g}", columns_[column], shown_short(field(row, column)), limit)
         .of(columns_[column])
-        .with_text(shown(field(row, column)))
+        .with_text(shown_short(field(row, column)))
         .beyond(std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1), limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
-    return refuse(row, "{} is '{}', expected a number", columns_[column], shown(field(row, column)))
+    return refuse(row, "{} is '{}', expected a number", columns_[column], shown_short(field(row, column)))
         .of(columns_[column])
-        .with_text(shown(field(row, column)));
+        .with_text(shown_short(field(row, column)));
   }
   if (!std::isfinite(value)) {
     return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column))
@@ -256,8 +269,8 @@ Result<int> CsvTable::integer(std::size_t row, std::size_t column, int lowest, i
   const Result<double> value = number(row, column);
   if (!value) return tl::make_unexpected(value.error());
   if (*value != std::floor(*value) || *value < lowest || *value > highest) {
-    return refuse(row, "{} is {}, expected a whole number from {} to {}", columns_[column], shown(field(row, column)),
-                  lowest, highest)
+    return refuse(row, "{} is {}, expected a whole number from {} to {}", columns_[column],
+                  shown_short(field(row, column)), lowest, highest)
         .of(columns_[column])
         .beyond(*value, *value < lowest ? lowest : highest);
   }

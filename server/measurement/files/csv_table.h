@@ -15,9 +15,15 @@ namespace trammel {
 /// are comments, fields may be quoted. Rows are counted from 0, messages name the line in the file.
 class CsvTable {
  public:
+  static constexpr std::size_t kMostRows = 1'000'000;
+  static constexpr std::size_t kMostColumns = 1000;
+  static constexpr std::size_t kMostValues = 5'000'000;  ///< of a table: each takes 32 bytes at least
+
   /// Refuses a text without header, a column without a name or named twice, a row of another length than the header, an
-  /// open quote, bytes that are not UTF-8.
-  [[nodiscard]] static Result<CsvTable> parse(std::string_view text, std::string where);
+  /// open quote, bytes that are not UTF-8, control characters. Refuses as kTooLarge more than `most_rows`, 1000
+  /// columns, 5 million values or 64 KiB in one value, while it reads and before it keeps them.
+  [[nodiscard]] static Result<CsvTable> parse(std::string_view text, std::string where,
+                                              std::size_t most_rows = kMostRows);
   /// A row that another reader has split. A table made of such rows has the same checks and messages. Refuses as
   /// parse() does.
   struct Row {
@@ -40,6 +46,8 @@ class CsvTable {
   [[nodiscard]] const std::string& field(std::size_t row, std::size_t column) const {
     return rows_[row].fields[column];
   }
+  /// An id or a name, which may be empty. Refuses what check_name() (plain_text.h) refuses.
+  [[nodiscard]] Result<std::string> name(std::size_t row, std::size_t column) const;
   /// Refuses what is not a finite number of magnitude <= `limit`.
   [[nodiscard]] Result<double> number(std::size_t row, std::size_t column, double limit = 1e12) const;
   [[nodiscard]] Result<int> integer(std::size_t row, std::size_t column, int lowest, int highest) const;
@@ -58,6 +66,7 @@ class CsvTable {
   std::string where_;
   std::vector<std::string> columns_;
   std::vector<Row> rows_;
+  std::size_t most_rows_ = kMostRows;
 };
 
 /// The field as it is written to a file, in quotes if necessary.

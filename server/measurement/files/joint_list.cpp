@@ -22,7 +22,9 @@ Result<JointList> parse_joint_csv(const std::string& text, const std::string& wh
   for (std::size_t row = 0; row < table->size(); ++row) {
     Result<PoseContext> context = columns->read(*table, row);
     if (!context) return tl::make_unexpected(context.error());
-    list.poses.push_back({columns->pose_id(*table, row), std::move(*context), table->line(row)});
+    Result<std::string> pose_id = columns->pose_id(*table, row);
+    if (!pose_id) return tl::make_unexpected(pose_id.error());
+    list.poses.push_back({std::move(*pose_id), std::move(*context), table->line(row)});
   }
   return list;
 }

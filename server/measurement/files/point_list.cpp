@@ -47,7 +47,9 @@ class PointReader {
   [[nodiscard]] Result<NamedPoint> read(std::size_t row) const {
     NamedPoint point;
     point.row = table_.line(row);
-    point.name = table_.field(row, name_);
+    Result<std::string> name = table_.name(row, name_);
+    if (!name) return tl::make_unexpected(name.error());
+    point.name = std::move(*name);
     if (point.name.empty()) return table_.refuse(row, "name is empty").of("name");
     if (positional_ && is_number(point.name) && point.name.find('.') != std::string::npos) {
       return table_.refuse(row, "name is '{}', which looks like a coordinate", point.name)

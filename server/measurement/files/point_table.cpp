@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kLeastFields = 4;
 constexpr std::size_t kMostFields = 9;
+constexpr std::size_t kLongestLineOfPoints = 1000;  // bytes: regular expressions recurse once for each
+constexpr std::size_t kMostComments = 500;          // each is searched for statements
 
 template <typename T>
 Status state(std::optional<T>& known, T said, const std::string& where, const char* what) {
@@ -39,13 +41,17 @@ Result<bool> is_radian(const std::string& word, const std::string& where, int li
       .with_text(word);
 }
 
-bool contains(const std::string& text, const char* pattern) { return std::regex_search(text, std::regex(pattern)); }
+bool contains(const std::string& text, const std::regex& pattern) { return std::regex_search(text, pattern); }
 
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
+/// In lower case, with one blank between words: the time to search would grow with the square of a run of blanks.
+std::string words_of(std::string_view text) {
+  std::string words;
+  for (const char c : text) {
+    const bool blank = std::isspace(static_cast<unsigned char>(c)) != 0;
+    if (blank && (words.empty() || words.back() == ' ')) continue;
+    words += blank ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return words;
 }
 
 Status read_unit_statements(const std::string& comment, const std::string& where, int line, Statements& statements) {
@@ -65,28 +71,30 @@ Status read_unit_statements(const std::string& comment, const std::string& where
 }
 
 Status read_statements(const TextLine& line, const std::string& where, Statements& statements) {
-  const std::string comment = lower_case(line.text);
+  static const std::regex kCylindric("cylindric"), kSpherical("spherical|\\bpolar"), kCartesian("cartesian");
+  static const std::regex kZyx(R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)"), kEuler(R"(\beuler\b)");
+  static const std::regex kFixed(R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)"), kUncertain("\\buncertaint");
+  const std::string comment = words_of(line.text);
   if (const Status units = read_unit_statements(comment, where, line.number, statements); !units) return units;
-  const auto coordinates = contains(comment, "cylindric")            ? std::optional(Coordinates::kCylindrical)
-                           : contains(comment, "spherical|\\bpolar") ? std::optional(Coordinates::kSpherical)
-                           : contains(comment, "cartesian")          ? std::optional(Coordinates::kCartesian)
-                                                                     : std::nullopt;
+  const auto coordinates = contains(comment, kCylindric)   ? std::optional(Coordinates::kCylindrical)
+                           : contains(comment, kSpherical) ? std::optional(Coordinates::kSpherical)
+                           : contains(comment, kCartesian) ? std::optional(Coordinates::kCartesian)
+                                                           : std::nullopt;
   if (coordinates) {
     if (const Status s = state(statements.coordinates, *coordinates, where, "coordinates"); !s) return s;
   }
-  const bool zyx = contains(comment, R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)");
-  if (!zyx && contains(comment, R"(\beuler\b)")) {
+  const bool zyx = contains(comment, kZyx);
+  if (!zyx && contains(comment, kEuler)) {
     return refused("Euler angles or parameters other than ZYX")
         .in(where)
         .at_row(line.number)
         .of("angles")
         .next("expected Euler ZYX or fixed XYZ");
   }
-  const auto behind = zyx ? std::optional(BehindCoordinates::kEulerZyx)
-                      : contains(comment, R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)")
-                          ? std::optional(BehindCoordinates::kFixedXyz)
-                      : contains(comment, "\\buncertaint") ? std::optional(BehindCoordinates::kUncertainties)
-                                                           : std::nullopt;
+  const auto behind = zyx                             ? std::optional(BehindCoordinates::kEulerZyx)
+                      : contains(comment, kFixed)     ? std::optional(BehindCoordinates::kFixedXyz)
+                      : contains(comment, kUncertain) ? std::optional(BehindCoordinates::kUncertainties)
+                                                      : std::nullopt;
   if (!behind) return {};
   return state(statements.behind, *behind, where, "columns behind the coordinates");
 }
@@ -204,6 +212,15 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
   return columns;
 }
 
+Status check_comments(const std::vector<TextLine>& lines, const std::string& where) {
+  const auto comments = static_cast<std::size_t>(
+      std::count_if(lines.begin(), lines.end(), [](const TextLine& line) { return line.comment; }));
+  if (comments <= kMostComments) return {};
+  return failure(ErrorCode::kTooLarge, "{} lines of comments, limit {}", comments, kMostComments)
+      .in(where)
+      .beyond(comments, kMostComments);
+}
+
 }  // namespace
 
 CoordinateNames coordinate_columns(Coordinates coordinates) {
@@ -219,15 +236,17 @@ CoordinateNames uncertainty_columns(Coordinates coordinates) {
 }
 
 Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
-  const std::vector<TextLine> lines = text_lines(text);
+  const Result<std::vector<TextLine>> read = text_lines(text, where, kLongestLineOfPoints);
+  if (!read) return tl::make_unexpected(read.error());
+  const std::vector<TextLine>& lines = *read;
+  if (const Status few = check_comments(lines, where); !few) return tl::make_unexpected(few.error());
   const auto first = std::find_if(lines.begin(), lines.end(), [](const TextLine& line) { return !line.comment; });
   if (first == lines.end()) return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
   const char separator = separator_of(first->text);
   PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
-  std::vector<CsvTable::Row> rows;
-  for (const TextLine& line : lines) {
-    if (!line.comment) rows.push_back({line.number, split_fields(line.text, separator)});
-  }
+  Result<std::vector<CsvTable::Row>> data = data_rows(lines, separator, where);
+  if (!data) return tl::make_unexpected(data.error());
+  std::vector<CsvTable::Row>& rows = *data;
   Header header = header_of(first->text, separator);
   int header_line = first->number;
   if (!header.columns.empty()) rows.erase(rows.begin());

@@ -222,6 +222,14 @@ std::vector<std::string> positional_names(std::size_t count) {
   return names.size() == count ? names : std::vector<std::string>{};
 }
 
+/// Turns a decimal comma into a point.
+void write_with_point(std::string& field) {
+  if (field.find(',') == std::string::npos) return;
+  std::string pointed = field;
+  std::replace(pointed.begin(), pointed.end(), ',', '.');
+  if (is_number(pointed)) field = std::move(pointed);
+}
+
 /// The file as a table; by position, with the names above.
 struct RoboDkTable {
   CsvTable table;
@@ -229,19 +237,19 @@ struct RoboDkTable {
 };
 
 Result<RoboDkTable> take_apart(const std::string& text, const std::string& where) {
-  std::vector<CsvTable::Row> rows;
-  char separator = ',';
-  for (const TextLine& line : text_lines(text)) {
-    if (line.comment) continue;
-    if (rows.empty()) separator = separator_of(line.text);
-    rows.push_back({line.number, split_fields(line.text, separator)});
-    for (std::string& field : rows.back().fields) {
-      std::string pointed = field;
-      std::replace(pointed.begin(), pointed.end(), ',', '.');
-      if (separator != ',' && is_number(pointed)) field = pointed;
+  const std::vector<TextLine> first = first_lines(text, 1);
+  if (first.empty()) return refused("empty file, expected joints and measured positions").in(where);
+  const char separator = separator_of(first.front().text);
+  Result<std::vector<CsvTable::Row>> read = text_lines(text, where).and_then([&](const std::vector<TextLine>& lines) {
+    return data_rows(lines, separator, where);
+  });
+  if (!read) return tl::make_unexpected(read.error());
+  std::vector<CsvTable::Row>& rows = *read;
+  if (separator != ',') {
+    for (CsvTable::Row& row : rows) {
+      for (std::string& field : row.fields) write_with_point(field);
     }
   }
-  if (rows.empty()) return refused("empty file, expected joints and measured positions").in(where);
   CsvTable::Row header = rows.front();
   const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), is_number);
   if (has_header) rows.erase(rows.begin());
@@ -302,8 +310,9 @@ Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t 
 Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
   Measurement measurement;
   measurement.row = table.line(row);
-  measurement.pose_id = columns.pose_id ? table.field(row, *columns.pose_id) : "";
-  if (measurement.pose_id.empty()) measurement.pose_id = fmt::format("{}", row + 1);
+  Result<std::string> pose_id = columns.pose_id ? table.name(row, *columns.pose_id) : std::string();
+  if (!pose_id) return tl::make_unexpected(pose_id.error());
+  measurement.pose_id = pose_id->empty() ? fmt::format("{}", row + 1) : std::move(*pose_id);
   measurement.context.index = static_cast<int>(row);
   measurement.context.q.resize(static_cast<Eigen::Index>(columns.joints.size()));
   for (std::size_t j = 0; j < columns.joints.size(); ++j) {
@@ -323,7 +332,7 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
 
 /// Names a tool for each TCP if there are several.
 Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, MeasurementBatch& batch) {
-  std::vector<std::vector<double>> tools;
+  std::map<std::vector<double>, std::size_t> tools;
   for (std::size_t row = 0; row < table.size(); ++row) {
     std::vector<double> tool;
     for (const std::size_t column : tcp) {
@@ -331,9 +340,8 @@ Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, Me
       if (!value) return tl::make_unexpected(value.error());
       tool.push_back(*value);
     }
-    auto at = std::find(tools.begin(), tools.end(), tool);
-    if (at == tools.end()) at = tools.insert(at, std::move(tool));
-    batch.measurements[row].context.tool = fmt::format("tcp-{}", at - tools.begin() + 1);
+    const std::size_t number = tools.emplace(std::move(tool), tools.size() + 1).first->second;
+    batch.measurements[row].context.tool = fmt::format("tcp-{}", number);
   }
   if (tools.size() > 1) return {};
   for (Measurement& m : batch.measurements) m.context.tool.clear();

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <optional>
 
 namespace trammel {
 
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
+constexpr std::size_t kMostLines = 1'000'000;
+constexpr std::size_t kMostDataLines = 100'000;
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(kBlanks);
@@ -32,18 +35,59 @@ std::string_view unquoted(std::string_view field) {
   return quoted ? trimmed(field.substr(1, field.size() - 2)) : field;
 }
 
+/// Reads a text line by line.
+class LineReader {
+ public:
+  explicit LineReader(std::string_view text) : text_(text) {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+  }
+
+  /// The next line that is not empty.
+  std::optional<TextLine> next() {
+    while (!text_.empty()) {
+      ++number_;
+      const std::size_t end = std::min(text_.find('\n'), text_.size());
+      const std::string_view line = trimmed(text_.substr(0, end));
+      text_.remove_prefix(std::min(end + 1, text_.size()));
+      if (line.empty()) continue;
+      const std::size_t mark = line.starts_with("//") ? 2 : line.starts_with('#') ? 1 : 0;
+      return TextLine{number_, trimmed(line.substr(mark)), mark > 0};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::string_view text_;
+  int number_ = 0;
+};
+
 }  // namespace
 
-std::vector<TextLine> text_lines(std::string_view text) {
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where, std::size_t longest) {
   std::vector<TextLine> lines;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = trimmed(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-    if (line.empty()) continue;
-    const std::size_t mark = line.starts_with("//") ? 2 : line.starts_with('#') ? 1 : 0;
-    lines.push_back({number, trimmed(line.substr(mark)), mark > 0});
+  std::size_t data = 0;
+  for (LineReader reader(text); const auto line = reader.next();) {
+    if (line->text.size() > longest)
+      return failure(ErrorCode::kTooLarge, "a line of {} bytes, limit {}", line->text.size(), longest)
+          .in(where)
+          .at_row(line->number)
+          .beyond(line->text.size(), longest);
+    data += line->comment ? 0 : 1;
+    if (lines.size() == kMostLines || data > kMostDataLines)
+      return failure(ErrorCode::kTooLarge, "more than {} lines, of data {}", kMostLines, kMostDataLines)
+          .in(where)
+          .beyond(lines.size() + 1, data > kMostDataLines ? kMostDataLines : kMostLines);
+    lines.push_back(*line);
+  }
+  return lines;
+}
+
+std::vector<TextLine> first_lines(std::string_view text, std::size_t count) {
+  std::vector<TextLine> lines;
+  for (LineReader reader(text); lines.size() < count;) {
+    const auto line = reader.next();
+    if (!line) break;
+    if (!line->comment) lines.push_back(*line);
   }
   return lines;
 }
@@ -64,6 +108,23 @@ std::vector<std::string> split_fields(std::string_view line, char separator) {
     if (end == line.size()) return fields;
     line.remove_prefix(end + 1);
   }
+}
+
+Result<std::vector<CsvTable::Row>> data_rows(const std::vector<TextLine>& lines, char separator,
+                                             const std::string& where) {
+  std::vector<CsvTable::Row> rows;
+  std::size_t values = 0;
+  for (const TextLine& line : lines) {
+    if (line.comment) continue;
+    rows.push_back({line.number, split_fields(line.text, separator)});
+    values += rows.back().fields.size();
+    if (values > CsvTable::kMostValues)
+      return failure(ErrorCode::kTooLarge, "more than {} values", CsvTable::kMostValues)
+          .in(where)
+          .at_row(line.number)
+          .beyond(values, CsvTable::kMostValues);
+  }
+  return rows;
 }
 
 bool is_number(std::string_view field) {

@@ -56,7 +56,13 @@ inline Vec exp_of_negative(Vec x) {
   const Vec shifted = x * 0x1.71547652b82fep+3 + kShift;
   const Vec r = x - (shifted - kShift) * 0x1.62e42fefa39efp-4;
   const Bits n = reinterpret_cast<Bits>(shifted);
-  const Vec power = reinterpret_cast<Vec>(__builtin_shuffle(kPowers, n) + (n << 49));
+#ifdef __clang__
+  const Bits powers = reinterpret_cast<Bits>(
+      _mm512_permutexvar_epi64(reinterpret_cast<__m512i>(n), reinterpret_cast<__m512i>(kPowers)));
+#else
+  const Bits powers = __builtin_shuffle(kPowers, n);
+#endif
+  const Vec power = reinterpret_cast<Vec>(powers + (n << 49));
   const Vec p = 0x1.0000000000000p+0 +
                 r * (0x1.0000000000287p+0 +
                      r * (0x1.0000000000172p-1 +

@@ -95,7 +95,28 @@ int distinct(const std::vector<const Measurement*>& judges, const Columns& among
   return static_cast<int>(poses.size());
 }
 
-GateVerdict no(std::string why) { return {false, "not in force: " + std::move(why)}; }
+constexpr const char* kAdvice = "activate it if it is wanted";
+
+GateVerdict yes(std::string why, const GateFigures& figures) { return {true, "in force: " + why, false, why, figures}; }
+
+GateVerdict no(const std::string& why, const GateFigures& figures, const std::string& advice = "") {
+  return {false, "not in force: " + why + (advice.empty() ? "" : "; " + advice), false, why, figures};
+}
+
+GateFigures figures_of(const PairedGain& gain) {
+  if (gain.poses == 0) return {};
+  return {gain.rms_before, gain.rms_after, gain.rms_before};
+}
+
+GateFigures without_limit(GateFigures figures) {
+  figures.limit.reset();
+  return figures;
+}
+
+GateFigures with_limit(GateFigures figures, double limit) {
+  figures.limit = limit;
+  return figures;
+}
 
 /// Candidate and model in force on the rows that both know.
 class Duel {
@@ -126,7 +147,7 @@ class Duel {
                                100 * covered, present_.version, 100 * GateOptions::kLeastCoverage));
     if (!shared_.empty() && apart() < GateOptions::kSame) return of_the_same();
     if (const std::string few = too_few(); !few.empty()) {
-      GateVerdict undecided = stays(few);
+      GateVerdict undecided = stays(few, without_limit(figures_of(shared_gain())));
       undecided.undecided = true;
       return undecided;
     }
@@ -140,9 +161,9 @@ class Duel {
     const JointVector& q = judges_[static_cast<std::size_t>(i)]->context.q;
     return ((q - parts.q_min + margin).array() >= 0).all() && ((parts.q_max + margin - q).array() >= 0).all();
   }
-  [[nodiscard]] GateVerdict stays(const std::string& why) const {
-    return no(
-        fmt::format("{}; version {} stays in force; activate the new one if it is wanted", why, present_.version));
+  [[nodiscard]] GateVerdict stays(const std::string& why, const GateFigures& figures = {}) const {
+    return no(why, figures,
+              fmt::format("version {} stays in force; activate the new one if it is wanted", present_.version));
   }
   [[nodiscard]] std::string lost_tools() const {
     std::string lost;
@@ -184,8 +205,9 @@ class Duel {
     return fmt::format("{} poses are held out to judge by in the joint ranges of version {}, {} are needed{}", poses,
                        present_.version, GateOptions::kFewestJudges, figures());
   }
+  [[nodiscard]] PairedGain shared_gain() const { return gain_of(before_.position, after_.position, shared_); }
   [[nodiscard]] std::string figures() const {
-    const PairedGain gain = gain_of(before_.position, after_.position, shared_);
+    const PairedGain gain = shared_gain();
     if (gain.poses == 0) return "";
     return fmt::format(" (held-out rms {:.4f} mm before, {:.4f} mm after)", to_mm(gain.rms_before),
                        to_mm(gain.rms_after));
@@ -202,8 +224,9 @@ class Duel {
         "{}, and of the tools that version {} does not know: held-out rms {:.4f} mm, "
         "nominal {:.4f} mm, {} poses",
         same, present_.version, to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses);
-    if (gain.rms_after > options_.accept_ratio * gain.rms_before) return stays(text);
-    return {true, "in force: " + text};
+    const double limit = options_.accept_ratio * gain.rms_before;
+    const GateFigures figures = with_limit(figures_of(gain), limit);
+    return gain.rms_after > limit ? stays(text, figures) : yes(text, figures);
   }
 
   /// Of a candidate that differs in where the base stands at most.
@@ -213,10 +236,11 @@ class Duel {
                   [&](const Measurement& m) { return !knows(candidate_, m) || !knows(present_.model, m); });
     if (newest.measurements.empty()) return stays(same);
     const PairedGain gain = paired_gain(present_.model, candidate_, newest);
-    if (!gain.beyond_chance()) return stays(same);
-    return {true, fmt::format("in force: {}, and it knows better where the base stands: held-out rms {:.4f} mm, before "
-                              "{:.4f} mm, {} poses",
-                              same, to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses)};
+    if (!gain.beyond_chance()) return stays(same, figures_of(gain));
+    return yes(fmt::format("{}, and it knows better where the base stands: held-out rms {:.4f} mm, before {:.4f} mm, "
+                           "{} poses",
+                           same, to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses),
+               figures_of(gain));
   }
 
   [[nodiscard]] bool better_by_own_account(const PairedGain& gain) const {
@@ -246,25 +270,29 @@ class Duel {
     const std::string text =
         fmt::format("held-out rms {:.4f} mm before (version {}), {:.4f} mm after, on the same {} poses",
                     to_mm(gain.rms_before), present_.version, to_mm(gain.rms_after), gain.poses);
+    GateFigures figures = figures_of(gain);
     if (why.empty()) {
       return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text, gain.z(),
-                               PairedGain::kBeyondChance));
+                               PairedGain::kBeyondChance),
+                   figures);
     }
     if (clearly_worse(turns, options_.accept_ratio, candidate_.cell().tracker.sigma_rotation))
-      return stays(fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)));
-    if (const std::string better = better_before(); !better.empty()) return stays(text + ": " + better);
-    return {true, fmt::format("in force: {}: {}", text, why)};
+      return stays(fmt::format("{}: {}, but its orientations are worse ({})", text, why, in_words(turns)), figures);
+    if (const std::string better = better_before(figures); !better.empty()) return stays(text + ": " + better, figures);
+    return yes(fmt::format("{}: {}", text, why), figures);
   }
 
   static std::string in_words(const PairedGain& turns) {
     return fmt::format("{:.4f} deg, before {:.4f} deg", to_deg(turns.rms_after), to_deg(turns.rms_before));
   }
 
-  /// What was served once and is better than the candidate on the same poses; empty where nothing is.
-  [[nodiscard]] std::string better_before() const {
+  /// What was served once and is better than the candidate on the same poses; empty where nothing is. Sets the limit
+  /// that it is.
+  [[nodiscard]] std::string better_before(GateFigures& figures) const {
     for (const ServedModel& other : served_before_) {
       const PairedGain gain = gain_of(rows_of(other.model, sessions_).position, after_.position, inside_);
       if (gain.poses > 0 && gain.rms_after > options_.accept_ratio * gain.rms_before) {
+        figures.limit = options_.accept_ratio * gain.rms_before;
         return fmt::format("version {} has {:.4f} mm on them, limit {} x that", other.version, to_mm(gain.rms_before),
                            options_.accept_ratio);
       }
@@ -290,7 +318,7 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   for (const Measurement* m : judges_in(question.sessions)) {
     if (knows(question.candidate, *m)) all.measurements.push_back(*m);
   }
-  if (all.measurements.empty()) return no("no pose that was held out has its tools; activate it if it is wanted");
+  if (all.measurements.empty()) return no("no pose that was held out has its tools", {}, kAdvice);
   const CompensatedModel::LevelErrors errors = question.candidate.errors_B(all);
   const PairedGain gain = paired_gain(errors.nominal, errors.compensated);
   const Rows nominal = rows_of(question.candidate, question.sessions, JudgedLevel::kNominal);
@@ -302,15 +330,18 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   const bool better = options.bar == Bar::kBetterBeyondChance ? gain.beyond_chance() : gain.rms_after < gain.rms_before;
   const std::string text = fmt::format("held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", to_mm(gain.rms_after),
                                        to_mm(gain.rms_before), gain.poses);
-  if (!better) return no(text + ": not better; activate it if it is wanted");
+  const GateFigures figures = figures_of(gain);
+  if (!better) return no(text + ": not better", figures, kAdvice);
   if (arm.rms_after > options.accept_ratio * arm.rms_before && arm.z() < kUnclear) {
     return no(fmt::format("{}: it only moves the base, the arm itself is worse ({:.4f} mm, nominal {:.4f} mm)", text,
-                          to_mm(arm.rms_after), to_mm(arm.rms_before)));
+                          to_mm(arm.rms_after), to_mm(arm.rms_before)),
+              figures);
   }
   if (clearly_worse(turns, options.accept_ratio, question.candidate.cell().tracker.sigma_rotation))
     return no(fmt::format("{}: its orientations are worse ({:.4f} deg, nominal {:.4f} deg)", text,
-                          to_deg(turns.rms_after), to_deg(turns.rms_before)));
-  return {true, "in force: " + text};
+                          to_deg(turns.rms_after), to_deg(turns.rms_before)),
+              figures);
+  return yes(text, figures);
 }
 
 /// How many times farther off than expected the median judge of the session is; not a number where it knows none.
@@ -346,14 +377,14 @@ std::vector<JudgingSession> sessions_of_today(const GateQuestion& question) {
 
 GateVerdict judge(const GateQuestion& question, const GateOptions& options) {
   const std::vector<const Measurement*> judges = judges_in(question.sessions);
-  if (judges.empty()) return no("no pose was held out to judge it; activate it if it is wanted");
+  if (judges.empty()) return no("no pose was held out to judge it", {}, kAdvice);
   const Rows rows = rows_of(question.candidate, question.sessions);
   const bool overflows =
       std::any_of(judges.begin(), judges.end(), [&, i = Eigen::Index{0}](const Measurement* m) mutable {
         const Eigen::Index at = i++;
         return knows(question.candidate, *m) && !rows.position.col(at).allFinite();
       });
-  if (overflows) return no("its held-out rms is not finite");
+  if (overflows) return no("its held-out rms is not finite", {});
   if (question.in_force == nullptr) return judge_first(question, options);
   return Duel(question, sessions_of_today(question), options).verdict();
 }

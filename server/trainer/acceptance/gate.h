@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,10 +44,19 @@ struct GateQuestion {
   std::size_t first_new = 0;               ///< from this one on they came after the model in force was trained
 };
 
+/// What the two leave of the same judges, m rms; empty where they were not held against each other.
+struct GateFigures {
+  std::optional<double> before;  ///< of the one in force; of a first model, nominal
+  std::optional<double> after;   ///< of the candidate
+  std::optional<double> limit;   ///< what `after` had to be below
+};
+
 struct GateVerdict {
   bool put_in_force = false;
   std::string message;     ///< before, after, limit and why
   bool undecided = false;  ///< not enough to judge by: nothing speaks against the candidate, a person decides
+  std::string why = {};    ///< of the message: the reason alone
+  GateFigures figures = {};
 };
 
 [[nodiscard]] GateVerdict judge(const GateQuestion& question, const GateOptions& options);

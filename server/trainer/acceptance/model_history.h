@@ -4,13 +4,16 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/gate.h"
+#include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/served_cells.h"
 
 namespace trammel {
@@ -19,16 +22,26 @@ namespace trammel {
 struct Candidate {
   const CompensatedModel& model;
   StoredJob job;
-  Bar bar = Bar::kBetter;
-  std::vector<JudgingSession> sessions;  ///< oldest first
-  std::string remarks;                   ///< go with the outcome
+  std::string remarks = {};                      ///< go with the outcome
+  std::optional<std::int64_t> peak_memory = {};  ///< bytes, see JobOutcome
+  std::optional<double> processor_time = {};     ///< s
 };
+
+/// Holds the candidate against others, wherever that is computed.
+using Judging = std::function<Result<GateVerdict>(const Opponents& opponents)>;
 
 /// What became of it.
 struct Kept {
   int version = 0;
   bool in_force = false;
   std::string message;  ///< the figures it was judged by, the limit and why
+  JobOutcome outcome;   ///< the same as data
+};
+
+/// A change of what is in force, as somebody asks for it.
+struct ChangeRequest {
+  ChangeId id = {};                  ///< it happens once under this id
+  std::optional<int> expected = {};  ///< the version served now, 0: none; with another one (kConflict) nothing changes
 };
 
 /// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
@@ -41,44 +54,81 @@ class ModelHistory {
   /// that cell can happen: it must not call back into what changes models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
-  /// `store` and `registry` outlive it.
-  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry, double accept_ratio);
+  /// `store` and `registry` outlive it. It is where the registry's models come from.
+  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry);
+  ~ModelHistory();
+  ModelHistory(const ModelHistory&) = delete;
+  ModelHistory& operator=(const ModelHistory&) = delete;
 
   void set_listener(Listener listener) { listener_ = std::move(listener); }
-  /// Publishes the version that the store has in force, if any. Refuses one that does not load or fit the cell.
-  [[nodiscard]] Status publish_from_store(const std::string& cell);
+  /// Announces the version that the store has in force, if any: it is loaded when it is asked for. Where it cannot be
+  /// loaded, the last one that served before it is, and troubles() says so. One that does not fit the cell is not
+  /// served, and nothing in its place.
+  [[nodiscard]] Status announce_from_store(const std::string& cell);
+  /// Cells that are not served with the model they should be served with, one sentence each.
+  [[nodiscard]] std::vector<std::string> troubles() const;
 
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
-  /// Puts a stored version in force and publishes it.
-  [[nodiscard]] Status activate(const std::string& cell, int version);
-  /// Back to the version in force before, or the last one before it that can be served; returns it.
-  [[nodiscard]] Result<int> rollback(const std::string& cell);
+  /// Puts a stored version in force and publishes it. A version that is served already is not published again.
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {});
+  /// Back to the version in force before, or the last one before it that can be served; returns it. Refuses (kBusy)
+  /// where others change what is in force all the time.
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {});
   /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
   /// same model is there already. Refuses one of another cell, robot or tool.
-  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text);
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
 
-  /// Stores the model, ends its job and, if judge() says so, puts it in force. What the job may release leaves
-  /// quarantine where the model goes in force, and where too few poses can judge it.
-  [[nodiscard]] Result<Kept> keep(const Candidate& candidate);
+  /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may release leaves
+  /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
+  /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
+  /// `stop` was requested.
+  [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop = {});
 
  private:
   [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
   /// Of a model that the store has put in force; the cell's lock is held.
-  void put_in_force(ServedModel model);
-  /// Of the candidate against `present`; null: none in force.
-  [[nodiscard]] Result<GateVerdict> verdict(const Candidate& candidate, const ServedModel* present) const;
-  /// The last versions that served the cell before the one in force, as far as they load.
-  [[nodiscard]] Result<std::vector<ServedModel>> served_before(const std::string& cell) const;
+  void put_in_force(ServedModelPtr model);
+  /// What the cell is to be served with.
+  [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
+  /// Empty: there is none any more.
+  void set_trouble(const std::string& cell, const std::string& trouble);
+  /// The cell's lock is held, or what it guards is looked at again when it is.
+  [[nodiscard]] Status check_expected(const std::string& cell, const ChangeRequest& request) const;
+  /// Where a rollback leads.
+  struct WayBack {
+    int version_now = 0;
+    std::vector<int> before;  ///< Store::previous_in_force()
+    bool operator==(const WayBack&) const = default;
+  };
+  [[nodiscard]] Result<WayBack> way_back(const std::string& cell) const;
+  /// The first of `before` that can be served: how many steps back it is, and the model.
+  [[nodiscard]] Result<std::pair<int, ServedModelPtr>> load_first(const std::string& cell,
+                                                                  const std::vector<int>& before) const;
+  /// What is to be said and stored of a candidate that was judged.
+  struct Judged {
+    bool put_in_force = false, release = false;
+    std::string message;
+    JobOutcome outcome;
+  };
+  [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const Judging& judging,
+                                      const ServedModel* present) const;
+  /// The cell's lock is held.
+  [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged);
+  /// What a candidate of the cell is held against; `present` null: none in force.
+  [[nodiscard]] Result<Opponents> opponents(const std::string& cell, const ServedModel* present) const;
+  /// The last versions that served the cell before the one in force, as far as they can be read.
+  [[nodiscard]] Result<std::vector<ModelText>> served_before(const std::string& cell) const;
   /// The version marked in force, where it could not be loaded.
-  [[nodiscard]] Result<std::optional<StoredModel>> record_not_loaded(const std::string& cell) const;
+  [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(const std::string& cell) const;
 
   const ServedCells cells_;
   Store& store_;
   ModelRegistry& registry_;
-  const double accept_ratio_;
   Listener listener_;
   std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
+  mutable Mutex troubles_mutex_;           // taken last
+  std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
 };
 
 }  // namespace trammel

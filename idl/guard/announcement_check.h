@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+
+#include "idl/guard/dropped.h"
+#include "idl/guard/edited_message.h"
+#include "idl/guard/rtps_bytes.h"
+
+namespace trammel::wire {
+
+/// Inline QoS at the front of `rest`, which is shortened by it. `names_source`: a key hash is an endpoint's GUID and
+/// must be of `source`.
+[[nodiscard]] std::optional<Dropped> check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says_status);
+
+/// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its
+/// parameter, GUIDs of `source`. Parameters that only this library reads, that nobody here needs and whose parsers
+/// trust what they read (type objects, content filters) are blanked in `message`. Leases are cut to kLongestLease.
+[[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message);
+
+/// The payload of a message of the authentication handshake, which comes before anybody is known.
+[[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload);
+
+inline constexpr std::uint32_t kLongestLease_s = 300;
+
+}  // namespace trammel::wire

@@ -1,0 +1,65 @@
+#include "idl/guard/guard.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "idl/guard/message_check.h"
+
+namespace trammel::wire {
+namespace {
+
+constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message",       "lengths",
+                                                             "statistics submessage", "in another's name",
+                                                             "sequence numbers",      "number sets",
+                                                             "parameter lists",       "fragments",
+                                                             "sample size",           "unfinished samples",
+                                                             "counts that jump",      "numbers skipped",
+                                                             "too many participants", "fragments that were never sent",
+                                                             "security submessages"};
+
+}  // namespace
+
+const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
+
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts)
+    : largest_sample_(largest_sample), counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()) {}
+
+std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
+  EditedMessage edited(message);
+  if (const auto dropped = MessageCheck({largest_sample_, socket, now}, memory_, message, edited).run()) {
+    counts_->add(*dropped);
+    return std::nullopt;
+  }
+  return edited.bytes();
+}
+
+void Guard::sent(Bytes message) {
+  if (message.size() < kHeader) return;
+  Bytes rest = message.subspan(kHeader), to{};
+  while (const auto submessage = next_submessage(rest)) {
+    if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {
+      to = submessage->body.first(kPrefix);
+    } else if (submessage->id == kAckNack && !to.empty()) {
+      confirm(to, *submessage);
+    } else if (submessage->id == kDataFrag) {
+      const auto fragments = fragments_of(*submessage);
+      if (!fragments || fragments->size == 0) continue;
+      const MutexLock lock(memory_.mutex);
+      memory_.sent.add(*fragments);
+    }
+  }
+}
+
+void Guard::confirm(Bytes to, const Submessage& acknack) {
+  Reader reader(acknack.body, acknack.little_endian());
+  if (!reader.u32()) return;
+  const auto writer = reader.entity();
+  const auto base = reader.sequence_number();
+  if (!writer || !base) return;
+  const MutexLock lock(memory_.mutex);
+  memory_.sequences.confirmed(key_of(to, *writer), std::max<std::int64_t>(0, *base - 1),
+                              std::chrono::steady_clock::now());
+}
+
+}  // namespace trammel::wire

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "idl/guard/dropped.h"
+#include "idl/guard/guard_memory.h"
+#include "idl/guard/rtps_bytes.h"
+
+namespace trammel::wire {
+
+/// Stands before the library's receiver: drops what would end, stop or flood it, and passes everything that an honest
+/// participant sends, secured or not. README.md says what is dropped and why. Reads hostile bytes: it never reads
+/// beyond a message, allocates nothing per packet and throws nothing. Thread-safe; it takes its one lock only for
+/// messages whose sender it must remember.
+class Guard {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  /// `largest_sample`: bytes that a sample of any topic may have.
+  explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr);
+
+  /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
+  /// Empty: nothing. Valid until the calling thread's next call.
+  [[nodiscard]] std::optional<Bytes> check(Bytes message, std::uint64_t socket,
+                                           Time now = std::chrono::steady_clock::now());
+  /// A message of our own that leaves.
+  void sent(Bytes message);
+
+  [[nodiscard]] const DropCounts& counts() const { return *counts_; }
+
+ private:
+  void confirm(Bytes to, const Submessage& acknack);
+
+  const std::uint32_t largest_sample_;
+  const std::shared_ptr<DropCounts> counts_;
+  GuardMemory memory_;
+};
+
+}  // namespace trammel::wire

@@ -1,0 +1,301 @@
+#include "idl/guard/message_check.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "idl/guard/announcement_check.h"
+
+namespace trammel::wire {
+namespace {
+
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kLiveliness = 0x000200c2;
+constexpr std::uint32_t kSecureAnnouncer = 0xff0101c2, kSecurePublications = 0xff0003c2,
+                        kSecureSubscriptions = 0xff0004c2, kSecureLiveliness = 0xff0200c2;
+constexpr std::uint32_t kHandshake = 0x000201c3;
+constexpr std::uint32_t kBuiltIn = 0xc0;  // in the last octet of an entity id
+constexpr std::uint32_t kMostBits = 256;
+constexpr std::uint32_t kMostHistory = 1u << 24;  // samples that a HEARTBEAT may offer
+constexpr std::size_t kStatisticsBody = 56;       // a locator, a time, a sequence; as this library lays it out
+constexpr std::size_t kSmallestFragment = 64;     // the library keeps a list in the first octets of each
+
+bool is_announcement_writer(std::uint32_t writer) {
+  return writer == kAnnouncer || writer == kPublications || writer == kSubscriptions || writer == kSecureAnnouncer ||
+         writer == kSecurePublications || writer == kSecureSubscriptions;
+}
+bool is_liveliness_writer(std::uint32_t writer) { return writer == kLiveliness || writer == kSecureLiveliness; }
+bool is_number(std::optional<std::int64_t> number) { return number && *number >= 1 && *number <= kLargestNumber; }
+
+/// A set of numbers behind its base.
+struct Set {
+  std::optional<Dropped> fault;
+  std::uint32_t bits = 0;
+  std::uint32_t highest = 0;  // from the base; 0 also when none is set
+};
+Set take_set(Reader& reader) {
+  const auto bits = reader.u32();
+  if (!bits) return {Dropped::kLength};
+  if (*bits > kMostBits) return {Dropped::kNumberSet};
+  Set set{{}, *bits};
+  for (std::uint32_t i = 0; i < (*bits + 31) / 32; ++i) {
+    const auto word = reader.u32();
+    if (!word) return {Dropped::kNumberSet};
+    const std::uint32_t used = *bits - 32 * i;  // of this word; the rest of it counts for nothing
+    const std::uint32_t set_bits = used >= 32 ? *word : *word & ~(UINT32_MAX >> used);
+    if (set_bits != 0) set.highest = 32 * i + 31 - static_cast<std::uint32_t>(std::countr_zero(set_bits));
+  }
+  return set;
+}
+
+struct Head {
+  std::uint32_t reader, writer;
+};
+std::optional<Head> take_head(Reader& reader) {
+  const auto to = reader.entity(), from = reader.entity();
+  if (!to || !from) return std::nullopt;
+  return Head{*to, *from};
+}
+
+}  // namespace
+
+std::optional<Fragments> fragments_of(const Submessage& submessage) {
+  Reader reader(submessage.body, submessage.little_endian());
+  if (!reader.take(4)) return std::nullopt;
+  const auto head = take_head(reader);
+  const auto number = reader.sequence_number();
+  const auto first = reader.u32();
+  const auto count = reader.u16(), size = reader.u16();
+  const auto sample_size = reader.u32();
+  if (!head || !number || !first || !count || !size || !sample_size) return std::nullopt;
+  return Fragments{head->writer, *number, *first, *count, *size, *sample_size};
+}
+
+std::optional<Dropped> MessageCheck::run() {
+  if (const Fault fault = check_header()) return fault;
+  source_ = message_.subspan(kPrefixAt, kPrefix);
+  Bytes rest = message_.subspan(kHeader);
+  while (!rest.empty()) {
+    const auto submessage = next_submessage(rest);
+    if (!submessage) return Dropped::kLength;
+    if (!rest.empty() && submessage->body.size() % 4 != 0) return Dropped::kLength;
+    if (const Fault fault = check_submessage(*submessage, rest)) return fault;
+  }
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_header() {
+  constexpr std::array<unsigned char, 5> kBegin = {'R', 'T', 'P', 'S', 2};
+  if (message_.size() < kHeader || message_.size() > EditedMessage::kMost) return Dropped::kHeader;
+  if (!std::equal(kBegin.begin(), kBegin.end(), message_.begin())) return Dropped::kHeader;
+  const Bytes prefix = message_.subspan(kPrefixAt, kPrefix);
+  if (std::all_of(prefix.begin(), prefix.end(), [](unsigned char b) { return b == 0; })) return Dropped::kSource;
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_submessage(const Submessage& submessage, Bytes behind) {
+  const auto at_least = [&](std::size_t size) -> Fault {
+    return submessage.body.size() < size ? Fault(Dropped::kLength) : Fault();
+  };
+  switch (submessage.id) {
+    case kData:
+      return check_data(submessage);
+    case kDataFrag:
+      return check_fragments(submessage);
+    case kHeartbeat:
+      return check_heartbeat(submessage);
+    case kHeartbeatFrag:
+      return check_heartbeat_frag(submessage);
+    case kGap:
+      return check_gap(submessage);
+    case kAckNack:
+      return check_acknack(submessage);
+    case kNackFrag:
+      return check_nack_frag(submessage);
+    case kInfoTimestamp:
+      return (submessage.flags & kInlineQos) != 0 ? Fault() : at_least(8);
+    case kInfoDestination:
+      return at_least(kPrefix);
+    case kInfoSource:
+      return Dropped::kSource;
+    case kStatistics:
+      return check_statistics(submessage, behind);
+    case kSecureBody:
+    case kSecurePrefix:
+    case kSecurePostfix:
+    case kSecureRtpsPrefix:
+    case kSecureRtpsPostfix:
+      return check_secured(submessage, behind);
+    default:
+      return {};  // the library skips it
+  }
+}
+
+std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
+  Reader reader(submessage.body, submessage.little_endian());
+  if (!reader.u16()) return Dropped::kLength;
+  const auto to_inline_qos = reader.u16();
+  Reader after(reader.rest(), reader.little_endian());
+  const auto head = take_head(reader);
+  const auto number = reader.sequence_number();
+  if (!to_inline_qos || !head || !number || *to_inline_qos < 16 || !after.take(*to_inline_qos)) return Dropped::kLength;
+  if (!is_number(number)) return Dropped::kNumber;
+
+  const bool announcement = is_announcement_writer(head->writer);
+  bool says_status = false;
+  if ((submessage.flags & kInlineQos) != 0) {
+    if (const Fault fault = check_inline_qos(after, source_, announcement, says_status)) return fault;
+  }
+  const bool payload = (submessage.flags & kPayload) != 0, key = (submessage.flags & kKey) != 0;
+  if (payload && key) return Dropped::kLength;
+  if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
+  if (after.rest().size() < 4) return Dropped::kLength;
+  return payload ? check_announced(head->writer, after.rest()) : Fault();
+}
+
+std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes payload) {
+  if (is_announcement_writer(writer)) {
+    if (const Fault fault = check_announcement(payload, source_, edited_)) return fault;
+  }
+  if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
+  if (writer == kHandshake) return check_handshake(payload);
+  if (writer != kAnnouncer) return {};
+  const MutexLock lock(memory_.mutex);
+  return memory_.participants.announced(source_, received_.socket, received_.now);
+}
+
+std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {
+  const auto fragments = fragments_of(submessage);
+  if (!fragments) return Dropped::kLength;
+  if (!is_number(fragments->sequence_number)) return Dropped::kNumber;
+  if (fragments->sample_size > received_.largest_sample) return Dropped::kSampleSize;
+  if ((fragments->writer & kBuiltIn) == kBuiltIn) return Dropped::kFragment;
+  if (fragments->size < kSmallestFragment || fragments->first < 1 || fragments->count < 1) return Dropped::kFragment;
+  const std::uint64_t last = std::uint64_t{fragments->first} + fragments->count - 1;
+  if (last > fragments->of_sample()) return Dropped::kFragment;
+
+  Reader reader(submessage.body, submessage.little_endian());
+  reader.u16();
+  const auto to_inline_qos = reader.u16();
+  Reader after(reader.rest(), reader.little_endian());
+  if (!to_inline_qos || *to_inline_qos < 28 || !after.take(*to_inline_qos)) return Dropped::kLength;
+  bool says_status = false;
+  if ((submessage.flags & kInlineQos) != 0) {
+    if (const Fault fault = check_inline_qos(after, source_, false, says_status)) return fault;
+  }
+  const std::uint64_t begin = std::uint64_t{fragments->first - 1} * fragments->size;
+  const std::uint64_t end = std::min<std::uint64_t>(last * fragments->size, fragments->sample_size);
+  if (after.rest().size() < end - begin) return Dropped::kFragment;
+  const MutexLock lock(memory_.mutex);
+  return memory_.unfinished.add(source_, *fragments, received_.now);
+}
+
+std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessage) {
+  Reader reader(submessage.body, submessage.little_endian());
+  const auto head = take_head(reader);
+  const Bytes first_field = reader.rest();
+  const auto first = reader.sequence_number(), last = reader.sequence_number();
+  const auto count = reader.u32();
+  if (!head || !first || !last || !count) return Dropped::kLength;
+  if (!is_number(first) || *last < *first - 1 || *last > kLargestNumber) return Dropped::kNumber;
+  if (*last - *first > kMostHistory) return Dropped::kNumber;
+  const MutexLock lock(memory_.mutex);
+  if (!memory_.sequences.count(key_of(source_, head->writer), *count, received_.now)) return Dropped::kCount;
+  const std::int64_t allowed = memory_.sequences.heartbeat(key_of(source_, head->writer), *first, received_.now);
+  if (allowed < *first) edited_.put_sequence_number(first_field.first(8), allowed, reader.little_endian());
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_heartbeat_frag(const Submessage& submessage) {
+  Reader reader(submessage.body, submessage.little_endian());
+  const auto head = take_head(reader);
+  const auto number = reader.sequence_number();
+  const auto last = reader.u32(), count = reader.u32();
+  if (!head || !number || !last || !count) return Dropped::kLength;
+  return is_number(number) && *last > 0 ? Fault() : Fault(Dropped::kNumber);
+}
+
+std::optional<Dropped> MessageCheck::check_gap(const Submessage& submessage) {
+  Reader reader(submessage.body, submessage.little_endian());
+  const auto head = take_head(reader);
+  const Bytes fields = reader.rest();
+  const auto start = reader.sequence_number(), base = reader.sequence_number();
+  if (!head || !start || !base) return Dropped::kLength;
+  if (!is_number(start) || !is_number(base) || *base < *start) return Dropped::kNumber;
+  if (const Set set = take_set(reader); set.fault) return set.fault;
+  const MutexLock lock(memory_.mutex);
+  const auto range = memory_.sequences.gap(key_of(source_, head->writer), {*start, *base}, received_.now);
+  if (range.start == *start && range.end == *base) return {};
+  if (range.end <= range.start) return Dropped::kSkipped;
+  edited_.put_sequence_number(fields.first(8), range.start, reader.little_endian());
+  if (range.end == *base) return {};
+  edited_.put_sequence_number(fields.subspan(8, 8), range.end, reader.little_endian());
+  edited_.put(fields.subspan(16, 4), std::uint32_t{0}, reader.little_endian());  // none beyond it
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_acknack(const Submessage& submessage) {
+  constexpr std::uint32_t kAcks = 0x01000000;  // no entity kind: these count apart from HEARTBEATs
+  Reader reader(submessage.body, submessage.little_endian());
+  const auto head = take_head(reader);
+  const auto base = reader.sequence_number();
+  if (!head || !base) return Dropped::kLength;
+  if (*base < 0 || *base > kLargestNumber) return Dropped::kNumber;
+  if (const Set set = take_set(reader); set.fault) return set.fault;
+  const auto count = reader.u32();
+  if (!count) return Dropped::kLength;
+  return check_count(head->reader, head->writer ^ kAcks, *count);
+}
+
+std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessage) {
+  constexpr std::uint32_t kNacks = 0x02000000;
+  Reader reader(submessage.body, submessage.little_endian());
+  const auto head = take_head(reader);
+  const auto number = reader.sequence_number();
+  const auto base = reader.u32();
+  if (!head || !number || !base) return Dropped::kLength;
+  if (!is_number(number) || *base < 1) return Dropped::kNumber;
+  const Set set = take_set(reader);
+  if (set.fault) return set.fault;
+  const auto count = reader.u32();
+  if (!count) return Dropped::kLength;
+  if (std::uint64_t{*base} + kMostBits > UINT32_MAX) return Dropped::kNotSent;
+  {
+    const MutexLock lock(memory_.mutex);
+    if (!memory_.sent.has(head->writer, *number, *base + set.highest)) return Dropped::kNotSent;
+  }
+  return check_count(head->reader, head->writer ^ kNacks, *count);
+}
+
+std::optional<Dropped> MessageCheck::check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count) {
+  const MutexLock lock(memory_.mutex);
+  const std::uint32_t mixed = endpoint * 0x9e3779b1u ^ tag;
+  return memory_.sequences.count(key_of(source_, mixed), count, received_.now) ? Fault() : Fault(Dropped::kCount);
+}
+
+std::optional<Dropped> MessageCheck::check_statistics(const Submessage& submessage, Bytes behind) {
+  if (!behind.empty() || submessage.body.size() != kStatisticsBody) return Dropped::kStatistics;
+  edited_.cut_to(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4);
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_secured(const Submessage& submessage, Bytes behind) {
+  constexpr std::size_t kTransformation = 20, kMac = 16;
+  const std::size_t size = submessage.body.size();
+  const auto counted = [&](std::size_t before, std::size_t each) {
+    Reader reader(submessage.body, false);
+    const auto skipped = reader.take(before);
+    const auto count = reader.u32();
+    return skipped && count && std::uint64_t{*count} * each <= reader.rest().size();
+  };
+  switch (submessage.id) {
+    case kSecurePrefix:
+    case kSecureRtpsPrefix:
+      return size >= kTransformation && !behind.empty() ? Fault() : Fault(Dropped::kSecurity);
+    case kSecureBody:
+      return counted(0, 1) && !behind.empty() ? Fault() : Fault(Dropped::kSecurity);
+    default:
+      return counted(kMac, 4 + kMac) ? Fault() : Fault(Dropped::kSecurity);
+  }
+}
+
+}  // namespace trammel::wire

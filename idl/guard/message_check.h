@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+
+#include "idl/guard/dropped.h"
+#include "idl/guard/edited_message.h"
+#include "idl/guard/guard_memory.h"
+#include "idl/guard/rtps_bytes.h"
+
+namespace trammel::wire {
+
+/// The fields of a DATA_FRAG; empty when it is too short.
+[[nodiscard]] std::optional<Fragments> fragments_of(const Submessage& submessage);
+
+/// One message on its way through the guard.
+class MessageCheck {
+ public:
+  struct Circumstances {
+    std::uint32_t largest_sample = 0;  // bytes
+    std::uint64_t socket = 0;
+    SequenceWatch::Time now{};
+  };
+  MessageCheck(Circumstances received, GuardMemory& memory, Bytes message, EditedMessage& edited)
+      : received_(received), memory_(memory), message_(message), edited_(edited) {}
+
+  [[nodiscard]] std::optional<Dropped> run();
+
+ private:
+  using Fault = std::optional<Dropped>;
+
+  Fault check_header();
+  Fault check_submessage(const Submessage& submessage, Bytes behind);
+  Fault check_data(const Submessage& submessage);
+  Fault check_announced(std::uint32_t writer, Bytes payload);
+  Fault check_fragments(const Submessage& submessage);
+  Fault check_heartbeat(const Submessage& submessage);
+  Fault check_heartbeat_frag(const Submessage& submessage);
+  Fault check_gap(const Submessage& submessage);
+  Fault check_acknack(const Submessage& submessage);
+  Fault check_nack_frag(const Submessage& submessage);
+  Fault check_statistics(const Submessage& submessage, Bytes behind);
+  Fault check_secured(const Submessage& submessage, Bytes behind);
+  Fault check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count);
+
+  const Circumstances received_;
+  GuardMemory& memory_;
+  const Bytes message_;
+  EditedMessage& edited_;
+  Bytes source_{};  // prefix
+};
+
+}  // namespace trammel::wire

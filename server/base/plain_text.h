@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "server/base/result.h"
+
+/// What names, ids and messages may hold. Whoever reads a name from outside checks it here; whoever shows a foreign
+/// text to people shows it by shown().
+namespace trammel {
+
+constexpr std::size_t kMostNameBytes = 256;  ///< of an id or a name, unless its place is smaller
+
+/// Whether the bytes are UTF-8 (RFC 3629) without NUL.
+[[nodiscard]] bool is_utf8(std::string_view text);
+/// Whether the text is UTF-8 without control characters: C0, DEL, C1, line and paragraph separators, marks that change
+/// the direction of writing. A terminal or a log shows it as it is.
+[[nodiscard]] bool is_plain(std::string_view text);
+/// The same, with tabs and line ends allowed: a field of a table, the text of a file.
+[[nodiscard]] bool is_plain_lines(std::string_view text);
+
+/// Refuses a name that is not plain or longer than `limit_bytes`. `what` says whose it is: `pose_id`. An empty name is
+/// fine here.
+[[nodiscard]] Status check_name(std::string_view name, const char* what, std::size_t limit_bytes = kMostNameBytes);
+
+/// The text with everything that is not plain spelled out, as JSON spells it: `\u001b`, `\u009b`; a byte that is no
+/// UTF-8 as `\xff`. Plain text stays as it is.
+[[nodiscard]] std::string shown(std::string_view text);
+/// The same, but tabs and line feeds stay.
+[[nodiscard]] std::string shown_lines(std::string_view text);
+/// shown(), cut after `most_bytes`.
+[[nodiscard]] std::string shown_short(std::string_view text, std::size_t most_bytes = 40);
+
+}  // namespace trammel

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/robot/cell.h"
+
+namespace trammel {
+
+/// What a training takes from the cell file, where nothing else was asked for.
+struct SpecUse {
+  bool error_sources = true;
+  bool bias = true;
+};
+
+/// What a training would refuse of the cell's own `model`: a bias that is none, an error source that is unknown, stands
+/// twice or asks for what the cell has not. Each error is kRefused and names `file`, row and key.
+[[nodiscard]] std::vector<Error> check_model_spec(const Cell& cell, const std::string& file, SpecUse use = {});
+
+}  // namespace trammel

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "idl/transport.h"
+
+namespace trammel {
+
+/// A writer of one reply topic to one client.
+class ReplyWriter final : private wire::dds::DataWriterListener {
+ public:
+  /// Null when DDS refuses. `matched` is called when a reader has been matched, in a thread of DDS.
+  [[nodiscard]] static std::shared_ptr<ReplyWriter> make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
+                                                         std::function<void()> matched);
+  ~ReplyWriter() override;
+  ReplyWriter(const ReplyWriter&) = delete;
+  ReplyWriter& operator=(const ReplyWriter&) = delete;
+
+  [[nodiscard]] bool has_reader() const { return readers_ > 0; }
+  /// Does not wait for the reader: what it does not take in time is overwritten.
+  [[nodiscard]] bool write(void* reply) { return writer_->write(reply); }
+
+ private:
+  ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched);
+  void on_publication_matched(wire::dds::DataWriter* writer,
+                              const wire::dds::PublicationMatchedStatus& status) override;
+
+  wire::dds::Publisher& publisher_;
+  const std::function<void()> matched_;
+  wire::dds::DataWriter* writer_ = nullptr;
+  std::atomic<int> readers_{0};
+};
+
+/// A publisher in the partition of a client, and its writers. Not thread-safe.
+class ReplyChannel {
+ public:
+  using Writer = std::shared_ptr<ReplyWriter>;
+
+  ReplyChannel(wire::dds::DomainParticipant& participant, const std::string& partition);
+  ~ReplyChannel();
+  ReplyChannel(const ReplyChannel&) = delete;
+  ReplyChannel& operator=(const ReplyChannel&) = delete;
+
+  /// Null when DDS refuses.
+  [[nodiscard]] wire::dds::Publisher* publisher() const { return publisher_; }
+  void add(const std::string& topic, Writer writer) { writers_[topic] = std::move(writer); }
+  [[nodiscard]] Writer writer(const std::string& topic) const;
+  /// A sender has a writer in its hands.
+  [[nodiscard]] bool is_in_use() const;
+  [[nodiscard]] bool has_readers() const;
+  /// With all its writers. False when DDS refuses.
+  [[nodiscard]] bool move_to(const std::string& partition);
+
+ private:
+  wire::dds::DomainParticipant& participant_;
+  wire::dds::Publisher* const publisher_;
+  std::map<std::string, Writer> writers_;  // by topic
+};
+
+/// The channels of clients that have left, kept for others. Deleting a writer tells all clients so, and the library
+/// removes that news from its history when the last of them has heard it. If the last one is dead, that happens as its
+/// lease ends, and may meet the thread that sends old news to a newcomer: each then holds the lock that the other
+/// wants, for ever. So while clients come and go a channel moves to the next client, and the rest is deleted when
+/// nobody has left for a while. Other libraries than Fast DDS do not follow a writer to another partition: their
+/// clients get new channels. Not thread-safe.
+class ParkedChannels {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  using Channel = std::shared_ptr<ReplyChannel>;
+
+  void park(Channel channel, Time now);
+  /// A channel for the client with this participant id; null: make one.
+  [[nodiscard]] Channel take(const std::string& participant, const std::string& partition);
+  /// Deletes what has not been needed, a few at a time. True if there is more to delete.
+  bool tend(Time now);
+  [[nodiscard]] std::size_t size() const { return parked_.size(); }
+
+ private:
+  std::vector<Channel> parked_;
+  Time last_parked_{};
+};
+
+}  // namespace trammel

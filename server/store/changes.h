@@ -1,0 +1,27 @@
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include "server/store/store.h"
+
+/// Changes that happen once, for the transactions of batches, jobs and models.
+namespace trammel {
+
+/// What was recorded under the id, if anything. kConflict: for something else than is asked for.
+[[nodiscard]] Result<std::optional<ChangeOutcome>> find_change(SQLite::Database& database, const ChangeId& change_id);
+/// Records what was made, in the transaction that is open.
+void record_change(SQLite::Database& database, const ChangeId& change_id, const ChangeOutcome& outcome);
+
+/// Runs `work`, which returns a Result<ChangeOutcome>, unless that was done before under this id; then what came of it.
+template <typename Work>
+[[nodiscard]] Result<ChangeOutcome> once(SQLite::Database& database, const ChangeId& change_id, const Work& work) {
+  if (change_id.id.empty()) return work();
+  auto made = find_change(database, change_id);
+  if (!made) return tl::make_unexpected(made.error());
+  if (*made) return **made;
+  Result<ChangeOutcome> outcome = work();
+  if (outcome) record_change(database, change_id, *outcome);
+  return outcome;
+}
+
+}  // namespace trammel

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/base/result.h"
+#include "server/store/served_copies.h"
+
+namespace trammel {
+
+constexpr int kBusyTimeout = 5000;  // ms to wait while another program reads the file
+
+/// A store's file as far as it could be opened.
+struct OpenedDatabase {
+  std::unique_ptr<SQLite::Database> file;  ///< null: nothing of it can be read, and only copies are there
+  std::optional<Error> why_not_written;    ///< set: it can be read at most
+};
+
+/// Opens the file for writing; where the disk does not let it, for reading; where that fails too and there are copies
+/// of the models that it had in force, not at all. Refuses what Store::open() refuses.
+[[nodiscard]] Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copies);
+
+/// Whether the error says that the disk does not let it be written now: full, read-only, broken.
+[[nodiscard]] bool is_of_the_disk(const SQLite::Exception& error);
+
+/// The failure for a caller: kBusy where the disk may let it be written again, kInternal where the file is damaged.
+[[nodiscard]] Failure failure_of(const SQLite::Exception& error, const std::string& path);
+
+}  // namespace trammel

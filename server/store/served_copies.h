@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/base/mutex.h"
+#include "server/base/result.h"
+
+namespace trammel {
+
+/// The last models in force of each cell as plain files beside the store: what is served where the store cannot be
+/// read. They lie in `<store>.models/<id of the store>/<hash of the cell's name>/`, one file a version, the newest
+/// three. Thread-safe; one thread at a time keeps copies of a cell.
+class ServedCopies {
+ public:
+  explicit ServedCopies(const std::string& store) : root_(store + ".models") {}
+
+  struct Copy {
+    std::int64_t activation = 0;  ///< number of the activation that put it in force: the larger, the newer
+    int version = 0;
+    std::string file;
+  };
+  /// The stores that copies were made of, the one written to last first.
+  [[nodiscard]] std::vector<std::string> stores() const;
+  /// From now on copies are those of this store. A store that is `served` from gets a folder even before its first
+  /// copy.
+  [[nodiscard]] Status belong_to(const std::string& store, bool served);
+  /// Newest first; none where they cannot be read.
+  [[nodiscard]] std::vector<Copy> of(const std::string& cell) const;
+  /// On disk when it returns. Takes the place of an older copy of the same version.
+  [[nodiscard]] Status keep(const std::string& cell, std::int64_t activation, int version,
+                            const std::string& content) const;
+  [[nodiscard]] const std::string& root() const { return root_; }
+
+ private:
+  /// Of the store's copies; empty: not known yet.
+  [[nodiscard]] std::string folder() const;
+  [[nodiscard]] std::string folder(const std::string& cell) const;
+
+  const std::string root_;
+  mutable Mutex mutex_;
+  std::string store_ TRAMMEL_GUARDED_BY(mutex_);  // empty: not known yet
+};
+
+}  // namespace trammel

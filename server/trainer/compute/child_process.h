@@ -1,0 +1,83 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+
+namespace trammel {
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(Descriptor&& other) noexcept : number_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int get() const { return number_; }
+  [[nodiscard]] int release();
+  void close();
+
+ private:
+  int number_ = -1;
+};
+
+/// A program that was started to compute, and nothing else: it inherits no descriptor but a socket to talk by and its
+/// standard streams (nothing to read; what it writes comes to words()), no blocked or ignored signal, and has a session
+/// of its own. It ends with this object. Not of a fork: the memory of a process with many threads and gigabytes is not
+/// copied.
+class ChildProcess {
+ public:
+  static constexpr int kChannel = 3;  ///< the descriptor of its end of the socket
+
+  /// argv[0] is the program's path.
+  [[nodiscard]] static Result<std::unique_ptr<ChildProcess>> start(const std::vector<std::string>& argv);
+  ~ChildProcess();  ///< kills it
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  [[nodiscard]] int channel() const { return channel_.get(); }  ///< does not block
+  [[nodiscard]] int words() const { return words_.get(); }      ///< does not block; -1: it says nothing any more
+  void close_words() { words_.close(); }
+  [[nodiscard]] int end() const { return pidfd_.get(); }  ///< can be read once it has ended
+  [[nodiscard]] pid_t pid() const { return pid_; }
+
+  /// SIGKILL, and until it is gone; a second at most, should the kernel not let go of it.
+  void kill();
+  /// How it ended, for people: `signal 11 (Segmentation fault)`, `exit code 1`. Empty while it runs.
+  [[nodiscard]] std::optional<std::string> ending();
+
+  /// What it has used until now, or until it ended.
+  struct Usage {
+    double processor_time = 0;     ///< s
+    std::int64_t peak_memory = 0;  ///< bytes, resident
+  };
+  [[nodiscard]] Usage usage();
+  /// Whether it wants the processor, or waits for the disk: else it does nothing by itself.
+  enum class State { kRuns, kWaitsForDisk, kStands };
+  [[nodiscard]] State state() const;
+
+ private:
+  ChildProcess() = default;
+  /// Whether it is over, without waiting.
+  bool reap();
+
+  pid_t pid_ = -1;
+  Descriptor channel_, words_, pidfd_;
+  std::optional<int> status_;  // of waitpid, once it has ended
+  Usage usage_;
+};
+
+/// Bytes of memory that this host, or the container it runs in, has.
+[[nodiscard]] std::int64_t memory_of_host();
+
+}  // namespace trammel

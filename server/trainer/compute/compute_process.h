@@ -1,0 +1,72 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "server/trainer/compute/child_process.h"
+#include "server/trainer/compute/compute_options.h"
+#include "server/trainer/compute/frames.h"
+#include "server/trainer/compute/task.h"
+
+namespace trammel {
+
+/// How a job learns that it is to end.
+struct StopRequests {
+  std::stop_token service;  ///< the service stops: the job goes on after the next start
+  std::stop_token job;      ///< the job is cancelled
+  [[nodiscard]] bool any() const { return service.stop_requested() || job.stop_requested(); }
+};
+
+/// The computing of a job in a process of its own, where it can hurt nobody: ended at once where it is to stop, within
+/// two seconds where it crashes or stands still, and where it takes more than a job may. It stands still when it
+/// neither gets on nor wants to: no processor time used for a second though it is neither ready to run nor waiting for
+/// the disk. One that computes for ever is ended by the limit of processor time.
+class ComputeProcess : public Computing {
+ public:
+  /// Refuses (kInternal) where no process can be started.
+  [[nodiscard]] static Result<std::unique_ptr<ComputeProcess>> start(const ComputeOptions& options,
+                                                                     const ComputeTask& task, const StopRequests& stop);
+  ~ComputeProcess() override;
+
+  [[nodiscard]] Status take(const BatchText& batch, bool judges) override;
+  [[nodiscard]] Result<Made> make(const ComputeWatch& watch) override;
+  [[nodiscard]] Result<GateVerdict> judge(const Opponents& opponents) override;
+  [[nodiscard]] std::optional<Breakdown> breakdown() const override { return breakdown_; }
+  [[nodiscard]] ComputeCost cost() const override;
+
+ private:
+  class Wake;
+  ComputeProcess(const ComputeOptions& options, std::unique_ptr<ChildProcess> child, const StopRequests& stop);
+
+  [[nodiscard]] Status send(const Frame& frame);
+  /// The next message that is an answer; those before it go to `watch`.
+  [[nodiscard]] Result<Frame> answer(const ComputeWatch& watch);
+  /// What is to be done with a message on the way.
+  [[nodiscard]] Status heard(const Frame& frame, const ComputeWatch& watch);
+  /// Waits until the channel is ready for `events` and looks after the process meanwhile.
+  [[nodiscard]] Status wait(short events);
+  /// Asked every tick.
+  [[nodiscard]] Status look_after();
+  void read_words();
+  [[nodiscard]] Status receive();
+  /// Ends the process, for that reason.
+  [[nodiscard]] Failure broken(Breakdown::Kind kind, Failure why);
+  [[nodiscard]] Failure crashed();
+
+  const ComputeOptions options_;
+  const std::unique_ptr<ChildProcess> child_;
+  const std::unique_ptr<Wake> wake_;
+  FrameReader reader_;
+  std::string words_;  // the last ones it wrote
+  std::optional<Breakdown> breakdown_;
+  int ticks_still_ = 0;
+  double time_at_last_tick_ = 0;  // s, of the processor
+};
+
+/// The same here where `options` names no program, else in a process of its own.
+[[nodiscard]] Result<std::unique_ptr<Computing>> start_computing(const ComputeOptions& options, ComputeTask task,
+                                                                 const StopRequests& stop);
+
+}  // namespace trammel

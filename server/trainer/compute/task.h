@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+#include "server/store/store.h"
+#include "server/trainer/acceptance/verdict.h"
+
+/// What one job computes from and what comes of it, as values that another process can be told.
+namespace trammel {
+
+/// A batch as it was received.
+struct BatchText {
+  std::string id;  ///< empty: it came with the diagnosis that was asked for
+  std::string csv;
+  std::int64_t taken_in = 0;  ///< Unix time, s, when it was received
+};
+
+struct ComputeTask {
+  std::shared_ptr<const Cell> cell;
+  JobKind kind = JobKind::kTrain;
+  std::vector<std::string> batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
+  std::string level, bias;             ///< of a training; empty: as usual
+  bool apply = false;                  ///< of a diagnosis: train a model with the causes found
+  bool hold_against_in_force = false;  ///< look at the batch first, and learn nothing from one that is strange
+  std::optional<ModelText> in_force;
+  std::uint64_t seed = 1;
+  double validation_share = 0.2;
+  double accept_ratio = 1.02;
+  std::int64_t now = 0;  ///< Unix time, s: when the model is trained
+};
+
+/// What a job makes.
+struct Made {
+  std::optional<CompensatedModel> model;
+  std::string remarks;     ///< to go with the model's outcome: `; ` before each
+  std::string quarantine;  ///< why nothing must be learned from the batch; empty: something was
+  /// Of a diagnosis that makes no model.
+  std::string message = {};
+  JobOutcome outcome = {};
+};
+
+/// What a job says on its way.
+struct ComputeWatch {
+  /// What is being done and the share done of all in [0, 1]; false: give up.
+  std::function<bool(const std::string& stage, double share)> progress;
+  /// The findings of a diagnosis (JSON) and their page (HTML). An error ends the job.
+  std::function<Status(const std::string& findings, const std::string& page)> found;
+};
+
+/// Why a process that computed has ended without an answer.
+struct Breakdown {
+  enum class Kind {
+    kCrashed,     ///< by a signal or with an exit code
+    kHung,        ///< it stood still
+    kOverMemory,  ///< it asked for more than a job may have
+    kOverTime,    ///< it took more processor time than a job may take
+    kStopped      ///< it was told to: the job is cancelled, or the service stops
+  };
+  Kind kind = Kind::kCrashed;
+  Error error;
+};
+
+struct ComputeCost {
+  std::optional<std::int64_t> peak_memory;  ///< bytes
+  std::optional<double> processor_time;     ///< s
+};
+
+/// The computing of one job: its batches are given to it one by one, it makes what the job asks for, and judges it as
+/// often as it is asked. Of one thread.
+class Computing {
+ public:
+  virtual ~Computing() = default;
+  /// `judges`: the batch is one of those that judge what the job makes; these come oldest first.
+  [[nodiscard]] virtual Status take(const BatchText& batch, bool judges) = 0;
+  [[nodiscard]] virtual Result<Made> make(const ComputeWatch& watch) = 0;
+  /// After make() has made a model.
+  [[nodiscard]] virtual Result<GateVerdict> judge(const Opponents& opponents) = 0;
+  /// After an error: whether it is one of the process and not of the data.
+  [[nodiscard]] virtual std::optional<Breakdown> breakdown() const { return std::nullopt; }
+  /// Until now.
+  [[nodiscard]] virtual ComputeCost cost() const { return {}; }
+};
+
+}  // namespace trammel

@@ -1,0 +1,187 @@
+#include "server/trainer/compute/workbench.h"
+
+#include <utility>
+
+#include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
+#include "server/diagnose/diagnose.h"
+#include "server/diagnose/triage.h"
+#include "server/report/diagnosis_json.h"
+#include "server/report/diagnosis_page.h"
+#include "server/trainer/acceptance/fits_cell.h"
+#include "server/trainer/acceptance/verdict.h"
+#include "server/trainer/pipeline/extend.h"
+#include "server/trainer/pipeline/lasting_sources.h"
+#include "server/trainer/pipeline/successor.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kDiagnosisShare = 0.6;  // of a diagnosis that is applied; the rest is the training
+
+std::string findings_text(const Diagnosis& diagnosis) {
+  return diagnosis_json(diagnosis).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+/// The cell as it is served: with the error sources of the model in force.
+std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, const ServedModel* in_force,
+                                      const CheckedBatch& batch) {
+  if (in_force == nullptr) return cell;
+  auto served = std::make_shared<Cell>(*cell);
+  served->model.error_sources = sources_in_force(in_force->model, *cell, batch);
+  return served;
+}
+
+/// `; ` before each that says something.
+std::string joined_by_semicolons(const std::vector<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts) {
+    if (!part.empty()) text += "; " + part;
+  }
+  return text;
+}
+
+HoldOut hold_out_of(const ComputeTask& task) {
+  return task.kind == JobKind::kDiagnose ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
+                                         : held_out_by_service(task.validation_share, task.seed);
+}
+
+}  // namespace
+
+Workbench::Workbench(ComputeTask task)
+    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids) {}
+
+Status Workbench::take(const BatchText& batch, bool judges) {
+  batches_.add(batch, judges);
+  return {};
+}
+
+Result<Made> Workbench::make(const ComputeWatch& watch) {
+  return task_.kind == JobKind::kTrain ? trained(watch) : diagnosed(watch);
+}
+
+Result<Made> Workbench::trained(const ComputeWatch& watch) {
+  const auto in_force = this->in_force();
+  if (!in_force) return tl::make_unexpected(in_force.error());
+  std::string seen;
+  if (task_.hold_against_in_force && *in_force) {
+    const auto batch = batches_.first();
+    if (!batch) return tl::make_unexpected(batch.error());
+    const Triage triaged = triage((*in_force)->model, *batch);
+    if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
+    if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+  }
+  const auto batch = batches_.to_learn_from();
+  if (!batch) return tl::make_unexpected(batch.error());
+  const bool as_usual = task_.level.empty() && task_.bias.empty();
+  auto successor = train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(watch));
+  if (!successor) return tl::make_unexpected(successor.error());
+  return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
+}
+
+Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
+  // What is to judge an extended model must not have been looked at.
+  const auto batch = task_.apply ? batches_.first_without_older_judges() : batches_.first();
+  if (!batch) return tl::make_unexpected(batch.error());
+  const auto present = in_force();
+  if (!present) return tl::make_unexpected(present.error());
+  DiagnoseOptions options;
+  options.seed = task_.seed;
+  options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage, double share) {
+    return watch.progress("diagnosing: " + stage, whole * share);
+  };
+  const auto served = as_served(task_.cell, present->get(), *batch);
+  const auto diagnosis = trammel::diagnose(served, *batch, options);
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
+  const Status stored = watch.found(findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
+  if (!stored) return tl::make_unexpected(stored.error());
+  Made made;
+  made.outcome.verdict = JobVerdict::kDiagnosed;
+  made.outcome.why = diagnosis->sentence;
+  made.message = to_string(diagnosis->verdict);
+  if (!task_.apply) return made;
+  if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
+    const std::string stays = *present ? fmt::format("; version {} stays in force", (*present)->version) : "";
+    made.outcome.verdict = JobVerdict::kNothingApplied;
+    made.outcome.why = sentence(can_apply.error());
+    made.message = "nothing applied: " + made.outcome.why + stays;
+    return made;
+  }
+  return extended(*batch, served->model.error_sources, *diagnosis, watch);
+}
+
+Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<std::string>& own,
+                                 const Diagnosis& diagnosis, const ComputeWatch& watch) {
+  TrainOptions options = train_options(watch);
+  options.progress = [&watch](const std::string& stage, double share) {
+    return watch.progress(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
+  };
+  auto extended = extended_model(task_.cell, own, batch, diagnosis, options);
+  if (!extended) return tl::make_unexpected(extended.error());
+  auto found = batches_.sessions_of_diagnosis();
+  if (!found) return tl::make_unexpected(found.error());
+  MeasurementBatch& own_judges = found->sessions[found->own].judges;
+  Judges judges = judges_of(diagnosis, std::move(own_judges));
+  own_judges = std::move(judges.batch);
+  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)});
+  return made(std::move(extended->model), remarks, std::move(found->sessions));
+}
+
+TrainOptions Workbench::train_options(const ComputeWatch& watch) const {
+  TrainOptions options;
+  if (!task_.level.empty()) {
+    options.level = task_.level;
+  } else if (in_force_) {
+    options.level = level_with_additions(*task_.cell, in_force_->model);
+  }
+  if (!task_.bias.empty()) options.bias = task_.bias;
+  options.seed = task_.seed;
+  options.trained_at = task_.now;
+  options.progress = watch.progress;
+  return options;
+}
+
+Made Workbench::made(CompensatedModel model, std::string remarks, std::vector<JudgingSession> sessions) {
+  sessions_ = std::move(sessions);
+  candidate_ = model;
+  remarks += joined_by_semicolons(warnings_of(model, model.parts().validation));
+  return {std::move(model), std::move(remarks), ""};
+}
+
+Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
+  std::shared_ptr<const ServedModel> present;
+  if (opponents.in_force && in_force_ && in_force_->version == opponents.in_force->version) {
+    present = in_force_;
+  } else if (opponents.in_force) {
+    auto model = loaded(*opponents.in_force);
+    if (!model) return tl::make_unexpected(model.error());
+    present = std::make_shared<const ServedModel>(std::move(*model));
+  }
+  std::vector<ServedModel> before;
+  for (const ModelText& text : opponents.served_before) {
+    if (before.size() >= opponents.most_before) break;
+    if (auto model = loaded(text)) before.push_back(std::move(*model));
+  }
+  const Bar bar = task_.kind == JobKind::kDiagnose ? Bar::kBetterBeyondChance : Bar::kBetter;
+  return verdict_on(*candidate_, present.get(), std::move(before), opponents.record, sessions_,
+                    {bar, task_.accept_ratio});
+}
+
+Result<std::shared_ptr<const ServedModel>> Workbench::in_force() {
+  if (!task_.in_force || in_force_) return in_force_;
+  auto model = loaded(*task_.in_force);
+  if (!model) return tl::make_unexpected(model.error());
+  in_force_ = std::make_shared<const ServedModel>(std::move(*model));
+  return in_force_;
+}
+
+Result<ServedModel> Workbench::loaded(const ModelText& text) const {
+  const std::string which = fmt::format("version {} of cell {}", text.version, task_.cell->name);
+  auto model = deserialize(text.text, which);
+  if (!model) return tl::make_unexpected(model.error());
+  if (const Status fits = check_fits_cell(*model, *task_.cell, which); !fits) return tl::make_unexpected(fits.error());
+  return ServedModel{task_.cell->name, text.version, std::move(*model)};
+}
+
+}  // namespace trammel

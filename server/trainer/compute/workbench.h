@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/registry/model_registry.h"
+#include "server/trainer/compute/job_batches.h"
+#include "server/trainer/compute/task.h"
+#include "server/trainer/pipeline/train.h"
+
+namespace trammel {
+
+struct Diagnosis;
+
+/// The computing of a job in the process that calls it. Knows the pipeline and the gate, but neither store nor
+/// registry.
+class Workbench : public Computing {
+ public:
+  explicit Workbench(ComputeTask task);
+
+  [[nodiscard]] Status take(const BatchText& batch, bool judges) override;
+  [[nodiscard]] Result<Made> make(const ComputeWatch& watch) override;
+  [[nodiscard]] Result<GateVerdict> judge(const Opponents& opponents) override;
+
+ private:
+  [[nodiscard]] Result<Made> trained(const ComputeWatch& watch);
+  [[nodiscard]] Result<Made> diagnosed(const ComputeWatch& watch);
+  /// With what the diagnosis of `batch` beside the sources `own` found.
+  [[nodiscard]] Result<Made> extended(const CheckedBatch& batch, const std::vector<std::string>& own,
+                                      const Diagnosis& diagnosis, const ComputeWatch& watch);
+  /// Of what the job asks for: level and bias, and where it asks for nothing special what the model in force has
+  /// besides.
+  [[nodiscard]] TrainOptions train_options(const ComputeWatch& watch) const;
+  [[nodiscard]] Made made(CompensatedModel model, std::string remarks, std::vector<JudgingSession> sessions);
+  /// Null where there is none.
+  [[nodiscard]] Result<std::shared_ptr<const ServedModel>> in_force();
+  [[nodiscard]] Result<ServedModel> loaded(const ModelText& text) const;
+
+  const ComputeTask task_;
+  JobBatches batches_;
+  std::shared_ptr<const ServedModel> in_force_;  // once it was asked for
+  std::optional<CompensatedModel> candidate_;    // once it is made
+  std::vector<JudgingSession> sessions_;         // that judge it, oldest first
+};
+
+}  // namespace trammel

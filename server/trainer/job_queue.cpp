@@ -1,0 +1,81 @@
+#include "server/trainer/job_queue.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace trammel {
+
+void JobQueue::push(WaitingJob job) {
+  {
+    const MutexLock lock(mutex_);
+    waiting_[job.cell].push_back(std::move(job));
+  }
+  ready_.notify_one();
+}
+
+void JobQueue::push_front(WaitingJob job) {
+  {
+    const MutexLock lock(mutex_);
+    waiting_[job.cell].push_front(std::move(job));
+  }
+  ready_.notify_one();
+}
+
+std::optional<TakenJob> JobQueue::take(const std::stop_token& stop) {
+  MutexLock lock(mutex_);
+  if (!ready_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty(); }) ||
+      stop.stop_requested())
+    return std::nullopt;
+  WaitingJob job = next();
+  taken_ = job.id;
+  cancelling_ = {};
+  return TakenJob{std::move(job), cancelling_.get_token()};
+}
+
+WaitingJob JobQueue::next() {
+  auto turn = waiting_.upper_bound(last_cell_);
+  if (turn == waiting_.end()) turn = waiting_.begin();
+  last_cell_ = turn->first;
+  WaitingJob job = std::move(turn->second.front());
+  turn->second.pop_front();
+  if (turn->second.empty()) waiting_.erase(turn);
+  return job;
+}
+
+void JobQueue::put_down() {
+  const MutexLock lock(mutex_);
+  taken_.reset();
+}
+
+JobQueue::Cancelled JobQueue::cancel(std::int64_t id) {
+  std::stop_source source;
+  {
+    const MutexLock lock(mutex_);
+    for (auto cell = waiting_.begin(); cell != waiting_.end(); ++cell) {
+      if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0) continue;
+      if (cell->second.empty()) waiting_.erase(cell);
+      return Cancelled::kRemoved;
+    }
+    if (taken_ != id) return Cancelled::kUnknown;
+    source = cancelling_;
+  }
+  source.request_stop();
+  return Cancelled::kStopping;
+}
+
+std::size_t JobQueue::size() const {
+  const MutexLock lock(mutex_);
+  std::size_t jobs = 0;
+  for (const auto& [cell, waiting] : waiting_) jobs += waiting.size();
+  return jobs;
+}
+
+std::size_t JobQueue::asked_for(const std::string& cell) const {
+  const MutexLock lock(mutex_);
+  const auto found = waiting_.find(cell);
+  if (found == waiting_.end()) return 0;
+  return static_cast<std::size_t>(
+      std::count_if(found->second.begin(), found->second.end(), [](const WaitingJob& job) { return job.asked_for; }));
+}
+
+}  // namespace trammel

@@ -1,0 +1,59 @@
+#include "server/trainer/job_sources.h"
+
+#include <algorithm>
+#include <set>
+
+namespace trammel {
+
+namespace {
+
+constexpr std::size_t kMostSessions = 50;  // newest batches that judge
+
+Status check_own(const Store& store, const StoredJob& job, const std::set<std::string>& own,
+                 const std::vector<StoredBatch>& stored) {
+  if (job.kind != JobKind::kTrain) return {};
+  const auto may_release = store.may_release(job.id);
+  if (!may_release) return tl::make_unexpected(may_release.error());
+  for (const StoredBatch& batch : stored) {
+    if (!own.contains(batch.id) || *may_release) continue;
+    if (Status free = check_released(batch); !free) return free;
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_released(const StoredBatch& batch) {
+  if (batch.quarantine.empty()) return {};
+  return refused("batch {} of cell {} is in quarantine: {}", batch.id, batch.cell, batch.quarantine)
+      .of("batch")
+      .with_text(batch.id)
+      .next("release it if it is good");
+}
+
+Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job, bool judged) {
+  const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
+  const auto stored = store.batches(job.cell);
+  if (!stored) return tl::make_unexpected(stored.error());
+  if (const Status free = check_own(store, job, own, *stored); !free) return tl::make_unexpected(free.error());
+  std::vector<BatchSource> judging;
+  if (judged) {
+    const auto may_judge = store.batches_learned_from(job.cell);
+    if (!may_judge) return tl::make_unexpected(may_judge.error());
+    for (auto batch = stored->rbegin(); batch != stored->rend() && judging.size() < kMostSessions; ++batch) {
+      if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge->contains(batch->id))) continue;
+      judging.push_back({batch->id, true});
+    }
+    std::reverse(judging.begin(), judging.end());
+  }
+  std::vector<BatchSource> sources;
+  for (const std::string& id : job.batch_ids) {
+    const bool judges =
+        std::any_of(judging.begin(), judging.end(), [&](const BatchSource& one) { return one.id == id; });
+    if (!judges) sources.push_back({id, false});
+  }
+  sources.insert(sources.end(), judging.begin(), judging.end());
+  return sources;
+}
+
+}  // namespace trammel

@@ -1,0 +1,471 @@
+// What each kind of packet meets at the guard. The packets that harm the library itself are in
+// tests/end_to_end/hostile_packets_test.cpp.
+#include "idl/guard/guard.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "idl/guard/announcement_check.h"
+#include "idl/limits.h"
+#include "tests/support/rtps_packet.h"
+
+namespace trammel::wire {
+namespace {
+
+using test::Packet;
+using test::PacketBytes;
+using test::ParameterList;
+using test::Prefix;
+
+constexpr Prefix kSource = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;
+constexpr std::uint32_t kUserWriter = 0x00000103, kUserReader = 0x00000104;
+constexpr std::uint64_t kSocket = 4711;
+const PacketBytes kSample = {0, 1, 0, 0, 1, 2, 3, 4};
+
+/// Why the guard drops it; empty: it passes.
+std::optional<Dropped> fate(Guard& guard, const PacketBytes& message) {
+  std::vector<std::uint64_t> before;
+  for (std::size_t i = 0; i < kDroppedReasons; ++i) before.push_back(guard.counts().of(static_cast<Dropped>(i)));
+  if (guard.check(message, kSocket)) return std::nullopt;
+  for (std::size_t i = 0; i < kDroppedReasons; ++i) {
+    if (guard.counts().of(static_cast<Dropped>(i)) == before[i] + 1) return static_cast<Dropped>(i);
+  }
+  ADD_FAILURE() << "dropped without a reason";
+  return std::nullopt;
+}
+std::optional<Dropped> fate(const PacketBytes& message) {
+  Guard guard(kMaxTextSample);
+  return fate(guard, message);
+}
+constexpr std::optional<Dropped> kPasses;
+
+Packet from() { return Packet(kSource); }
+ParameterList participant() {
+  return ParameterList().add(0x0015, {2, 3, 0, 0}).guid(0x0050, kSource, 0x000001c1).text(0x0062, "somebody");
+}
+ParameterList writer() {
+  return ParameterList().guid(0x005a, kSource, kUserWriter).text(0x0005, "Topic").text(0x0007, "Type");
+}
+PacketBytes announcement(const ParameterList& list, std::uint32_t by = kAnnouncer) {
+  return from().data({0, by, 1, {}, list.payload()}).bytes();
+}
+/// A list with one more parameter, whose value is so many words.
+PacketBytes with(std::uint16_t id, const std::vector<std::uint32_t>& words, std::uint32_t by = kPublications) {
+  PacketBytes value;
+  for (const std::uint32_t word : words) test::put32(value, word);
+  return announcement(writer().add(id, value), by);
+}
+
+TEST(Guard, WhatHonestParticipantsSendPasses) {
+  Guard guard(kMaxTextSample);
+  EXPECT_EQ(fate(guard, announcement(participant())), kPasses);
+  EXPECT_EQ(fate(guard, announcement(writer(), kPublications)), kPasses);
+  EXPECT_EQ(fate(guard, announcement(writer(), kSubscriptions)), kPasses);
+  EXPECT_EQ(fate(guard, from().data({0, kUserWriter, 1, {}, kSample}).heartbeat(0, kUserWriter, 1, 1, 1).bytes()),
+            kPasses);
+  EXPECT_EQ(fate(guard, from().to(kOther).heartbeat(0, kUserWriter, 1, 0, 2).bytes()), kPasses) << "nothing sent yet";
+  EXPECT_EQ(fate(guard, from().gap(0, kUserWriter, 2, 9).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 0, 0, 1).bytes()), kPasses) << "before any";
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 7, 256, 2).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().fragments({0, kUserWriter, 9, 1, 2, 1024, 4096, PacketBytes(2048)}).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().submessage(0x09, 1, PacketBytes(8)).submessage(0x01, 1, {}).bytes()), kPasses);
+  const PacketBytes leaves = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_EQ(fate(guard, from().data({0, kAnnouncer, 2, leaves, {}}).bytes()), kPasses) << "it leaves";
+}
+
+TEST(Guard, WhatIsNoRtpsMessageIsDropped) {
+  EXPECT_EQ(fate({}), Dropped::kHeader);
+  EXPECT_EQ(fate(PacketBytes(19, 'R')), Dropped::kHeader);
+  PacketBytes other = from().data({0, kUserWriter, 1, {}, kSample}).bytes();
+  other[4] = 1;
+  EXPECT_EQ(fate(other), Dropped::kHeader) << "version 1";
+  EXPECT_EQ(fate(Packet(Prefix{}).data({0, kUserWriter, 1, {}, kSample}).bytes()), Dropped::kSource);
+}
+
+TEST(Guard, SubmessagesThatDoNotFitAreDropped) {
+  const PacketBytes data = from().data({0, kUserWriter, 1, {}, kSample}).bytes();
+  for (std::size_t size = kHeader + 1; size < data.size(); ++size) {
+    EXPECT_EQ(fate(PacketBytes(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size))), Dropped::kLength)
+        << size << " of " << data.size() << " bytes";
+  }
+  PacketBytes odd = from().submessage(0x01, 1, PacketBytes(3)).bytes();
+  test::put_bytes(odd, {0x01, 1, 0, 0});
+  EXPECT_EQ(fate(odd), Dropped::kLength) << "the library would go on at another place";
+  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {}, {}}).bytes()), Dropped::kLength) << "neither data nor state";
+  PacketBytes both = data;
+  both[kHeader + 1] |= kKey;
+  EXPECT_EQ(fate(both), Dropped::kLength) << "data and key at once";
+  PacketBytes jump = data;
+  jump[kHeader + 6] = 0xf0;  // octets to inline QoS
+  jump[kHeader + 7] = 0xff;
+  EXPECT_EQ(fate(jump), Dropped::kLength);
+}
+
+TEST(Guard, AStatisticsSubmessagePassesNowhere) {
+  const auto with_statistics = [](std::size_t size, bool last) {
+    Packet packet = from().data({0, kUserWriter, 1, {}, kSample});
+    packet.submessage(kStatistics, 1, PacketBytes(size));
+    if (!last) packet.submessage(0x01, 1, {});
+    return packet.bytes();
+  };
+  EXPECT_EQ(fate(with_statistics(56, false)), Dropped::kStatistics);
+  EXPECT_EQ(fate(with_statistics(52, true)), Dropped::kStatistics);
+  Guard guard(kMaxTextSample);
+  const PacketBytes honest = with_statistics(56, true);
+  const auto passed = guard.check(honest, kSocket);
+  ASSERT_TRUE(passed);
+  EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), from().data({0, kUserWriter, 1, {}, kSample}).bytes())
+      << "without it";
+}
+
+TEST(Guard, NobodySpeaksInTheNameOfAnother) {
+  EXPECT_EQ(fate(announcement(ParameterList().guid(0x0050, kOther, 0x000001c1))), Dropped::kSource);
+  EXPECT_EQ(fate(announcement(ParameterList().guid(0x005a, kOther, kUserWriter), kPublications)), Dropped::kSource);
+  const PacketBytes ends_another = ParameterList().guid(0x0070, kOther, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_EQ(fate(from().data({0, kAnnouncer, 2, ends_another, {}}).bytes()), Dropped::kSource);
+  EXPECT_EQ(fate(from().submessage(kInfoSource, 1, PacketBytes(20)).bytes()), Dropped::kSource);
+}
+
+TEST(Guard, NumbersThatNoWriterReachesAreDropped) {
+  constexpr std::int64_t kHuge = std::int64_t{1} << 62;
+  for (const std::int64_t number : {std::int64_t{0}, std::int64_t{-1}, kHuge}) {
+    EXPECT_EQ(fate(from().data({0, kUserWriter, number, {}, kSample}).bytes()), Dropped::kNumber) << number;
+    EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, number, number, 1).bytes()), Dropped::kNumber) << number;
+    EXPECT_EQ(fate(from().gap(0, kUserWriter, number, 5).bytes()), Dropped::kNumber) << number;
+    EXPECT_EQ(fate(from().gap(0, kUserWriter, 1, number).bytes()), Dropped::kNumber) << number;
+    EXPECT_EQ(fate(from().fragments({0, kUserWriter, number, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes()),
+              Dropped::kNumber);
+  }
+  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 5, 3, 1).bytes()), Dropped::kNumber) << "ends before it begins";
+  EXPECT_EQ(fate(from().heartbeat(0, kUserWriter, 1, 1 << 30, 1).bytes()), Dropped::kNumber) << "no history is so long";
+  EXPECT_EQ(fate(from().acknack(kUserReader, kUserWriter, -1, 0, 1).bytes()), Dropped::kNumber);
+}
+
+TEST(Guard, SetsOfMoreThan256NumbersAreDropped) {
+  EXPECT_EQ(fate(from().acknack(kUserReader, kUserWriter, 1, 257, 1).bytes()), Dropped::kNumberSet);
+  PacketBytes body;
+  for (const std::uint32_t word : {kUserReader, kUserWriter}) test::put_entity(body, word);
+  test::put_number(body, 1);
+  test::put_number(body, 2);
+  test::put32(body, 0xffffffffu);
+  EXPECT_EQ(fate(from().submessage(kGap, 1, body).bytes()), Dropped::kNumberSet);
+  body.resize(body.size() - 4);
+  test::put32(body, 256);
+  EXPECT_EQ(fate(from().submessage(kGap, 1, body).bytes()), Dropped::kNumberSet) << "without its bits";
+}
+
+TEST(Guard, CountsAndLengthsOfAnnouncementsStayWithinTheirParameter) {
+  constexpr std::uint32_t kAll = 0xffffffffu;
+  const std::vector<std::pair<const char*, PacketBytes>> hostile = {
+      {"data representations", with(0x0073, {kAll, 0})},
+      {"data sharing domains", with(0x8006, {kAll, 0})},
+      {"partitions", with(0x0029, {kAll, 1, 0})},
+      {"a partition that leads back", with(0x0029, {2, 0xfffffff8u, 0})},
+      {"a partition that leads to the end of memory", with(0x0029, {2, 0xffffff00u, 0})},
+      {"properties", with(0x0059, {kAll, 1, 0}, kAnnouncer)},
+      {"a property's name", with(0x0059, {1, 0xfffffff0u, 0}, kAnnouncer)},
+      {"properties of a token", with(0x1001, {1, 0, kAll}, kAnnouncer)},
+      {"a token's class", with(0x1002, {0xfffffff0u, 0}, kAnnouncer)},
+      {"binary properties of a token", with(0x1001, {1, 0, 0, kAll}, kAnnouncer)},
+      {"user data", with(0x002c, {kAll}, kAnnouncer)},
+      {"group data", with(0x002d, {64, 0})},
+      {"a topic's name", with(0x0005, {0xfffffff0u, 0})},
+      {"a name without its end", with(0x0062, {4, 0x41414141u}, kAnnouncer)},
+      {"a locator", with(0x0032, {1, 2, 3}, kAnnouncer)},
+      {"a GUID", with(0x0050, {1, 2, 3}, kAnnouncer)},
+      {"a lease", with(0x0002, {1, 2, 3}, kAnnouncer)},
+      {"a lease that is negative", with(0x0002, {0x80000000u, 0}, kAnnouncer)},
+  };
+  for (const auto& [what, message] : hostile) EXPECT_EQ(fate(message), Dropped::kParameters) << what;
+  EXPECT_EQ(fate(with(0x0073, {2, 0})), kPasses);
+  EXPECT_EQ(fate(with(0x0029, {2, 2, 0x41, 1, 0})), kPasses);
+
+  PacketBytes endless = writer().payload();
+  endless.resize(endless.size() - 4);
+  EXPECT_EQ(fate(from().data({0, kPublications, 1, {}, endless}).bytes()), Dropped::kParameters) << "no sentinel";
+  EXPECT_EQ(fate(from().data({0, kUserWriter, 1, {0x70, 0, 0xff, 0x7f}, kSample}).bytes()), Dropped::kParameters);
+  ParameterList crowded = participant();
+  for (int i = 0; i < 100; ++i) crowded.locator(0x0032, 1);
+  EXPECT_EQ(fate(announcement(crowded)), Dropped::kParameters) << "a hundred addresses to send to";
+}
+
+TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
+  for (const std::uint16_t id :
+       std::initializer_list<std::uint16_t>{0x0069, 0x0072, 0x0075, 0x0035}) {  // type objects, content filters
+    Guard guard(kMaxTextSample);
+    const PacketBytes message = with(id, {0xfffffff0u, 0});
+    const auto passed = guard.check(message, kSocket);
+    ASSERT_TRUE(passed) << id;
+    EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), with(0x0000, {0xfffffff0u, 0})) << id;
+  }
+}
+
+TEST(Guard, AParticipantThatIsNotHeardIsNotKeptForEver) {
+  Guard guard(kMaxTextSample);
+  PacketBytes lease;
+  test::put32(lease, 0x7fffffffu);
+  test::put32(lease, 0xffffffffu);
+  const PacketBytes message = announcement(participant().add(0x0002, lease));
+  const auto passed = guard.check(message, kSocket);
+  ASSERT_TRUE(passed);
+  PacketBytes cut;
+  test::put32(cut, kLongestLease_s);
+  test::put32(cut, 0xffffffffu);
+  EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), announcement(participant().add(0x0002, cut)));
+}
+
+TEST(Guard, TheHandshakeOfStrangersIsReadBeforeTheLibraryReadsIt) {
+  constexpr std::uint32_t kHandshake = 0x000201c3;
+  const auto handshake = [](const std::vector<std::uint32_t>& words) {
+    PacketBytes payload = {0, 1, 0, 0};
+    payload.resize(payload.size() + 96);
+    for (const std::uint32_t word : words) test::put32(payload, word);
+    return from().data({0x000201c4, kHandshake, 1, {}, payload}).bytes();
+  };
+  EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 0})), kPasses);
+  EXPECT_EQ(fate(handshake({1, 0, 0xffffffffu})), Dropped::kParameters) << "tokens";
+  EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 1, 1, 0, 0xffffffffu})), Dropped::kParameters) << "binary value";
+  EXPECT_EQ(fate(handshake({0xfffffff0u})), Dropped::kParameters) << "class";
+}
+
+TEST(Guard, FragmentsThatTheirSampleDoesNotHaveAreDropped) {
+  const auto fragments = [](std::uint32_t first, std::uint16_t count, std::uint16_t size, std::uint32_t sample,
+                            std::size_t payload, std::uint32_t by = kUserWriter) {
+    return from().fragments({0, by, 1, first, count, size, sample, PacketBytes(payload)}).bytes();
+  };
+  EXPECT_EQ(fate(fragments(4, 1, 1000, 3500, 500)), kPasses) << "the last one is shorter";
+  EXPECT_EQ(fate(fragments(0, 1, 1024, 4096, 1024)), Dropped::kFragment) << "the first has number 1";
+  EXPECT_EQ(fate(fragments(5, 1, 1024, 4096, 1024)), Dropped::kFragment) << "four fragments";
+  EXPECT_EQ(fate(fragments(3, 3, 1024, 4096, 3072)), Dropped::kFragment);
+  EXPECT_EQ(fate(fragments(0xffffffffu, 2, 1024, 4096, 2048)), Dropped::kFragment) << "wraps around";
+  EXPECT_EQ(fate(fragments(1, 0, 1024, 4096, 1024)), Dropped::kFragment);
+  EXPECT_EQ(fate(fragments(1, 1, 0, 4096, 1024)), Dropped::kFragment) << "fragments without size";
+  EXPECT_EQ(fate(fragments(1, 1, 1, 4096, 4)), Dropped::kFragment) << "the library keeps a list in each";
+  EXPECT_EQ(fate(fragments(1, 2, 1024, 4096, 1024)), Dropped::kFragment) << "two said, one there";
+  EXPECT_EQ(fate(fragments(1, 1, 1024, 4096, 1024, kPublications)), Dropped::kFragment) << "would hide a list";
+  EXPECT_EQ(fate(fragments(1, 1, 60000, kMaxTextSample + 1, 60000)), Dropped::kSampleSize);
+
+  Guard guard(kMaxTextSample);
+  EXPECT_EQ(fate(guard, fragments(1, 1, 1024, 4096, 1024)), kPasses);
+  EXPECT_EQ(fate(guard, fragments(2, 1, 2048, 4096, 2048)), Dropped::kFragment) << "another size than before";
+}
+
+TEST(Guard, SamplesBegunAndNotFinishedAreBounded) {
+  Guard guard(kMaxTextSample);
+  int begun = 0;
+  for (std::int64_t number = 1; number <= 64; ++number) {
+    const PacketBytes first =
+        from().fragments({0, kUserWriter, number, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)}).bytes();
+    if (fate(guard, first) == kPasses) ++begun;
+  }
+  EXPECT_EQ(begun, static_cast<int>(UnfinishedSamples::kMostBytesOfOne / kMaxTextSample));
+  const PacketBytes of_another =
+      Packet(kOther).fragments({0, kUserWriter, 1, 1, 1, 60000, kMaxTextSample, PacketBytes(60000)}).bytes();
+  EXPECT_EQ(fate(guard, of_another), kPasses);
+  EXPECT_EQ(fate(guard, from().data({0, kUserWriter, 70, {}, kSample}).bytes()), kPasses) << "small ones go on";
+}
+
+TEST(Guard, FinishedSamplesMakeRoom) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kFragments = (kMaxTextSample + 59999) / 60000;
+  for (std::int64_t number = 1; number <= 20; ++number) {
+    for (std::uint32_t first = 1; first <= kFragments; ++first) {
+      const std::size_t size = std::min<std::size_t>(60000, kMaxTextSample - (first - 1) * 60000);
+      const PacketBytes part =
+          from().fragments({0, kUserWriter, number, first, 1, 60000, kMaxTextSample, PacketBytes(size)}).bytes();
+      ASSERT_EQ(fate(guard, part), kPasses) << "sample " << number << " fragment " << first;
+    }
+  }
+}
+
+std::int64_t first_of(Bytes message) {
+  Bytes rest = message.subspan(kHeader);
+  while (const auto submessage = next_submessage(rest)) {
+    if (submessage->id != kHeartbeat) continue;
+    Reader reader(submessage->body.subspan(8), submessage->little_endian());
+    return reader.sequence_number().value_or(0);
+  }
+  return 0;
+}
+
+TEST(Guard, AWriterThatSkipsABillionNumbersIsFollowedInSteps) {
+  Guard guard(kMaxTextSample);
+  constexpr std::int64_t kFirst = 1'000'000'001;
+  Guard::Time now = std::chrono::steady_clock::now();
+  std::int64_t reached = 0;
+  int steps = 0;
+  for (std::uint32_t count = 1; reached < kFirst && steps < 100'000; ++count, ++steps) {
+    now += std::chrono::milliseconds(100);
+    const PacketBytes heartbeat = from().heartbeat(0, kUserWriter, kFirst, kFirst + 3, count).bytes();
+    const auto passed = guard.check(heartbeat, kSocket, now);
+    ASSERT_TRUE(passed);
+    const std::int64_t first = first_of(*passed);
+    ASSERT_LE(first - reached, SequenceWatch::kHeartbeatStep + 1) << "the library counts through each";
+    reached = first;
+    guard.sent(Packet(kOther).to(kSource).acknack(kUserReader, kUserWriter, first, 0, count).bytes());
+  }
+  EXPECT_EQ(reached, kFirst) << "it arrives in the end";
+}
+
+TEST(Guard, WhatOurReaderHasNotConfirmedIsNotSkippedFurther) {
+  Guard guard(kMaxTextSample);
+  for (std::uint32_t count = 1; count <= 100; ++count) {
+    const PacketBytes heartbeat =
+        from().heartbeat(0, kUserWriter, std::int64_t{1} << 40, std::int64_t{1} << 40, count).bytes();
+    const auto passed = guard.check(heartbeat, kSocket);
+    ASSERT_TRUE(passed);
+    EXPECT_LE(first_of(*passed), SequenceWatch::kHeartbeatStep + 1);
+  }
+}
+
+TEST(Guard, AGapIsTakenInSteps) {
+  Guard guard(kMaxTextSample);
+  constexpr std::int64_t kEnd = 100'000'000;
+  Guard::Time now = std::chrono::steady_clock::now();
+  std::int64_t reached = 1;
+  for (int step = 0; step < 10'000 && reached < kEnd; ++step) {
+    now += std::chrono::milliseconds(100);
+    const PacketBytes gap = from().gap(0, kUserWriter, 1, kEnd).bytes();
+    const auto passed = guard.check(gap, kSocket, now);
+    if (!passed) continue;
+    Reader reader(passed->subspan(kHeader + 4 + 8), true);
+    const std::int64_t start = reader.sequence_number().value_or(0), end = reader.sequence_number().value_or(0);
+    ASSERT_EQ(start, reached) << "nothing is left out";
+    ASSERT_LE(end - start, SequenceWatch::kGapStep);
+    reached = end;
+  }
+  EXPECT_EQ(reached, kEnd);
+}
+
+TEST(Guard, AFloodOfGapsDoesNotKeepTheReceiverBusy) {
+  Guard guard(kMaxTextSample);
+  const Guard::Time now = std::chrono::steady_clock::now();
+  for (std::int64_t i = 0; i < 1000; ++i) {
+    static_cast<void>(guard.check(from().gap(0, kUserWriter, 1 + (i << 20), (i + 1) << 20).bytes(), kSocket, now));
+  }
+  EXPECT_GT(guard.counts().of(Dropped::kSkipped), 900u);
+  EXPECT_EQ(fate(guard, from().gap(0, kUserWriter, 1, 100).bytes()), kPasses) << "small ones go on";
+}
+
+TEST(Guard, ACountThatJumpsIsDroppedAndTheHonestOneGoesOn) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kAll = 0xffffffffu;
+  EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, 10).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, kAll).bytes()), Dropped::kCount);
+  EXPECT_EQ(fate(guard, from().heartbeat(0, kUserWriter, 1, 1, 11).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, 3).bytes()), kPasses);
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, kAll).bytes()), Dropped::kCount);
+  EXPECT_EQ(fate(guard, from().acknack(kUserReader, kUserWriter, 1, 0, 4).bytes()), kPasses);
+}
+
+TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
+  Guard guard(kMaxTextSample);
+  const auto asks = [](std::int64_t number, std::uint32_t fragment, std::uint32_t count) {
+    return from().nack_frag(kUserReader, kUserWriter, number, fragment, count).bytes();
+  };
+  EXPECT_EQ(fate(guard, asks(7, 1, 1)), Dropped::kNotSent);
+  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes());
+  EXPECT_EQ(fate(guard, asks(7, 4, 2)), kPasses);
+  EXPECT_EQ(fate(guard, asks(7, 5, 3)), Dropped::kNotSent);
+  EXPECT_EQ(fate(guard, asks(7, 0xffffffffu, 4)), Dropped::kNotSent);
+  EXPECT_EQ(fate(guard, asks(7, 0, 5)), Dropped::kNumber);
+}
+
+TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
+  Guard guard(kMaxTextSample);
+  int passed = 0;
+  for (unsigned char i = 0; i < 200; ++i) {
+    Prefix prefix = kSource;
+    prefix[11] = i;
+    const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1);
+    if (guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), kSocket)) ++passed;
+  }
+  EXPECT_EQ(passed, ParticipantWatch::kNewOfOneSocket);
+  EXPECT_TRUE(guard.check(announcement(participant()), kSocket + 1)) << "from another socket";
+}
+
+TEST(Guard, TwoHundredCellsThatStartAtOnceAreAllHeard) {
+  Guard guard(kMaxTextSample);
+  for (std::uint64_t socket = 0; socket < 1000; ++socket) {
+    Prefix prefix = kSource;
+    prefix[10] = static_cast<unsigned char>(socket >> 8);
+    prefix[11] = static_cast<unsigned char>(socket);
+    const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1);
+    EXPECT_TRUE(guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), socket));
+  }
+}
+
+TEST(Guard, SecuredMessagesPassWhenTheyHaveHeadAndTail) {
+  PacketBytes tail(16);
+  test::put32(tail, 0);
+  PacketBytes secret = {0, 0, 0, 8};
+  secret.resize(12);
+  EXPECT_EQ(fate(from()
+                     .submessage(kSecurePrefix, 1, PacketBytes(20))
+                     .submessage(kSecureBody, 1, secret)
+                     .submessage(kSecurePostfix, 1, tail)
+                     .bytes()),
+            kPasses);
+  EXPECT_EQ(fate(from().submessage(kSecurePrefix, 1, PacketBytes(20)).bytes()), Dropped::kSecurity);
+  EXPECT_EQ(fate(from().submessage(kSecurePrefix, 1, PacketBytes(8)).submessage(kSecurePostfix, 1, tail).bytes()),
+            Dropped::kSecurity);
+  PacketBytes many = tail;
+  many[16] = 0x7f;
+  EXPECT_EQ(fate(from().submessage(kSecurePostfix, 1, many).bytes()), Dropped::kSecurity) << "codes that are not there";
+  secret[0] = 0xff;
+  EXPECT_EQ(fate(from().submessage(kSecureBody, 1, secret).submessage(kSecurePostfix, 1, tail).bytes()),
+            Dropped::kSecurity);
+}
+
+std::vector<PacketBytes> everything() {
+  return {
+      announcement(participant().locator(0x0032, 7).add(0x002c, {4, 0, 0, 0, 1, 2, 3, 4})),
+      announcement(writer().text(0x0062, "name").add(0x0073, {1, 0, 0, 0, 0, 0}), kPublications),
+      with(0x0029, {1, 2, 0x41}, kSubscriptions),
+      with(0x1001, {1, 0, 1, 1, 0, 1, 0, 0}, kAnnouncer),
+      with(0x0075, {1, 2, 3}),
+      from().to(kOther).data({0, kUserWriter, 1, ParameterList().guid(0x0070, kSource, 1).bytes(), kSample}).bytes(),
+      from()
+          .submessage(0x09, 1, PacketBytes(8))
+          .data({0, kUserWriter, 2, {}, kSample})
+          .heartbeat(0, kUserWriter, 1, 2, 1)
+          .bytes(),
+      from().fragments({0, kUserWriter, 3, 1, 1, 64, 256, PacketBytes(64)}).bytes(),
+      from().gap(0, kUserWriter, 4, 6).acknack(kUserReader, kUserWriter, 3, 40, 2).bytes(),
+      from().nack_frag(kUserReader, kUserWriter, 3, 2, 1).bytes(),
+      from().data({0, kUserWriter, 5, {}, kSample}).submessage(kStatistics, 1, PacketBytes(56)).bytes(),
+      from().submessage(kSecurePrefix, 1, PacketBytes(20)).submessage(kSecurePostfix, 1, PacketBytes(20)).bytes()};
+}
+
+// Also the promise to the library: whatever passes is whole, and passes again.
+TEST(Guard, AMillionMutatedPacketsAreReadWithinTheirBytes) {
+  const std::vector<PacketBytes> corpus = everything();
+  std::mt19937 random(7);
+  Guard guard(kMaxTextSample);
+  int passed = 0;
+  for (int run = 0; run < 1'000'000; ++run) {
+    PacketBytes message = corpus[random() % corpus.size()];
+    const int changes = static_cast<int>(random() % 4);
+    for (int i = 0; i < changes; ++i) {
+      message[random() % message.size()] = random() % 4 == 0 ? 0xff : static_cast<unsigned char>(random());
+    }
+    if (random() % 8 == 0) message.resize(random() % (message.size() + 1));
+    message.shrink_to_fit();  // a sanitizer sees the byte behind it
+    guard.sent(message);
+    const auto whole = guard.check(message, random() % 1000);
+    if (!whole) continue;
+    ++passed;
+    ASSERT_LE(whole->size(), message.size());
+    Bytes rest = whole->subspan(kHeader);
+    while (!rest.empty()) ASSERT_TRUE(next_submessage(rest)) << "run " << run;
+  }
+  EXPECT_GT(passed, 100'000);
+  EXPECT_GT(guard.counts().all(), 100'000u);
+}
+
+}  // namespace
+}  // namespace trammel::wire

@@ -1,0 +1,401 @@
+// What is left of a store, and what it goes on doing, after faults of the disk.
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <set>
+
+#include "server/base/hash.h"
+#include "server/compensate/model_file.h"
+#include "server/store/store.h"
+#include "tests/support/demand.h"
+#include "tests/support/faulty_disk.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+using test::demand;
+
+constexpr std::streamoff kPage = 4096;
+
+StoredBatch batch(const std::string& id) {
+  const std::string csv = "q1_deg\n" + id + std::string(3000, '0') + "\n";
+  return {"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1};
+}
+
+StoredJob job_of(const std::string& id) {
+  StoredJob job;
+  job.cell = "cell-7";
+  job.batch_ids = {id};
+  return job;
+}
+
+class StoreFaults : public testing::Test {
+ protected:
+  void open() { store_ = demand(Store::open(path_)); }
+  void restart() {
+    store_.reset();
+    open();
+  }
+  void put_in_force(int poses, const std::string& cell = "cell-7") {
+    const auto& its = cell == "cell-7" ? cell_ : other_cell_;
+    ASSERT_TRUE(store_->add_model(cell, test::nominal_model(its, poses), 0, true, "made"));
+  }
+  /// The first version that can be served, 0: none.
+  int served(const std::string& cell = "cell-7") {
+    for (const int version : store_->versions_to_serve(cell)) {
+      if (store_->model(cell, version)) return version;
+    }
+    return 0;
+  }
+  void overwrite(std::streamoff at, std::size_t size) {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(at);
+    file << std::string(size, '\x5A');
+  }
+  void forget_copies() { fs::remove_all(path_ + ".models"); }
+
+  test::TemporaryFolder folder_;
+  const std::string path_ = folder_.file("trammel.db");
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
+  const std::shared_ptr<const Cell> other_cell_ = test::small_cell("cell-8");
+  std::optional<test::FaultyDisk> disk_;
+  std::unique_ptr<Store> store_;
+};
+
+TEST_F(StoreFaults, OnADiskThatIsFullAtTheStartTheModelsAreThereAndChangesAreRefusedUntilThereIsRoom) {
+  test::FaultyDisk& disk = disk_.emplace();
+  open();
+  put_in_force(1);
+  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_READONLY, SQLITE_IOERR_SHMSIZE, SQLITE_CANTOPEN}) {
+    store_.reset();
+    disk.refuse_writing(code);
+    open();
+    EXPECT_EQ(served(), 1) << code;
+    const std::string id = "lt-" + std::to_string(code);
+    const auto refused = store_->add_batch(batch(id), job_of(id));
+    ASSERT_FALSE(refused) << code;
+    EXPECT_EQ(refused.error().code, ErrorCode::kBusy) << sentence(refused.error());
+    EXPECT_TRUE(store_->state().why_not_written) << code;
+    disk.work_again();
+    EXPECT_TRUE(store_->wait_until_writable({})) << code;
+    EXPECT_FALSE(store_->state().why_not_written) << code;
+    EXPECT_TRUE(store_->add_batch(batch(id), job_of(id))) << code;
+  }
+}
+
+TEST_F(StoreFaults, WhateverCallFailsWhatIsRefusedIsNotThereAndWhatIsAcceptedStays) {
+  test::FaultyDisk& disk = disk_.emplace();
+  open();
+  put_in_force(1);
+  std::set<std::string> accepted;
+  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_IOERR_FSYNC, SQLITE_IOERR_SHMMAP}) {
+    for (int nth = 0; nth < 12; ++nth) {
+      const std::string id = fmt::format("{}-{}", code, nth);
+      disk.set_plan([code, left = nth](auto, const std::string&) mutable { return left-- == 0 ? code : SQLITE_OK; });
+      if (store_->add_batch(batch(id), job_of(id))) accepted.insert(id);
+      disk.work_again();
+      const auto again = store_->add_batch(batch(id + "+"), job_of(id + "+"));
+      EXPECT_TRUE(again) << "with room again it goes on: " << sentence(again.error());
+      accepted.insert(id + "+");
+    }
+  }
+  restart();
+  std::set<std::string> kept;
+  for (const StoredBatch& one : demand(store_->batches("cell-7"))) kept.insert(one.id);
+  EXPECT_EQ(kept, accepted);
+  EXPECT_EQ(demand(store_->unfinished_jobs()).size(), accepted.size());
+  EXPECT_EQ(served(), 1);
+}
+
+TEST_F(StoreFaults, AfterAPowerCutAtAnyCallAllThatWasAcknowledgedIsThere) {
+  struct Acknowledged {
+    std::size_t calls;
+    int batches, models;
+  };
+  std::vector<Acknowledged> acknowledged;
+  test::FaultyDisk& disk = disk_.emplace();
+  open();
+  acknowledged.push_back({disk.calls(), 0, 0});
+  for (int i = 1; i <= 4; ++i) {
+    const std::string id = std::to_string(i);
+    const auto job = demand(store_->add_batch(batch(id), job_of(id)));
+    acknowledged.push_back({disk.calls(), i, i - 1});
+    ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, i), job.id, true, "made"));
+    acknowledged.push_back({disk.calls(), i, i});
+  }
+  const std::size_t end = disk.calls();
+  store_.reset();
+  std::mt19937_64 random(13);
+  for (std::size_t cut = acknowledged.front().calls; cut <= end; ++cut) {
+    for (int round = 0; round < 4; ++round) {
+      test::TemporaryFolder left;
+      disk.cut_power(cut, random, left.path());
+      auto store = Store::open(left.file("trammel.db"));
+      ASSERT_TRUE(store) << "cut after call " << cut << ": " << sentence(store.error());
+      Acknowledged least{};
+      for (const Acknowledged& one : acknowledged) {
+        if (one.calls <= cut) least = one;
+      }
+      const auto batches = demand((*store)->batches("cell-7"));
+      const auto models = demand((*store)->models("cell-7"));
+      EXPECT_GE(static_cast<int>(batches.size()), least.batches) << "cut after call " << cut;
+      EXPECT_GE(static_cast<int>(models.size()), least.models) << "cut after call " << cut;
+      EXPECT_EQ(demand((*store)->version_in_force("cell-7")).value_or(0), static_cast<int>(models.size()));
+      for (const StoredBatch& one : batches)
+        EXPECT_EQ(demand((*store)->batch("cell-7", one.id)).csv, batch(one.id).csv);
+      EXPECT_TRUE(models.empty() || (*store)->model("cell-7", models.back().version));
+      EXPECT_EQ(demand((*store)->unfinished_jobs()).size(), batches.size() - models.size());
+    }
+  }
+}
+
+/// Changes in an order that `seed` draws, each under an id of its own.
+class Changes {
+ public:
+  explicit Changes(std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 4)(random));
+  }
+  /// Those from `*next` on, which rises with every answer.
+  void ask(Store& store, std::size_t* next) const {
+    for (; *next < kinds_.size(); ++*next) {
+      const std::size_t i = *next;
+      const ChangeId id{"robot-3:" + std::to_string(i), std::to_string(kinds_[i])};
+      const int version = static_cast<int>(i) % 3 + 1;
+      const std::string name = std::to_string(i);
+      StoredBatch brought = batch(name);
+      switch (kinds_[i]) {
+        case 0:
+          static_cast<void>(store.activate("cell-7", version, id));
+          break;
+        case 1:
+          static_cast<void>(store.rollback("cell-7", 1, id));  // refused where nothing was before
+          break;
+        case 2:
+          static_cast<void>(store.add_batch(brought, job_of(name)));
+          break;
+        case 3:
+          static_cast<void>(store.add_job(job_of("first"), false, id));
+          break;
+        default:
+          static_cast<void>(store.set_quarantine("cell-7", "first", name, id));
+      }
+    }
+  }
+
+ private:
+  std::vector<int> kinds_;
+};
+
+/// Everything that the changes change.
+std::string contents(const Store& store) {
+  std::string all = fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
+  if (const auto before = store.previous_in_force("cell-7")) all += fmt::format(", before {}", fmt::join(*before, " "));
+  for (const StoredBatch& one : demand(store.batches("cell-7"))) all += "\n" + one.id + " " + one.quarantine;
+  for (const StoredJob& one : demand(store.unfinished_jobs()))
+    all += fmt::format("\njob of {}", fmt::join(one.batch_ids, " "));
+  return all;
+}
+
+TEST_F(StoreFaults, AfterAKillAtAnyCallEveryChangeThatIsAskedForAgainHasHappenedOnce) {
+  constexpr int kSeeds = 10, kPoints = 32;
+  open();
+  for (int i = 1; i <= 3; ++i) put_in_force(i);
+  ASSERT_TRUE(store_->add_batch(batch("first"), job_of("first")));
+  store_.reset();
+  const auto fresh_copy = [&](const test::TemporaryFolder& to) {
+    fs::copy(folder_.path(), to.path(), fs::copy_options::recursive);
+    return to.file("trammel.db");
+  };
+  int killed = 0;
+  auto* answered = static_cast<std::size_t*>(
+      ::mmap(nullptr, sizeof(std::size_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Changes changes(static_cast<std::uint64_t>(seed));
+    std::string expected;
+    std::size_t calls = 0;
+    {
+      test::TemporaryFolder whole;
+      test::FaultyDisk disk;
+      auto store = demand(Store::open(fresh_copy(whole)));
+      const std::size_t before = disk.calls();
+      std::size_t next = 0;
+      changes.ask(*store, &next);
+      calls = disk.calls() - before;
+      expected = contents(*store);
+      store.reset();
+    }
+    for (int point = 0; point < kPoints; ++point) {
+      test::TemporaryFolder left;
+      const std::string path = fresh_copy(left);
+      *answered = 0;
+      const pid_t child = ::fork();
+      ASSERT_GE(child, 0);
+      if (child == 0) {
+        test::FaultyDisk disk;
+        auto store = Store::open(path);
+        auto calls_left = static_cast<int>(calls) * point / kPoints;
+        disk.set_plan([calls_left](auto, const std::string&) mutable {
+          if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
+          return SQLITE_OK;
+        });
+        if (store) changes.ask(**store, answered);
+        ::_exit(0);
+      }
+      int status = 0;
+      ASSERT_EQ(::waitpid(child, &status, 0), child);
+      killed += WIFSIGNALED(status) ? 1 : 0;
+      const auto store = demand(Store::open(path));
+      EXPECT_FALSE(store->versions_to_serve("cell-7").empty());
+      changes.ask(*store, answered);  // the client knows what was answered, and repeats the rest
+      EXPECT_EQ(contents(*store), expected)
+          << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
+    }
+  }
+  EXPECT_GE(killed, kSeeds * (kPoints - 1));
+}
+
+TEST_F(StoreFaults, WhateverPageIsDamagedTheLastModelOfEveryCellIsServed) {
+  open();
+  for (int i = 1; i <= 3; ++i) {
+    const std::string id = std::to_string(i);
+    ASSERT_TRUE(store_->add_batch(batch(id), job_of(id)));
+    put_in_force(i);
+    put_in_force(i, "cell-8");
+  }
+  store_.reset();
+  const std::string good = test::read_file(path_);
+  const auto pages = static_cast<std::streamoff>(good.size()) / kPage;
+  ASSERT_GT(pages, 20);
+  for (std::streamoff page = 0; page < pages; ++page) {
+    for (const std::streamoff at : {std::streamoff{0}, std::streamoff{1500}}) {
+      std::ofstream(path_, std::ios::binary) << good;
+      overwrite(page * kPage + at, 600);
+      auto opened = Store::open(path_);
+      ASSERT_TRUE(opened) << "page " << page << ": " << sentence(opened.error());
+      store_ = std::move(*opened);
+      EXPECT_EQ(served("cell-7"), 3) << "page " << page;
+      EXPECT_EQ(served("cell-8"), 3) << "page " << page;
+      static_cast<void>(store_->unfinished_jobs());
+      store_.reset();
+    }
+  }
+}
+
+TEST_F(StoreFaults, WithoutCopiesADamagedModelIsAnErrorOfItsOwnAndOlderOnesAreServed) {
+  open();
+  put_in_force(1);
+  put_in_force(2);
+  put_in_force(1, "cell-8");
+  store_.reset();
+  forget_copies();
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'x' WHERE version = 2"); }
+  open();
+  forget_copies();
+  EXPECT_EQ(store_->versions_to_serve("cell-7"), (std::vector<int>{2, 1}));
+  EXPECT_EQ(served(), 1);
+  EXPECT_EQ(served("cell-8"), 1);
+}
+
+TEST_F(StoreFaults, AModelThatIsDamagedInTheStoreIsServedFromItsCopyAndThatIsSaid) {
+  open();
+  put_in_force(1);
+  put_in_force(2);
+  store_.reset();
+  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'x' WHERE version = 2"); }
+  open();
+  EXPECT_EQ(served(), 2);
+  ASSERT_EQ(store_->state().damages.size(), 1u);
+  EXPECT_NE(store_->state().damages.front().find("its copy is served"), std::string::npos);
+}
+
+TEST_F(StoreFaults, AStoreThatWasEmptiedOrIsNoStoreAnyMoreIsLeftAloneAndItsModelsAreServed) {
+  open();
+  put_in_force(1);
+  put_in_force(2);
+  store_.reset();
+  for (const std::string& left : {std::string(), std::string(20000, 'x')}) {
+    std::ofstream(path_, std::ios::binary) << left;
+    open();
+    EXPECT_EQ(served(), 2);
+    const auto refused = store_->add_batch(batch("a"), job_of("a"));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kInternal) << sentence(refused.error());
+    EXPECT_FALSE(store_->state().readable);
+    store_.reset();
+    EXPECT_EQ(test::read_file(path_), left);
+  }
+}
+
+TEST_F(StoreFaults, TheStoreOfAnotherServerInItsPlaceIsLeftAloneAndTheModelsThatServedHereGoOn) {
+  const std::string other = folder_.file("other.db");
+  {
+    auto store = demand(Store::open(other));
+    ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 77), 0, true, "another server's"));
+  }
+  open();
+  put_in_force(1);
+  const std::string hash = demand(store_->model("cell-7", 1)).provenance().hash;
+  store_.reset();
+  fs::copy_file(other, path_, fs::copy_options::overwrite_existing);
+  open();
+  EXPECT_EQ(demand(store_->model("cell-7", served())).provenance().hash, hash);
+  EXPECT_FALSE(store_->add_batch(batch("a"), job_of("a")));
+}
+
+TEST_F(StoreFaults, AStoreThatWentBackToABackupTakesBackWhatWasInForceSince) {
+  open();
+  put_in_force(1);
+  store_.reset();
+  const std::string backup = test::read_file(path_);
+  open();
+  put_in_force(2);
+  put_in_force(3);
+  store_.reset();
+  std::ofstream(path_, std::ios::binary) << backup;
+  open();
+  EXPECT_EQ(served(), 3);
+  ASSERT_TRUE(store_->take_back_from_copy("cell-7"));
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 3);
+  put_in_force(4);
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 4) << "a number that was taken is not given again";
+  restart();
+  EXPECT_EQ(served(), 4);
+  EXPECT_EQ(demand(store_->rollback("cell-7")), 3);
+}
+
+TEST_F(StoreFaults, AJournalThatIsLostDamagedOrCutLosesNothing) {
+  open();
+  std::string journal;
+  for (int i = 1; i <= 3; ++i) {
+    const std::string id = std::to_string(i);
+    ASSERT_TRUE(store_->add_batch(batch(id), job_of(id)));
+    put_in_force(i);
+    journal = test::read_file(path_ + "-wal");
+  }
+  const std::string file = test::read_file(path_);
+  const std::vector<std::string> journals = {"", journal.substr(0, journal.size() / 2), journal.substr(0, 20),
+                                             std::string(journal.size(), 'x'), journal};
+  for (const std::string& left : journals) {
+    test::TemporaryFolder crashed;
+    std::ofstream(crashed.file("trammel.db"), std::ios::binary) << file;
+    if (!left.empty()) std::ofstream(crashed.file("trammel.db-wal"), std::ios::binary) << left;
+    const auto store = demand(Store::open(crashed.file("trammel.db")));
+    EXPECT_EQ(demand(store->batches("cell-7")).size(), 3u);
+    EXPECT_EQ(demand(store->version_in_force("cell-7")), 3);
+    EXPECT_TRUE(store->model("cell-7", 3));
+  }
+}
+
+}  // namespace
+}  // namespace trammel
