@@ -68,7 +68,7 @@ class Call final : public Job {
   using Request = wire::Received<typename Operation::Request::type>;
   using Reply = typename Operation::Reply::type;
   /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
-  static constexpr bool kComputes = AsksForTargets<Request> || AsksForJoints<Request>;
+  static constexpr bool kComputes = AsksForTargets<Request> || AsksForPoses<Request>;
 
   /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids. `while_under_way`
   /// is kept until the call is over.

@@ -341,7 +341,7 @@ TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatC
   EXPECT_EQ(answered[0].predictions().size(), 1U) << "the thief's poses came as the victim's answer";
   const auto session = open_session(server_.options());
   std::uint64_t misdirected = 0;
-  for (int look = 0; misdirected == 0 && look < 50; ++look) {
+  for (int look = 0; misdirected == 0 && look < 20000; ++look) {
     static_cast<void>(session->models("cell-7"));  // its status comes every second
     misdirected = session->servers().value().front().misdirected;
   }
