@@ -165,7 +165,7 @@ TEST_F(DaemonTest, ARollbackThatIsRepeatedAfterACrashGoesBackOnce) {
   ASSERT_TRUE(repeated) << repeated.error().message;
   EXPECT_EQ(*repeated, *back);
   EXPECT_EQ(model().version, *back) << "it went back twice";
-  once.id = "another one";
+  once.id = "another-one";
   EXPECT_EQ(session_->rollback("cell-7", once).error().code, ErrorCode::kConflict) << "another version is in force";
   once.id = "rollback-of-this-test";
   EXPECT_EQ(session_->activate("cell-7", last, once).error().code, ErrorCode::kConflict) << "the id is of a rollback";
