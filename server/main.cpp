@@ -132,6 +132,17 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
+/// Whoever asks for nonsense all day does not fill the log of a service that logs what happens.
+void log_call(const CallReport& call) {
+  const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
+  if (!call.refused.empty()) {
+    spdlog::debug("{}: {} of request {}{} is refused: {}", call.cell, call.operation, call.request, trace,
+                  call.refused);
+  } else {
+    spdlog::info("{}: {} of request {}{} is done", call.cell, call.operation, call.request, trace);
+  }
+}
+
 /// Takes the signals that end the service in a thread of its own; all other threads block them. A signal ends the
 /// process within kOrderlyStop, even if another thread hangs.
 class StopSignals {
@@ -195,6 +206,7 @@ Status serve(const ServerConfig& config) {
   ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
+  service.set_call_listener(log_call);
   service.set_packet_listener([](const std::string& dropped) { spdlog::warn("{}", dropped); });
   trainer.set_listeners(
       [&service](const JobProgress& progress) {

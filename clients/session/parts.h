@@ -43,8 +43,8 @@ template <typename Item>
 using AskPart = std::function<Result<Answer<Item>>(std::size_t first, std::size_t count)>;
 
 /// The answers to `items` items, all from one model. If the model changes between two parts, all items are asked again.
-/// A part that is not answered in time is asked again in smaller ones, a few times. kBusy: the model changed again and
-/// again. `progress` may be empty; `now` is the clock.
+/// A part that is not answered in time, or that a busy server has no time for, is asked again in smaller ones, a few
+/// times. kBusy: that did not help, or the model changed again and again. `progress` may be empty; `now` is the clock.
 template <typename Item>
 [[nodiscard]] Result<Answer<Item>> ask_in_parts(std::size_t items, const std::string& cell, PartSize size,
                                                 const AskPart<Item>& ask, const std::function<void(double)>& progress,
@@ -60,7 +60,8 @@ template <typename Item>
       const std::size_t count = std::min(size.next(), items - done);
       const PartSize::Seconds begun = now();
       auto part = ask(done, count);
-      const bool too_late = !part && part.error().code == ErrorCode::kUnreachable;
+      const bool too_late =
+          !part && (part.error().code == ErrorCode::kUnreachable || part.error().code == ErrorCode::kBusy);
       if (too_late && done > 0 && count > 1 && smaller_parts_left-- > 0) {
         size.timed_out(count);
         continue;

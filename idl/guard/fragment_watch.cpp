@@ -42,17 +42,24 @@ std::optional<Dropped> UnfinishedSamples::begin(const EndpointKey& writer, const
 std::size_t SentSamples::place(std::uint32_t writer, std::int64_t sequence_number) {
   const std::uint64_t mixed =
       (std::uint64_t{writer} << 32 ^ static_cast<std::uint64_t>(sequence_number)) * 0x9e3779b97f4a7c15u;
-  return static_cast<std::size_t>(mixed >> 40) % kSamples;
+  return static_cast<std::size_t>(mixed >> 40) % kSets;
 }
 
 void SentSamples::add(const Fragments& fragments) {
-  (*samples_)[place(fragments.writer, fragments.sequence_number)] = {fragments.writer, fragments.of_sample(),
-                                                                     fragments.sequence_number};
+  Set& set = (*sets_)[place(fragments.writer, fragments.sequence_number)];
+  Sample* into = set.data();
+  for (Sample& sample : set) {
+    if (sample.writer == fragments.writer && sample.sequence_number == fragments.sequence_number) return;
+    if (sample.sequence_number < into->sequence_number) into = &sample;
+  }
+  *into = {fragments.writer, fragments.of_sample(), fragments.sequence_number};
 }
 
 bool SentSamples::has(std::uint32_t writer, std::int64_t sequence_number, std::uint32_t fragment) const {
-  const Sample& sample = (*samples_)[place(writer, sequence_number)];
-  return sample.writer == writer && sample.sequence_number == sequence_number && fragment <= sample.fragments;
+  const Set& set = (*sets_)[place(writer, sequence_number)];
+  return std::any_of(set.begin(), set.end(), [&](const Sample& sample) {
+    return sample.writer == writer && sample.sequence_number == sequence_number && fragment <= sample.fragments;
+  });
 }
 
 }  // namespace trammel::wire

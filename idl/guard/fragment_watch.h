@@ -59,10 +59,11 @@ class SentSamples {
     std::uint32_t fragments = 0;
     std::int64_t sequence_number = 0;  // 0: free
   };
-  static constexpr std::size_t kSamples = 4096;
+  static constexpr std::size_t kSets = 1024;
+  using Set = std::array<Sample, 4>;
   static std::size_t place(std::uint32_t writer, std::int64_t sequence_number);
 
-  std::unique_ptr<std::array<Sample, kSamples>> samples_ = std::make_unique<std::array<Sample, kSamples>>();
+  std::unique_ptr<std::array<Set, kSets>> sets_ = std::make_unique<std::array<Set, kSets>>();
 };
 
 }  // namespace trammel::wire

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,6 +53,8 @@ class CompensatedModel {
                                         const std::string& payload) const;
   /// The same at many poses, faster for a bias with blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
+  /// As BiasModel::prepare(): so that the first targets do not wait.
+  void prepare(const std::function<bool()>& go_on) const;
   /// The physics with which the bias was learned.
   [[nodiscard]] BiasPhysics learned_physics() const;
   /// The learned bias, if any, and the features of a pose for it.
@@ -98,10 +101,8 @@ class CompensatedModel {
   };
   /// With the mean temperature of the training where none is given.
   [[nodiscard]] PoseContext completed(PoseContext asked) const;
-  /// `bias_weight`: taken instead of the one that follows from the domain.
-  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, std::optional<double> bias_weight) const;
-  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned,
-                                        std::optional<double> bias_weight) const;
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked) const;
+  [[nodiscard]] ErrorPrediction predict(const PoseContext& asked, const Learned* learned) const;
   /// The arm at a pose as the calibration has it.
   struct CalibratedPose {
     PoseContext context;  ///< completed

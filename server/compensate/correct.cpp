@@ -187,7 +187,7 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.q = start->q;
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
 
-  const ErrorPrediction before = predict(context, std::nullopt);
+  const ErrorPrediction before = predict(context);
   result.error_before =
       rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
   result.error_after = result.error_before;
@@ -209,14 +209,13 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return end(CorrectionStatus::kNotConverged,
                fmt::format("{:.2e} mm left after {} iterations", to_mm(result.left), result.iterations));
   }
-  context.q = found.joints.q;
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
-  const ErrorPrediction after = found.iterations > 0 ? predict(context, bias_weight) : before;
-  result.error_after = rms(found.missing.head<3>(), after.true_stddev_B);
+  // The standard deviation is that at the target: a correction moves it by far less than it is known.
+  result.error_after = rms(found.missing.head<3>(), before.true_stddev_B);
   result.stddev = result.error_after / std::sqrt(3.0);
   result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
-  result.turn_after = turn_rms(found.missing.tail<3>(), after.rotation_stddev_B, sigma_rotation);
+  result.turn_after = turn_rms(found.missing.tail<3>(), before.rotation_stddev_B, sigma_rotation);
   if (before.in_domain) return end(CorrectionStatus::kOk, "");
   return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
 }

@@ -29,7 +29,8 @@ struct Target {
 
 /// A corrected target. One that is neither ok nor out of domain is not corrected: the wanted pose is commanded.
 /// Expected errors are root mean squares of the true distance from the target, without the instrument's noise; NaN
-/// where no joints bring the tool there.
+/// where no joints bring the tool there. Their standard deviations are those at the target, before and after: a
+/// correction moves the joints by milliradians, and a standard deviation changes over a length scale of the bias.
 struct Correction {
   CorrectionStatus status = CorrectionStatus::kRefused;
   Pose X_BT_wanted = Pose::Identity();

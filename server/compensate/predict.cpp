@@ -49,12 +49,12 @@ ErrorPrediction CompensatedModel::predict(const JointVector& q, const std::strin
   context.tool = tool;
   context.payload = payload;
   context.served = true;
-  return predict(context, std::nullopt);
+  return predict(context);
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, std::optional<double> bias_weight) const {
-  if (!inside_->bias) return predict(asked, nullptr, bias_weight);
-  return predict(asked, &learned({asked}).front(), bias_weight);
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked) const {
+  if (!inside_->bias) return predict(asked, nullptr);
+  return predict(asked, &learned({asked}).front());
 }
 
 std::vector<CompensatedModel::Learned> CompensatedModel::turn(std::vector<Learned> all) const {
@@ -94,7 +94,7 @@ std::vector<ErrorPrediction> CompensatedModel::predict_all(const std::vector<Pos
   if (inside_->bias) all = learned(poses);
   std::vector<ErrorPrediction> predictions;
   for (std::size_t i = 0; i < poses.size(); ++i)
-    predictions.push_back(predict(poses[i], all.empty() ? nullptr : &all[i], std::nullopt));
+    predictions.push_back(predict(poses[i], all.empty() ? nullptr : &all[i]));
   return predictions;
 }
 
@@ -235,8 +235,7 @@ void CompensatedModel::add_rotation_bias(const CalibratedPose& pose, const BiasP
   prediction->rotation_stddev_B = with_bias(bias, weight, inside_->bias_has_parameters, of).diagonal().cwiseSqrt();
 }
 
-ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned,
-                                          std::optional<double> bias_weight) const {
+ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learned* learned) const {
   const PhysicalModel& physics = parts().physics;
   CalibratedPose pose{completed(asked), physics.X_WB.inverse(), {}, 0};
   const PoseContext& context = pose.context;
@@ -256,7 +255,7 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   } else {
     const double share = learned->position.prior_share;
     prediction.in_domain &= share <= parts().prior_share_limit;
-    prediction.bias_weight = bias_weight.value_or(trained_with ? domain.bias_weight(context.q, share) : 0.0);
+    prediction.bias_weight = trained_with ? domain.bias_weight(context.q, share) : 0.0;
     covariance = add_position_bias(pose, learned->position, &prediction) + unsaid;
     if (inside_->bias_has_parameters && prediction.bias_weight < 1) {
       // Near its poses the bias has learned this; part of it went into the weights, so its direction is not known.

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -65,6 +66,7 @@ RoomLimits room_limits(const DdsOptions& options) {
 TurnLimits compute_limits(const DdsOptions& options) {
   TurnLimits limits;
   limits.workers = static_cast<std::size_t>(options.compute_workers);
+  limits.express_workers = 1;
   limits.client_requests = static_cast<std::size_t>(options.client_requests);
   limits.requests = static_cast<std::size_t>(options.queued_requests);
   limits.cell_share = options.cell_share;
@@ -75,6 +77,7 @@ TurnLimits compute_limits(const DdsOptions& options) {
 TurnLimits limits_of_reads(const DdsOptions& options) {
   TurnLimits limits = compute_limits(options);
   limits.workers = 4;
+  limits.express_workers = 0;
   limits.client_workers = 2;
   return limits;
 }
@@ -83,6 +86,7 @@ TurnLimits limits_of_reads(const DdsOptions& options) {
 TurnLimits limits_of_changes(const DdsOptions& options) {
   TurnLimits limits = compute_limits(options);
   limits.workers = 8;
+  limits.express_workers = 0;
   limits.client_workers = 4;
   limits.cell_workers = 1;
   return limits;
@@ -112,7 +116,8 @@ class DdsService::Running {
 
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
-                                                              const PacketListener& packet_listener) {
+                                                              const PacketListener& packet_listener,
+                                                              const CallListener& call_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
@@ -134,6 +139,7 @@ class DdsService::Running {
 
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));
+    running->core_.listener = call_listener;
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
@@ -191,8 +197,8 @@ class DdsService::Running {
         topics_(topics),
         echo_(std::move(echo)),
         channels_(
-            *participant_, static_cast<std::size_t>(options.max_clients),
-            [events = events_.get()] { events->status_changed(); }, replying_),
+            *participant_, static_cast<std::size_t>(options.max_clients), [events = events_.get()] { events->wake(); },
+            replying_),
         room_(room_limits(options)),
         predictions_(compute_limits(options), room_),
         corrections_(compute_limits(options), room_),
@@ -230,14 +236,20 @@ class DdsService::Running {
 
   void tell_status(const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "status");
-    bool clients_wait = false;
+    ServiceEvents::News news{true, {}};
+    Clock::time_point told;
     while (!stop.stop_requested()) {
-      publish_status(wire::SERVICE_SERVING);
+      if (news.status_changed || Clock::now() - told >= wire::kStatusPeriod) {
+        publish_status(wire::SERVICE_SERVING);
+        told = Clock::now();
+      }
       ++status_steps_;
       if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
-      channels_.heard(events_->wait(stop, clients_wait ? wire::kAnnouncement : wire::kStatusPeriod));
+      const bool clients_wait = channels_.tend();
       ++status_steps_;
-      clients_wait = channels_.tend();
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
+      news = events_->wait(stop, clients_wait ? std::min(left, wire::kAnnouncement) : left);
+      channels_.heard(news.readers);
     }
   }
 
@@ -310,6 +322,8 @@ DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const
 
 DdsService::~DdsService() { stop(); }
 
+void DdsService::set_call_listener(CallListener listener) { call_listener_ = std::move(listener); }
+
 void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
   packet_listener_ = std::move(listener);
 }
@@ -320,7 +334,7 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);

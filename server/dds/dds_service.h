@@ -6,6 +6,7 @@
 
 #include "server/base/mutex.h"
 #include "server/base/result.h"
+#include "server/dds/call_report.h"
 #include "server/dds/dds_options.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
@@ -27,6 +28,9 @@ class DdsService {
   /// Called with a sentence for the log when packets have been dropped (idl/guard), at most once a minute, in a thread
   /// of the service. Set it before start().
   void set_packet_listener(std::function<void(const std::string& dropped)> listener);
+  /// Called when a request was to change something, or was refused, in the thread that answers it. Set it before
+  /// start().
+  void set_call_listener(CallListener listener);
   /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses a port that is
   /// taken, an address that this host does not have, and a server or cell name that the wire does not allow.
   [[nodiscard]] Status start();
@@ -46,6 +50,7 @@ class DdsService {
 
   const DdsOptions options_;
   std::function<void(const std::string&)> packet_listener_ = [](const std::string&) {};
+  CallListener call_listener_;
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;

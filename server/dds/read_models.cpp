@@ -1,4 +1,5 @@
-#include <algorithm>
+#include <map>
+#include <string>
 
 #include "idl/limits.h"
 #include "server/compensate/model_file.h"
@@ -69,10 +70,17 @@ Result<ReadModelsReply> Handlers::job_of(std::int64_t job) const {
 Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
   const auto models = store_.models(cell);
   if (!models) return tl::make_unexpected(models.error());
+  const auto batches = store_.batches(cell);
+  if (!batches) return tl::make_unexpected(batches.error());
+  std::map<std::string, std::string> hashes;  // by batch; of several batches together none is stored
+  for (const StoredBatch& batch : *batches) hashes[batch.id] = batch.hash;
   ReadModelsReply reply;
   const std::int64_t now = unix_now_s();
-  for (std::size_t i = first_of_last(*models, wire::MAX_VERSIONS); i < models->size(); ++i)
+  for (std::size_t i = first_of_last(*models, wire::MAX_VERSIONS); i < models->size(); ++i) {
     reply.models().push_back(to_wire((*models)[i], now));
+    const auto hash = hashes.find((*models)[i].batch_id);
+    if (hash != hashes.end()) reply.models().back().batch_hash(hash->second);
+  }
   return reply;
 }
 

@@ -120,20 +120,16 @@ void ReplyChannels::matched() {
   due_.notify_all();
 }
 
-std::unique_ptr<ReplyChannels::Expectation> ReplyChannels::expect(const std::string& participant,
+std::shared_ptr<ReplyChannels::Expectation> ReplyChannels::expect(const std::string& participant,
                                                                   const std::string& partition) {
-  bool has_channel = false;
+  bool wants_channel = false;
   {
     const MutexLock lock(mutex_);
-    if (!book_.may_listen(participant, partition)) {
-      ++unheard_;
-      return nullptr;
-    }
-    book_.asked(partition, Clock::now());
-    has_channel = channels_.contains(partition);
+    if (!book_.may_listen(participant, partition)) return nullptr;
+    wants_channel = book_.asked(partition, Clock::now());
   }
-  if (!has_channel) wants_tending_();
-  return std::make_unique<Expectation>(*this, partition);
+  if (wants_channel) wants_tending_();
+  return std::make_shared<Expectation>(*this, partition);
 }
 
 void ReplyChannels::answered(const std::string& partition) {

@@ -53,7 +53,7 @@ class ReplyChannels final : public ReplySink {
     const std::string partition_;
   };
   /// Null when another participant listens in the partition: it would get the reply.
-  [[nodiscard]] std::unique_ptr<Expectation> expect(const std::string& participant, const std::string& partition);
+  [[nodiscard]] std::shared_ptr<Expectation> expect(const std::string& participant, const std::string& partition);
 
   /// Writes the reply, or keeps it until the client's reader is matched.
   void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override;

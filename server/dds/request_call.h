@@ -11,6 +11,7 @@
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
+#include "server/dds/call_report.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/reply_memory.h"
@@ -57,6 +58,7 @@ struct CallContext {
   ReplyMemory<Reply> memory{kRepliesRemembered};  ///< of operations that change something, by request id
   ReplyMemory<Reply> lately{kLately};             ///< of long computations, by writer and request id
   UnderWay under_way = {};
+  CallListener listener = {};  ///< told of what was to change something, and of what was refused
 };
 
 /// A request from its arrival to its reply.
@@ -66,7 +68,7 @@ class Call final : public Job {
   using Request = wire::Received<typename Operation::Request::type>;
   using Reply = typename Operation::Reply::type;
   /// Whether an answer is computed in portions. Then a repeat gets the kept reply.
-  static constexpr bool kComputes = AsksForTargets<Request> || AsksForJoints<Request>;
+  static constexpr bool kComputes = AsksForTargets<Request> || AsksForPoses<Request>;
 
   /// `sent`: the DDS writer of the sample with the request id: clients may reuse each other's ids. `while_under_way`
   /// is kept until the call is over.
@@ -109,6 +111,7 @@ class Call final : public Job {
     }
     const bool is_good = reply_.header().result() == wire::RESULT_OK;
     if (!is_known_) remember(is_good);
+    report(is_good);
     const std::uint64_t times = answer(&ReplySink::send);
     context_.counts.requests += times;
     if (!is_good) context_.counts.refused += times;
@@ -196,6 +199,14 @@ class Call final : public Job {
     if (happens_once(*request_)) {
       context_.memory.remember(request_id_text(request_->header().request_id()), reply_);
     }
+  }
+
+  void report(bool is_good) const {
+    const bool changes = happens_once(*request_);
+    if (!context_.listener || (is_good && !changes)) return;
+    const wire::RequestHeader& header = request_->header();
+    context_.listener({Operation::kName, request_id_text(header.request_id()), header.trace_id().to_string(),
+                       request_->about().cell(), changes, reply_.header().message()});
   }
 
   /// Returns how many were answered: with the repeats that have come meanwhile.

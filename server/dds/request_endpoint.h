@@ -25,6 +25,7 @@ struct ServiceCore {
   const Trainer& trainer;  ///< knows which cells are served
   Handlers& handlers;
   ReplyChannels& channels;
+  CallListener listener{};
   CallCounts counts{};
   /// Dropped: not even the header could be read.
   std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
@@ -81,7 +82,9 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
       : core_(core),
         lanes_(lanes),
-        context_{core.server_id, std::move(reply_topic), core.handlers, core.channels, core.counts} {}
+        context_{core.server_id, std::move(reply_topic), core.handlers, core.channels, core.counts} {
+    context_.listener = core.listener;
+  }
 
   void on_data_available(wire::dds::DataReader* reader) override {
     wire::dds::SampleInfo info;
@@ -135,7 +138,8 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     const auto now = std::chrono::steady_clock::now();
     const std::chrono::milliseconds deadline(request.header().deadline_ms());
     ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
-    if (deadline.count() > 0) ask.finish_by = ask.start_by;
+    // A change that has begun is worth its end: a repeat gets the outcome.
+    if (deadline.count() > 0 && !happens_once(request)) ask.finish_by = ask.start_by;
     return ask;
   }
 

@@ -14,12 +14,16 @@ concept AsksForTargets = requires(const Request& request) {
   request.targets();
 };
 template <typename Request>
-concept AsksForJoints = requires(const Request& request) {
+concept AsksForPoses = requires(const Request& request) {
   request.poses();
 };
 template <typename Request>
 concept HasAction = requires(const Request& request) {
   request.action();
+};
+template <typename Request>
+concept IsQuestion = requires(const Request& request) {
+  request.what();
 };
 
 /// Items that are computed apart from each other.
@@ -27,7 +31,7 @@ template <typename Request>
 [[nodiscard]] std::size_t items_of(const Request& request) {
   if constexpr (AsksForTargets<Request>) {
     return request.targets().size();
-  } else if constexpr (AsksForJoints<Request>) {
+  } else if constexpr (AsksForPoses<Request>) {
     return request.poses().size();
   } else {
     return 1;
@@ -39,8 +43,7 @@ template <typename Request>
 [[nodiscard]] std::size_t bytes_of_request(const Request& request) {
   constexpr std::size_t kAskedAndAnswered = 1024;  // of one item
   std::size_t bytes = sizeof(Request) + kAskedAndAnswered * items_of(request);
-  if constexpr (requires { request.model_text(); }) bytes += request.model_text().size();
-  if constexpr (requires { request.csv(); }) bytes += request.csv().size();
+  if constexpr (requires { request.bytes; }) bytes += request.bytes;  // serialized
   return bytes;
 }
 
@@ -62,6 +65,7 @@ template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {
   std::string work = cell + '/' + operation;
   if constexpr (HasAction<Request>) work += '/' + std::to_string(static_cast<int>(request.action()));
+  if constexpr (IsQuestion<Request>) work += '/' + std::to_string(static_cast<int>(request.what()));
   if constexpr (requires { request.what(); }) work += '/' + std::to_string(static_cast<int>(request.what()));
   return work;
 }

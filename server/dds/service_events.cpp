@@ -14,22 +14,30 @@ void ServiceEvents::status_changed() {
   {
     const MutexLock lock(mutex_);
     status_changed_ = true;
+    woken_ = true;
   }
   changed_.notify_one();
 }
 
-std::vector<ReaderEvent> ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
+void ServiceEvents::wake() {
+  {
+    const MutexLock lock(mutex_);
+    woken_ = true;
+  }
+  changed_.notify_one();
+}
+
+ServiceEvents::News ServiceEvents::wait(const std::stop_token& stop, std::chrono::milliseconds limit) {
   MutexLock lock(mutex_);
-  changed_.wait_for(lock, stop, limit, [this]() TRAMMEL_REQUIRES(mutex_) {
-    return status_changed_ || !readers_.empty() || !left_.empty();
-  });
-  status_changed_ = false;
-  std::vector<ReaderEvent> events = std::exchange(readers_, {});
+  changed_.wait_for(lock, stop, limit,
+                    [this]() TRAMMEL_REQUIRES(mutex_) { return woken_ || !readers_.empty() || !left_.empty(); });
+  woken_ = false;
+  News news{std::exchange(status_changed_, false), std::exchange(readers_, {})};
   // Last: no participant comes back under the same name.
   for (const std::string& participant : std::exchange(left_, {})) {
-    events.push_back({ReaderEvent::Kind::kLeft, {participant, {}, {}}});
+    news.readers.push_back({ReaderEvent::Kind::kLeft, {participant, {}, {}}});
   }
-  return events;
+  return news;
 }
 
 void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,

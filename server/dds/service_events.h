@@ -23,11 +23,18 @@ struct ReaderEvent {
 /// the participants that have left, and nothing else. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
-  /// The status thread has something to do.
+  /// The status is to be published.
   void status_changed();
-  /// Waits until the status has changed or discovery has found something, at most `limit`. Returns what has been found
-  /// since the last call.
-  [[nodiscard]] std::vector<ReaderEvent> wait(const std::stop_token& stop, std::chrono::milliseconds limit);
+  /// The status thread has something else to do.
+  void wake();
+
+  /// What has happened since the last call of wait().
+  struct News {
+    bool status_changed = false;
+    std::vector<ReaderEvent> readers = {};
+  };
+  /// Waits until something has happened, at most `limit`.
+  [[nodiscard]] News wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
  private:
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
@@ -37,6 +44,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
 
   Mutex mutex_;
   Condition changed_;
+  bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;
   bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::vector<ReaderEvent> readers_ TRAMMEL_GUARDED_BY(mutex_);
   std::set<std::string> left_ TRAMMEL_GUARDED_BY(mutex_);  // participants

@@ -66,27 +66,4 @@ void StoreConnection::note_damage(const std::string& what) {
     damages.push_back(what);
 }
 
-StoreState Store::state() const { return connection_->state(); }
-
-Status Store::try_again() {
-  if (!connection_->state().why_not_written) return {};
-  return connection_->in_transaction([](SQLite::Database& database) -> Status {
-    change(database, "UPDATE store_identity SET id = id");
-    return {};
-  });
-}
-
-bool Store::wait_until_writable(const std::stop_token& stop) {
-  constexpr std::chrono::seconds kTick{1};
-  StoreConnection& connection = *connection_;
-  while (!stop.stop_requested()) {
-    if (try_again()) return true;
-    MutexLock guard(connection.state_mutex);
-    connection.state_changed.wait_for(guard, stop, kTick, [&connection]() TRAMMEL_REQUIRES(connection.state_mutex) {
-      return !connection.state_now.why_not_written;
-    });
-  }
-  return false;
-}
-
 }  // namespace trammel

@@ -13,7 +13,8 @@
 #include "server/base/result.h"
 #include "server/store/open_database.h"
 #include "server/store/served_copies.h"
-#include "server/store/store.h"
+#include "server/store/statements.h"
+#include "server/store/store_state.h"
 #include "server/store/writer_lock.h"
 
 namespace trammel {
@@ -84,31 +85,5 @@ struct StoreConnection {
   bool must_be_opened_anew TRAMMEL_GUARDED_BY(mutex) = false;
   std::chrono::steady_clock::time_point tried_last TRAMMEL_GUARDED_BY(mutex) = {};
 };
-
-/// A prepared statement with its values bound in order.
-template <typename... Values>
-[[nodiscard]] SQLite::Statement prepare(SQLite::Database& database, const char* sql, const Values&... values) {
-  SQLite::Statement statement(database, sql);
-  int index = 0;
-  (statement.bind(++index, values), ...);
-  return statement;
-}
-
-/// Runs a statement that changes something; returns how many rows it changed.
-template <typename... Values>
-int change(SQLite::Database& database, const char* sql, const Values&... values) {
-  return prepare(database, sql, values...).exec();
-}
-
-/// Empty where the column is NULL.
-[[nodiscard]] inline std::optional<std::int64_t> optional_integer(SQLite::Statement& row, int column) {
-  if (row.isColumnNull(column)) return std::nullopt;
-  return row.getColumn(column).getInt64();
-}
-
-[[nodiscard]] inline std::optional<double> optional_number(SQLite::Statement& row, int column) {
-  if (row.isColumnNull(column)) return std::nullopt;
-  return row.getColumn(column).getDouble();
-}
 
 }  // namespace trammel

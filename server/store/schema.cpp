@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/store/connection.h"
 #include "server/store/file_header.h"
+#include "server/store/statements.h"
 
 namespace trammel {
 namespace {

@@ -1,5 +1,6 @@
 #include "server/store/store.h"
 
+#include <chrono>
 #include <memory>
 #include <utility>
 
@@ -18,6 +19,29 @@ Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
   if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Store>(
       new Store(std::make_unique<StoreConnection>(path, std::move(*lock), std::move(*opened), std::move(copies))));
+}
+
+StoreState Store::state() const { return connection_->state(); }
+
+Status Store::try_again() {
+  if (!connection_->state().why_not_written) return {};
+  return connection_->in_transaction([](SQLite::Database& database) -> Status {
+    change(database, "UPDATE store_identity SET id = id");
+    return {};
+  });
+}
+
+bool Store::wait_until_writable(const std::stop_token& stop) {
+  constexpr std::chrono::seconds kTick{1};
+  StoreConnection& connection = *connection_;
+  while (!stop.stop_requested()) {
+    if (try_again()) return true;
+    MutexLock guard(connection.state_mutex);
+    connection.state_changed.wait_for(guard, stop, kTick, [&connection]() TRAMMEL_REQUIRES(connection.state_mutex) {
+      return !connection.state_now.why_not_written;
+    });
+  }
+  return false;
 }
 
 }  // namespace trammel

@@ -11,6 +11,7 @@
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 #include "server/store/job_outcome.h"
+#include "server/store/store_state.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
 /// synchronous=FULL).
@@ -82,15 +83,6 @@ struct ChangeOutcome {
   int version = 0;           ///< of the model that was put in force or stored; 0: of none
   std::int64_t job = 0;      ///< that was queued; 0: none
   std::int64_t made_at = 0;  ///< Unix time, s
-};
-
-/// What the disk lets a store do.
-struct StoreState {
-  std::optional<Error> why_not_written;  ///< set: every change is refused with it
-  bool readable = true;                  ///< false: only the copies of the models that were in force are there
-  std::int64_t since = 0;                ///< Unix time, s, of the last change of either; 0: none since it was opened
-  std::uint64_t failed_writes = 0;
-  std::vector<std::string> damages;  ///< what was found damaged since it was opened, the first hundred
 };
 
 struct StoreConnection;

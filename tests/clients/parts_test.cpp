@@ -101,6 +101,18 @@ TEST(Parts, AProgramWhoseLaterTargetsTakeFarLongerIsAnsweredAllTheSame) {
   for (int i = 0; i < 5000; ++i) EXPECT_EQ(answer->items[static_cast<std::size_t>(i)], 100000 + i);
 }
 
+TEST(Parts, AServerThatHasNoTimeForALongPartIsAskedForShorterOnes) {
+  Service service{Seconds(1e-5)};
+  const auto answer = service.ask(5000, [&](std::size_t first, std::size_t count) -> Result<Answer<int>> {
+    if (count > 300) return failure(ErrorCode::kBusy, "its {} items would be done too late", count);
+    service.per_item = Seconds(0.001);
+    return service.answer(first, count);
+  });
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  ASSERT_EQ(answer->items.size(), 5000U);
+  for (int i = 0; i < 5000; ++i) EXPECT_EQ(answer->items[static_cast<std::size_t>(i)], 100000 + i);
+}
+
 TEST(Parts, AServiceThatIsGoneIsNotAskedForEver) {
   Service service;
   int asked = 0;

@@ -353,8 +353,10 @@ TEST_F(Compensated, WhereAnotherBranchWouldReachItIsSaidAndItDoes) {
 TEST_F(Compensated, WhatIsExpectedAfterwardsIsTheTrueErrorsStddevWithoutTheInstrumentsNoise) {
   const Correction correction = correct(target_at(inside()));
   ASSERT_EQ(correction.status, CorrectionStatus::kOk) << correction.message;
-  const ErrorPrediction there = model().predict(correction.q, "spindle", "spindle");
+  const ErrorPrediction there = model().predict(inside(), "spindle", "spindle");
   EXPECT_NEAR(to_mm(correction.error_after), to_mm(there.true_stddev_B.norm()), 1e-6);
+  const ErrorPrediction commanded = model().predict(correction.q, "spindle", "spindle");
+  EXPECT_NEAR(commanded.true_stddev_B.norm(), there.true_stddev_B.norm(), 0.02 * there.true_stddev_B.norm());
   EXPECT_NEAR(correction.stddev * std::sqrt(3.0), correction.error_after, 1e-12);
   EXPECT_LT(correction.error_after, there.stddev_B.norm());
   EXPECT_GT(to_mm(correction.error_after), 1e-3) << "what the iteration leaves is no error to expect";

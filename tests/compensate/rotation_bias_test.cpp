@@ -85,6 +85,27 @@ VirtualRobot* RotationBias::robot_ = nullptr;
 MeasurementBatch* RotationBias::batch_ = nullptr;
 CompensatedModel* RotationBias::model_ = nullptr;
 
+TEST_F(RotationBias, TheExpectedErrorsOfTheOrientationAreThoseThatAreFound) {
+  double before = 0, after = 0, expected_before = 0, expected_after = 0;
+  const auto turn_to = [](const Correction& correction, const JointVector& q) {
+    const Pose X_BT = robot_->truth.X_WB.inverse() * robot_->truth.pose_W(posed(q));
+    return rotation_log(correction.X_BT_wanted.linear() * X_BT.linear().transpose()).squaredNorm();
+  };
+  for (const Measurement& m : test::measured(*robot_, 80, 74).measurements) {
+    Target target;
+    target.joint_target = true;
+    target.seed = m.context.q;
+    const Correction correction = model_->correct(target, "spindle", "spindle");
+    if (correction.status != CorrectionStatus::kOk) continue;
+    before += turn_to(correction, m.context.q);
+    after += turn_to(correction, correction.q);
+    expected_before += correction.turn_before * correction.turn_before;
+    expected_after += correction.turn_after * correction.turn_after;
+  }
+  EXPECT_NEAR(std::sqrt(before / expected_before), 1, 0.1);
+  EXPECT_NEAR(std::sqrt(after / expected_after), 1, 0.35);
+}
+
 TEST_F(RotationBias, TheTrueOrientationOfCorrectedTargetsIsNearerAndTheIntervalsHold) {
   ASSERT_TRUE(model_->parts().rotation_bias);
   const double calibrated = true_turn_after(trained(*batch_, "none"));

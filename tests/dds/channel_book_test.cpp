@@ -25,7 +25,7 @@ struct Desk {
   }
   void leaves(const std::string& name) { book.left("participant of " + name); }
   void asks(const std::string& name) {
-    book.asked(name, now);
+    static_cast<void>(book.asked(name, now));
     book.answered(name, now);
   }
   void tend(milliseconds later = milliseconds(0)) {
@@ -94,7 +94,7 @@ TEST(ChannelBook, AClientWhoseRequestIsNotAnsweredKeepsItsChannel) {
   Desk desk(1);
   desk.comes("a");
   desk.tend();
-  desk.book.asked("a", desk.now);
+  EXPECT_FALSE(desk.book.asked("a", desk.now)) << "it has a channel";
   desk.comes("b");
   desk.tend(milliseconds(5000));
   EXPECT_TRUE(desk.has("a"));
@@ -143,6 +143,19 @@ TEST(ChannelBook, OnlyTheFirstWhoListensInAPartitionIsAnsweredThere) {
   desk.leaves("b");
   desk.tend();
   EXPECT_TRUE(desk.has("a"));
+}
+
+TEST(ChannelBook, AClientThatIsStartedAgainUnderItsNameFollowsTheOneThatDied) {
+  Desk desk(4);
+  desk.comes("a");
+  desk.tend();
+  desk.book.found({"a, started again", "a", "PredictError_Reply"}, desk.now);
+  desk.tend();
+  EXPECT_FALSE(desk.book.may_listen("a, started again", "a")) << "the first one may still be there";
+  desk.leaves("a");
+  desk.tend();
+  EXPECT_TRUE(desk.book.listens("a, started again", "a"));
+  EXPECT_EQ(desk.open["a"], std::set<std::string>{"PredictError_Reply"});
 }
 
 TEST(ChannelBook, OneParticipantThatListensInAThousandPartitionsTakesFewChannels) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <condition_variable>
 #include <future>
 #include <map>
 #include <mutex>
@@ -282,6 +283,36 @@ TEST_F(ServiceTest, EveryRequestHasExactlyOneAnswer) {
   }
 }
 
+TEST_F(ServiceTest, TheLogTellsWhatWasChangedOrRefusedUnderTheClientsTrace) {
+  std::mutex mutex;
+  std::condition_variable told;
+  std::vector<CallReport> reports;  // guarded by mutex
+  server_.service().set_call_listener([&](const CallReport& report) {
+    {
+      const std::lock_guard lock(mutex);
+      reports.push_back(report);
+    }
+    told.notify_all();
+  });
+  server_.backend().serve(1);
+  server_.start();
+  test::RawClient<wire::ManageModels> client(server_.options().domain, server_.options().port, "raw-1");
+  ASSERT_TRUE(client.wait_until_matched());
+  wire::ManageModelsRequest request;
+  request.header().trace_id("shift-3/program-17");
+  request.about().cell("cell-7");
+  request.change().expected_version(-1);
+  request.version(9);
+  client.send(request, 1);
+  std::unique_lock lock(mutex);
+  ASSERT_TRUE(told.wait_for(lock, kLimit, [&] { return !reports.empty(); }));
+  EXPECT_EQ(reports[0].operation, "ManageModels");
+  EXPECT_EQ(reports[0].trace, "shift-3/program-17");
+  EXPECT_EQ(reports[0].cell, "cell-7");
+  EXPECT_TRUE(reports[0].changes);
+  EXPECT_NE(reports[0].refused.find("version 9"), std::string::npos) << reports[0].refused;
+}
+
 TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatClient) {
   server_.backend().serve(1);
   server_.start();
@@ -310,7 +341,7 @@ TEST_F(ServiceTest, ARequestInAnotherClientsNameIsRefusedAndNeverAnsweredToThatC
   EXPECT_EQ(answered[0].predictions().size(), 1U) << "the thief's poses came as the victim's answer";
   const auto session = open_session(server_.options());
   std::uint64_t misdirected = 0;
-  for (int look = 0; misdirected == 0 && look < 50; ++look) {
+  for (int look = 0; misdirected == 0 && look < 20000; ++look) {
     static_cast<void>(session->models("cell-7"));  // its status comes every second
     misdirected = session->servers().value().front().misdirected;
   }
@@ -570,9 +601,13 @@ TEST_F(ServiceTest, ASubmittedBatchIsTrainedWatchedAndPutInForce) {
   ASSERT_EQ(in_force->size(), 1u);
   EXPECT_EQ(in_force->front().version, status->model_version);
   EXPECT_EQ(in_force->front().batch_id, "lt-07");
+  EXPECT_EQ(in_force->front().batch_hash.size(), 64u);
   const auto models = session->models("cell-7");
   ASSERT_TRUE(models);
-  EXPECT_EQ(models->size(), 1u);
+  ASSERT_EQ(models->size(), 1u);
+  EXPECT_EQ(models->front().batch_hash, in_force->front().batch_hash);
+  EXPECT_EQ(status->verdict, "in_force");
+  EXPECT_LT(status->after_mm.value_or(1e9), status->before_mm.value_or(0));
   const auto again = session->train("cell-7", {"lt-07"}, "", "");
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_NE(*again, *job);

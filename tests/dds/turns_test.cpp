@@ -302,6 +302,20 @@ TEST(Turns, ALongRequestGoesToAllWorkersWhenNobodyElseWaits) {
   EXPECT_NE(third->entry, first->entry) << "whoever waits comes before a third worker for the same request";
 }
 
+TEST(Turns, AnExpressWorkerTakesUpShortRequestsOnly) {
+  Shop shop;
+  for (const char* client : {"long", "short"}) ASSERT_TRUE(ask(shop, client, {1}));  // 1 ms an item is known now
+  work_all(shop);
+  ASSERT_TRUE(ask(shop, "long", {500}));
+  EXPECT_FALSE(shop.lane.step(Turns::Which::kShort));
+  ASSERT_TRUE(ask(shop, "short", {1}));
+  EXPECT_TRUE(shop.lane.step(Turns::Which::kShort));
+  EXPECT_EQ(shop.answered["short"], 2);
+  EXPECT_FALSE(shop.lane.step(Turns::Which::kShort));
+  work_all(shop);
+  EXPECT_EQ(shop.answered["long"], 2);
+}
+
 TEST(Turns, ChangesOfOneCellComeOneAfterTheOtherAndDoNotHoldUpAnotherCell) {
   TurnLimits limits;
   limits.workers = 8;

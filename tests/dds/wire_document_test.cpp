@@ -67,6 +67,8 @@ TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
                                                       {"kMaxStateSample", kMaxStateSample},
                                                       {"kRequestDepth", kRequestDepth},
                                                       {"kReplyDepth", kReplyDepth},
+                                                      {"client_requests", DdsOptions().client_requests},
+                                                      {"queued_requests", DdsOptions().queued_requests},
                                                       {"max_clients", DdsOptions().max_clients}};
   std::map<std::string, long long> told;
   for (const Row& row : rows()) {

@@ -89,9 +89,10 @@ void fill(Sample& sample) {
   if constexpr (requires { sample.header().contract_version(wire::CONTRACT_VERSION); })
     sample.header().contract_version(wire::CONTRACT_VERSION);
   if constexpr (requires { sample.about().cell("cell-7"); }) sample.about().cell("cell-7");
-  if constexpr (requires { sample.joints_rad().resize(3); }) {
-    sample.joints_rad().resize(3);
-    for (auto& joints : sample.joints_rad()) joints = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  if constexpr (requires { sample.poses().resize(3); }) {
+    sample.poses().resize(3);
+    for (auto& pose : sample.poses()) pose.joints_rad({0.1, 0.2, 0.3, 0.4, 0.5, 0.6});
+    sample.poses()[1].approach().directions({0, 1, 0, -1, 0, 0});
   }
   if constexpr (requires { sample.targets().resize(3); }) {
     sample.targets().resize(3);

@@ -107,6 +107,18 @@ TEST_P(EveryBuild, MultipliesByATranspose) {
   }
 }
 
+TEST_P(EveryBuild, MultipliesAPackedMatrixInSinglePrecisionByAVector) {
+  for (const auto& [rows, cols] : {std::pair{1, 1}, {24, 6}, {25, 7}, {61, 480}}) {
+    const MatrixXd a = random_joints(rows, 55, cols);
+    const VectorXd k = random_joints(cols, 56, 1);
+    std::vector<float> packed(static_cast<std::size_t>(build().panel_size(rows, cols)));
+    build().pack_panels(rows, cols, a.data(), a.rows(), packed.data());
+    VectorXd product(padded_rows(rows));
+    build().panel_product(rows, cols, packed.data(), k.data(), product.data());
+    EXPECT_LT((product.head(rows) - a.cast<float>().cast<double>() * k).norm(), 1e-12 * cols) << rows << " " << cols;
+  }
+}
+
 TEST_P(EveryBuild, MultipliesATransposeByAMatrix) {
   for (const auto& [k, m, n] : {std::tuple{1, 1, 1}, {7, 5, 3}, {1033, 9, 6}, {64, 4, 4}}) {
     const MatrixXd a = random_joints(k, 53, m);

@@ -86,7 +86,7 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   for (Index d = 0; d < data.y.cols(); ++d) {
     const auto output = static_cast<std::size_t>(d);
     const VectorXd own = data.y.col(d) - data.columns[output] * posterior.weights_;
-    const VarianceForm kept = form == VarianceForm::kExact ? form : VarianceForm::kCompressedOnly;
+    const VarianceForm kept = form == VarianceForm::kCompressed ? VarianceForm::kCompressedOnly : form;
     auto process = GaussianProcess::condition(kernel, data.q, own, data.noise_shape, at.outputs[output], kept);
     if (!process) return std::nullopt;
     posterior.outputs_.push_back(std::move(*process));
@@ -97,7 +97,7 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
     posterior.prior_.col(d).noalias() += data.columns[output].cwiseAbs2() * posterior.column_scale_.cwiseAbs2();
     posterior.inverse_.emplace_back();
     const bool smooth = posterior.outputs_.back().variance_points() < n;
-    if (form != VarianceForm::kExact && !smooth)
+    if (kept == VarianceForm::kCompressedOnly && !smooth)
       posterior.inverse_.back() = minus_triangle(solution->eliminated[output].map(), n);
     const double noise = std::exp(at.outputs[output].log_noise_stddev) * std::sqrt(data.noise_shape.minCoeff());
     const double signal = std::exp(at.outputs[output].log_signal_stddev);

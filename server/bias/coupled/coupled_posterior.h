@@ -24,11 +24,15 @@ class CoupledPosterior {
                                                                  const CoupledHyperparameters& at,
                                                                  VarianceForm form = VarianceForm::kCompressed);
 
-  /// At the rows of `q`; `columns` is H there, not scaled, as in CoupledData. Unless the form is kExact, training poses
-  /// whose covariance with the target is too small to matter are left out. The variance of an output is then off by
-  /// less than 0.003 of its noise variance (bound: DECISIONS.md).
+  /// At the rows of `q`; `columns` is H there, not scaled, as in CoupledData. With kCompressed, training poses whose
+  /// covariance with the target is too small to matter are left out. The variance of an output is then off by less than
+  /// 0.003 of its noise variance (bound: DECISIONS.md).
   [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
                                                        const std::vector<Eigen::MatrixXd>& columns) const;
+  /// As GaussianProcess has it.
+  void prepare(const std::function<bool()>& go_on) const {
+    for (const GaussianProcess& output : outputs_) output.prepare(go_on);
+  }
   /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 

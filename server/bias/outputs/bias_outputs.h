@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -62,6 +63,9 @@ class BiasOutputs {
     return std::nullopt;
   }
 
+  /// Works out ahead what predictions would work out when they need it, while `go_on` says so.
+  virtual void prepare(const std::function<bool()>& /*go_on*/) const {}
+
   /// With more points, or without some (rising indices); null where the outputs must be conditioned anew.
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const { return nullptr; }
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> without(const std::vector<Eigen::Index>& /*points*/) const {
@@ -76,8 +80,7 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 
 /// Independent outputs. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_independent(const KernelPtr& kernel, const OutputData& data,
-                                                   const std::vector<GpHyperparameters>& at,
-                                                   VarianceForm form = VarianceForm::kCompressed);
+                                                   const std::vector<GpHyperparameters>& at, VarianceForm form);
 /// The most probable hyperparameters of independent outputs; those of another unit (from the fourth on) are searched
 /// apart. `metrology_stddev`: D, the instrument's. Where `last` is given, there are no other starts. Empty when no
 /// start gave a positive definite covariance.
@@ -88,7 +91,7 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
 
 /// Outputs that share the weights of blocks. Null when a covariance is not positive definite.
 [[nodiscard]] BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data,
-                                               const CoupledHyperparameters& at);
+                                               const CoupledHyperparameters& at, VarianceForm form);
 [[nodiscard]] std::optional<CoupledSearchResult> search_coupled_outputs(const SpelledBias& bias, const OutputData& data,
                                                                         const Eigen::VectorXd& metrology_stddev,
                                                                         const SearchOptions& options,

@@ -72,6 +72,7 @@ class CoupledOutputs final : public BiasOutputs {
     return predictions;
   }
 
+  void prepare(const std::function<bool()>& go_on) const override { posterior_.prepare(go_on); }
   MatrixXd nearby_mean(const MatrixXd& q) const override { return posterior_.own_mean(q); }
 
   VectorXd parameter_weights() const override { return parameter_weights_; }
@@ -105,9 +106,10 @@ class CoupledOutputs final : public BiasOutputs {
 
 }  // namespace
 
-BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at) {
+BiasOutputsPtr condition_coupled(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at,
+                                 VarianceForm form) {
   LinearBlocks blocks = blocks_of(bias, data);
-  auto posterior = CoupledPosterior::condition(bias.kernel, blocks, coupled(blocks, data), at);
+  auto posterior = CoupledPosterior::condition(bias.kernel, blocks, coupled(blocks, data), at, form);
   if (!posterior) return nullptr;
   VectorXd parameter_weights;
   Index first = 0;

@@ -20,10 +20,17 @@ constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an out
 constexpr double kLeastLogRatio = -20.0;  // of η: with less noise thousands of smooth points are not positive definite
 
 // The compressed variance.
-constexpr double kUnexplained = 1e-3;     // of the noise variance, at any training point: far below what anybody sees
-constexpr double kMostKept = 0.75;        // of the points: with more, little time would be saved
-constexpr Index kMostKeptPoints = 2000;   // finding them takes time with the square of their number
+constexpr double kUnexplained = 1e-3;      // of the noise variance, at any training point: far below what anybody sees
+constexpr double kMostKept = 0.75;         // of the points: with more, little time would be saved
+constexpr Index kMostKeptPoints = 2000;    // finding them takes time with the square of their number
+constexpr Index kMostBeforeRegions = 400;  // with more, regions are faster
+constexpr double kClosely = 0.01;          // of the standard deviation of a measurement
+constexpr double kRoughly = 0.03;
 constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
+
+bool is_by_regions(VarianceForm form) {
+  return form == VarianceForm::kRegional || form == VarianceForm::kRegionalOnly || form == VarianceForm::kRough;
+}
 
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
 void assemble_augmented(const Kernel& kernel, const VectorXd& parameters, const AlignedMatrix& features, double ratio,
@@ -179,6 +186,10 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
   gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
   gp.finish(form);
+  if (is_by_regions(form) && !gp.compressed_ && n >= kFewestToCompress) {
+    const double tolerance = form == VarianceForm::kRough ? kRoughly : kClosely;
+    gp.regional_ = std::make_shared<RegionalVariance>(gp.kernel_, gp.parameters_, q, gp.noise_, tolerance);
+  }
   return gp;
 }
 
@@ -190,8 +201,9 @@ void GaussianProcess::finish(VarianceForm form) {
   kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
   leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
-  if (form != VarianceForm::kExact) compress();
-  if (form == VarianceForm::kCompressedOnly && compressed_) exact_ = {};
+  if (form != VarianceForm::kExact) compress(is_by_regions(form) ? kMostBeforeRegions : kMostKeptPoints);
+  const bool only = form != VarianceForm::kCompressed && form != VarianceForm::kRegional;
+  if (only && compressed_) exact_ = {};
 }
 
 std::vector<double> GaussianProcess::root_rows(Index more) const {
@@ -205,9 +217,9 @@ std::vector<double> GaussianProcess::root_rows(Index more) const {
   return VarianceTable(features_.copy(), size_, std::move(matrix)).rows(more);
 }
 
-void GaussianProcess::compress() {
+void GaussianProcess::compress(Index at_most) {
   if (size_ < kFewestToCompress) return;
-  const Index most = std::min(kMostKeptPoints, static_cast<Index>(kMostKept * static_cast<double>(size_)));
+  const Index most = std::min(at_most, static_cast<Index>(kMostKept * static_cast<double>(size_)));
   const double tolerance = kUnexplained * noise_.minCoeff();
   const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
   if (static_cast<Index>(points.size()) == most) return;
@@ -235,8 +247,13 @@ std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) cons
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
   VectorXd posterior(q.rows());
   VectorXd prior(q.rows());
-  const VarianceTable& table = compressed_ ? *compressed_ : exact_;
-  table.shares(*kernel_, parameters_, rows_of(targets, 0, q.rows()), posterior.data(), prior.data());
+  const FeatureBlock asked = rows_of(targets, 0, q.rows());
+  if (regional_) {
+    regional_->shares(exact_, asked, posterior.data(), prior.data());
+  } else {
+    const VarianceTable& table = compressed_ ? *compressed_ : exact_;
+    table.shares(*kernel_, parameters_, asked, posterior.data(), prior.data());
+  }
   std::vector<PosteriorVariance> variances(static_cast<std::size_t>(q.rows()));
   for (Index i = 0; i < q.rows(); ++i)
     variances[static_cast<std::size_t>(i)] = {signal_variance_ * posterior[i], signal_variance_ * prior[i]};

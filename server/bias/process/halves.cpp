@@ -44,4 +44,11 @@ std::vector<std::vector<Index>> halved(const MatrixXd& table, Index most) {
   return parts;
 }
 
+MatrixXd joints_as_seen_by(const Kernel& kernel, const Eigen::VectorXd& parameters, const MatrixXd& q) {
+  MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
+  if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
+  kernel.features(parameters, q, features.data(), features.rows());
+  return features.leftCols(q.cols());
+}
+
 }  // namespace trammel

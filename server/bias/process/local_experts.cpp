@@ -21,13 +21,10 @@ constexpr Index kMostOfAnExpert =
     1200;  // neighbours: twice as many take twice the time and leave a tenth less (DECISIONS.md)
 constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
 
-// In units of the length scales for a kernel with one length scale for each joint; in rad for all others, whose idea of
-// neighbours is not a single distance.
-MatrixXd joints_as_seen_by(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
-  MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
-  if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;
-  kernel.features(parameters, q, features.data(), features.rows());
-  return features.leftCols(q.cols());
+VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
+  if (experts == 1) return wanted;
+  if (wanted == VarianceForm::kRegionalOnly || wanted == VarianceForm::kRough) return VarianceForm::kCompressedOnly;
+  return wanted == VarianceForm::kRegional ? VarianceForm::kCompressed : wanted;
 }
 
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
@@ -45,7 +42,7 @@ std::optional<LocalExperts> LocalExperts::condition(const std::shared_ptr<const 
   local.members_ = neighbourhoods(*kernel, hyperparameters.kernel, q);
   for (const std::vector<Index>& points : local.members_) {
     auto expert = GaussianProcess::condition(kernel, q(points, Eigen::all), y(points), noise_shape(points),
-                                             hyperparameters, form);
+                                             hyperparameters, form_of(form, local.members_.size()));
     if (!expert) return std::nullopt;
     local.experts_.push_back(*std::move(expert));
   }

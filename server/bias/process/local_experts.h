@@ -14,12 +14,13 @@ namespace trammel {
 /// Immutable, thread-safe. Experts have 600 to 1200 points m; memory is 4 N m bytes, time N m².
 class LocalExperts {
  public:
-  /// Empty when a covariance is not positive definite.
+  /// Empty when a covariance is not positive definite. `form`: of a single process; that of several is kCompressed, for
+  /// their variances decide the mean.
   [[nodiscard]] static std::optional<LocalExperts> condition(const std::shared_ptr<const Kernel>& kernel,
                                                              const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                              const Eigen::VectorXd& noise_shape,
                                                              const GpHyperparameters& hyperparameters,
-                                                             VarianceForm form = VarianceForm::kCompressed);
+                                                             VarianceForm form = VarianceForm::kRegional);
 
   /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the expert that knows it
   /// best. without() takes points out of their experts, and drops an expert without points.
@@ -35,6 +36,10 @@ class LocalExperts {
   }
 
   void mean(const Eigen::MatrixXd& q, double* out) const;
+  /// As GaussianProcess has it.
+  void prepare(const std::function<bool()>& go_on) const {
+    for (const GaussianProcess& expert : experts_) expert.prepare(go_on);
+  }
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
 
   [[nodiscard]] double signal_variance() const { return experts_.front().signal_variance(); }

@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::size_t kMostKnown = 4096;   // clients; more are heard when some have left
 constexpr int kPartitionsOfOne = 4;        // a participant may be as many clients
+constexpr std::size_t kMostBeside = 64;    // readers of others in a client's partition
 constexpr std::size_t kOpenedAtOnce = 16;  // so that those who have a channel are not held up
 constexpr std::chrono::seconds kLongestPenalty{30};
 
@@ -16,8 +17,7 @@ constexpr std::chrono::seconds kLongestPenalty{30};
 void ChannelBook::found(const ReplyReader& reader, SteadyTime now) {
   const auto known = clients_.find(reader.partition);
   if (known != clients_.end()) {
-    if (known->second.participant == reader.participant) known->second.topics.insert(reader.topic);
-    return;
+    return found_beside(reader, &known->second);
   }
   if (clients_.size() >= kMostKnown) return;
   int& partitions = partitions_[reader.participant];
@@ -29,9 +29,19 @@ void ChannelBook::found(const ReplyReader& reader, SteadyTime now) {
   client.waits_since = now;
 }
 
+void ChannelBook::found_beside(const ReplyReader& reader, Client* client) {
+  if (client->participant == reader.participant) {
+    client->topics.insert(reader.topic);
+  } else if (client->others.size() < kMostBeside) {
+    client->others.push_back(reader);
+  }
+}
+
 void ChannelBook::lost(const ReplyReader& reader) {
   const auto known = clients_.find(reader.partition);
-  if (known == clients_.end() || known->second.participant != reader.participant) return;
+  if (known == clients_.end()) return;
+  std::erase(known->second.others, reader);
+  if (known->second.participant != reader.participant) return;
   known->second.topics.erase(reader.topic);
   if (known->second.topics.empty()) drop(known);
 }
@@ -39,6 +49,7 @@ void ChannelBook::lost(const ReplyReader& reader) {
 void ChannelBook::left(const std::string& participant) {
   for (auto client = clients_.begin(); client != clients_.end();) {
     const auto next = std::next(client);
+    std::erase_if(client->second.others, [&](const ReplyReader& one) { return one.participant == participant; });
     if (client->second.participant == participant) drop(client);
     client = next;
   }
@@ -51,7 +62,10 @@ void ChannelBook::drop(Clients::iterator client) {
   }
   const auto partitions = partitions_.find(client->second.participant);
   if (--partitions->second == 0) partitions_.erase(partitions);
+  const std::vector<ReplyReader> others = std::move(client->second.others);
+  const SteadyTime now = client->second.last_used;
   clients_.erase(client);
+  for (const ReplyReader& reader : others) found(reader, now);
 }
 
 bool ChannelBook::may_listen(const std::string& participant, const std::string& partition) const {
@@ -64,16 +78,17 @@ bool ChannelBook::listens(const std::string& participant, const std::string& par
   return known != clients_.end() && known->second.participant == participant;
 }
 
-void ChannelBook::asked(const std::string& partition, SteadyTime now) {
+bool ChannelBook::asked(const std::string& partition, SteadyTime now) {
   const auto known = clients_.find(partition);
-  if (known == clients_.end()) return;
+  if (known == clients_.end()) return false;
   Client& client = known->second;
   ++client.at_work;
   client.last_used = now;
   client.was_useful = true;
-  if (client.is_open) return;
+  if (client.is_open || client.asks) return false;
   client.asks = true;
   client.waits_since = std::min(client.waits_since, now);
+  return true;
 }
 
 void ChannelBook::answered(const std::string& partition, SteadyTime now) {

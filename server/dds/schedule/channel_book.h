@@ -16,6 +16,8 @@ struct ReplyReader {
   std::string participant;
   std::string partition;
   std::string topic;
+
+  bool operator==(const ReplyReader&) const = default;
 };
 
 /// Who listens where, and which clients have a reply channel. Only the participant that was the first to listen in a
@@ -34,8 +36,8 @@ class ChannelBook {
   /// Whether the participant may be answered in the partition: it listens there, or nobody does yet.
   [[nodiscard]] bool may_listen(const std::string& participant, const std::string& partition) const;
   [[nodiscard]] bool listens(const std::string& participant, const std::string& partition) const;
-  /// A request of this client has come.
-  void asked(const std::string& partition, SteadyTime now);
+  /// A request of this client has come. True: it has no channel, and had not asked for one.
+  bool asked(const std::string& partition, SteadyTime now);
   /// The request has been answered. Between the two the client keeps its channel.
   void answered(const std::string& partition, SteadyTime now);
 
@@ -54,8 +56,9 @@ class ChannelBook {
  private:
   struct Client {
     std::string participant;
-    std::set<std::string> topics;  // that it listens to
-    std::set<std::string> opened;  // topics with a writer
+    std::set<std::string> topics;     // that it listens to
+    std::vector<ReplyReader> others;  // of participants that listen there too; they follow when it has left
+    std::set<std::string> opened;     // topics with a writer
     bool is_open = false;
     bool was_useful = false;   // since it was opened
     bool asks = false;         // since it has no channel
@@ -70,6 +73,7 @@ class ChannelBook {
   void open(Client& client, SteadyTime now);
   void close(Clients::iterator client, SteadyTime now, std::vector<Change>* changes);
   void drop(Clients::iterator client);
+  void found_beside(const ReplyReader& reader, Client* client);
 
   const std::size_t capacity_;
   const SteadyTime::duration grace_;

@@ -30,8 +30,9 @@ Lane::Lane(const TurnLimits& limits, Room& room, int nice, Clock now)
 Lane::~Lane() { stop(); }
 
 void Lane::start() {
-  for (std::size_t i = 0; i < limits_.workers; ++i) {
-    workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+  for (std::size_t i = 0; i < limits_.workers + limits_.express_workers; ++i) {
+    const auto which = i < limits_.workers ? Turns::Which::kAll : Turns::Which::kShort;
+    workers_.emplace_back([this, which](const std::stop_token& stop) { work(stop, which); });
   }
 }
 
@@ -44,49 +45,60 @@ void Lane::stop() {
     stopped_ = true;
     left = turns_.clear();
   }
-  for (const auto& entry : left) entry->job().shed({"the server stops", kSoon});
+  for (const auto& entry : left) entry->job().shed({"the server stops", kSoon, false});
 }
 
 std::optional<Shed> Lane::submit(std::shared_ptr<Job> job, Ask ask) {
   auto place = room_.take(ask.client, ask.cell, ask.bytes);
+  bool all_are_busy = false;
   {
     const MutexLock lock(mutex_);
-    if (stopped_) return Shed{"the server stops", kSoon};
-    if (!place) return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client)};
+    if (stopped_) return Shed{"the server stops", kSoon, false};
+    if (!place) return Shed{"the memory for waiting requests is used up", turns_.retry_after(ask.client), false};
     if (auto shed = turns_.add(std::move(job), std::move(ask), std::move(*place), now_())) return shed;
     waits_ = true;
     workable_ = true;
+    all_are_busy = idle_ == 0;
+    express_waits_ = express_waits_ || all_are_busy;
   }
-  arrived_.notify_one();
+  (all_are_busy ? express_arrived_ : arrived_).notify_one();
   return std::nullopt;
 }
 
-std::optional<Turns::Portion> Lane::next() {
-  auto portion = turns_.next(now_());
-  waits_ = portion.has_value();
-  workable_ = waits_;
+std::optional<Turns::Portion> Lane::next(Turns::Which which) {
+  auto portion = turns_.next(now_(), which);
+  if (which == Turns::Which::kShort) {
+    express_waits_ = portion.has_value();
+  } else {
+    waits_ = portion.has_value();
+    workable_ = waits_;
+  }
   if (portion) ++taken_up_;
   return portion;
 }
 
-void Lane::work(const std::stop_token& stop) {
+void Lane::work(const std::stop_token& stop, Turns::Which which) {
   ::pthread_setname_np(::pthread_self(), "requests");
   // Of this thread alone, as Linux has it.
   if (nice_ != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), nice_);
   while (!stop.stop_requested()) {
-    if (step()) continue;
+    if (step(which)) continue;
     MutexLock lock(mutex_);
+    if (which == Turns::Which::kShort) {
+      express_arrived_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return express_waits_; });
+      continue;
+    }
     ++idle_;
     arrived_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return waits_; });
     --idle_;
   }
 }
 
-bool Lane::step() {
+bool Lane::step(Turns::Which which) {
   std::optional<Turns::Portion> portion;
   {
     const MutexLock lock(mutex_);
-    portion = next();
+    portion = next(which);
   }
   if (portion) run(*portion);
   return portion.has_value();
@@ -103,7 +115,7 @@ void Lane::run(const Turns::Portion& portion) {
     const MutexLock lock(mutex_);
     given_up = turns_.settle(portion, done, now_());
   }
-  if (given_up) portion.entry->job().shed({"it was not done in time", kSoon});
+  if (given_up) portion.entry->job().shed({"it was not done in time", kSoon, true});
 }
 
 Turns::Done Lane::work_on(const Turns::Portion& portion) {

@@ -36,7 +36,7 @@ class Lane {
   /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what is not taken in.
   [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
   /// Works on one portion in the calling thread. False: there was nothing to do.
-  [[nodiscard]] bool step();
+  [[nodiscard]] bool step(Turns::Which which = Turns::Which::kAll);
 
   [[nodiscard]] std::size_t requests() const;
   /// For the watchdog: a number while a request could be worked on and an idle worker has not taken it up; else empty.
@@ -44,9 +44,8 @@ class Lane {
   [[nodiscard]] std::optional<std::uint64_t> unseen() const;
 
  private:
-  void work(const std::stop_token& stop);
-  /// Next portion, after the one before has been settled.
-  [[nodiscard]] std::optional<Turns::Portion> next() TRAMMEL_REQUIRES(mutex_);
+  void work(const std::stop_token& stop, Turns::Which which);
+  [[nodiscard]] std::optional<Turns::Portion> next(Turns::Which which) TRAMMEL_REQUIRES(mutex_);
   void run(const Turns::Portion& portion);
   [[nodiscard]] Turns::Done work_on(const Turns::Portion& portion);
   /// Whether there is something to compute.
@@ -59,13 +58,14 @@ class Lane {
   const int nice_;
   const Clock now_;
   mutable Mutex mutex_;
-  Condition arrived_;
   Turns turns_ TRAMMEL_GUARDED_BY(mutex_);
   bool stopped_ TRAMMEL_GUARDED_BY(mutex_) = false;
-  bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;  // something may be workable
-  std::atomic<bool> workable_{false};              // the same, for the watchdog
-  std::atomic<int> idle_{0};                       // workers that wait
-  std::atomic<std::uint64_t> taken_up_{0};         // portions
+  Condition arrived_, express_arrived_;
+  bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;          // something may be workable
+  bool express_waits_ TRAMMEL_GUARDED_BY(mutex_) = false;  // by express workers
+  std::atomic<bool> workable_{false};                      // as waits_, for the watchdog
+  std::atomic<int> idle_{0};                               // workers asleep, the express ones left out
+  std::atomic<std::uint64_t> taken_up_{0};                 // portions
   std::vector<std::jthread> workers_;
 };
 

@@ -51,7 +51,7 @@ void Turns::forget_clients() {
 }
 
 std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost own, SteadyTime now) const {
-  const auto full = [&](const std::string& why) { return Shed{why, retry_after(ask.client)}; };
+  const auto full = [&](const std::string& why) { return Shed{why, retry_after(ask.client), false}; };
   if (client.entries.size() >= limits_.client_requests) {
     return full(fmt::format("{} requests of this client wait", client.entries.size()));
   }
@@ -67,7 +67,7 @@ std::optional<Shed> Turns::refusal(const Client& client, const Ask& ask, Cost ow
                              begins - Cost(ask.start_by - now));
   if (late <= Cost(0)) return std::nullopt;
   return Shed{fmt::format("its {} items would be done in {:.0f} ms, too late", ask.items, 1e3 * ends.count()),
-              as_retry(late)};
+              as_retry(late), false};
 }
 
 Cost Turns::served_in(const Client& client, Cost own, std::size_t items) const {
@@ -94,19 +94,26 @@ bool Turns::may_run(const Entry& entry) const {
   return entry.state_ == Entry::State::kOpen && !entry.given_up_ && entry.next_ < entry.items_;
 }
 
-std::shared_ptr<Turns::Entry> Turns::workable(const Client& client) const {
+bool Turns::is_short(const Entry& entry) const {
+  constexpr std::size_t kFew = 4;  // items, of unknown cost
+  return entry.state_ == Entry::State::kWaits && entry.left_ <= limits_.portion &&
+         (entry.left_ > Cost(0) || entry.ask_.items <= kFew);
+}
+
+std::shared_ptr<Turns::Entry> Turns::workable(const Client& client, Which which) const {
   if (client.running >= limits_.client_workers) return nullptr;
-  const auto found =
-      std::find_if(client.entries.begin(), client.entries.end(), [this](const auto& entry) { return may_run(*entry); });
+  const auto found = std::find_if(client.entries.begin(), client.entries.end(), [&](const auto& entry) {
+    return may_run(*entry) && (which == Which::kAll || is_short(*entry));
+  });
   return found == client.entries.end() ? nullptr : *found;
 }
 
-std::optional<Turns::Portion> Turns::next(SteadyTime now) {
+std::optional<Turns::Portion> Turns::next(SteadyTime now, Which which) {
   Client* best = nullptr;
   std::shared_ptr<Entry> entry;
   for (auto& [name, client] : clients_) {
     if (best != nullptr && std::pair(client.had, client.turn) >= std::pair(best->had, best->turn)) continue;
-    if (auto work = workable(client)) {
+    if (auto work = workable(client, which)) {
       best = &client;
       entry = std::move(work);
     }
@@ -144,7 +151,7 @@ std::optional<Shed> Turns::too_late(const Client& client, const Entry& entry, St
   const Cost late = Cost(now - limit) + (ask.finish_by && !begun ? together : Cost(0));
   if (late <= Cost(0)) return std::nullopt;
   return Shed{fmt::format("its {} items were not done in time", ask.items), as_retry(served_in(client, Cost(0), 1)),
-              true};
+              ask.finish_by && now > limit};
 }
 
 void Turns::open(Entry& entry, std::size_t items) {

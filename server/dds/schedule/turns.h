@@ -18,6 +18,9 @@ namespace trammel {
 
 struct TurnLimits {
   std::size_t workers = 2;
+  /// More workers, who take up short requests only. They mostly sleep, so the system lets them run at once where the
+  /// others have computed all the time and wait for a core themselves.
+  std::size_t express_workers = 0;
   Cost portion{0.002};               ///< a worker goes to the next request after this, or after one item
   std::size_t client_requests = 64;  ///< of one client that wait or are worked on
   std::size_t requests = 4096;       ///< of all clients
@@ -78,8 +81,10 @@ class Turns {
 
   /// Takes the request in, or tells why not. What cannot be done in time by what is known of the costs is not taken in.
   [[nodiscard]] std::optional<Shed> add(std::shared_ptr<Job> job, Ask ask, Room::Place place, SteadyTime now);
+  /// Which requests are looked at: all, or those that are done within one portion by what is known of the costs.
+  enum class Which { kAll, kShort };
   /// Empty when there is nothing that may be worked on.
-  [[nodiscard]] std::optional<Portion> next(SteadyTime now);
+  [[nodiscard]] std::optional<Portion> next(SteadyTime now, Which which = Which::kAll);
   /// After Job::begin(): other workers may join.
   void open(Entry& entry, std::size_t items);
   /// Ends a portion of another part than kShed. True: the request is given up and nobody works for it any longer, so
@@ -111,7 +116,8 @@ class Turns {
   [[nodiscard]] Cost served_in(const Client& client, Cost own, std::size_t items) const;
   [[nodiscard]] Client& arrived(const std::string& client);
   [[nodiscard]] bool may_run(const Entry& entry) const;
-  [[nodiscard]] std::shared_ptr<Entry> workable(const Client& client) const;
+  [[nodiscard]] bool is_short(const Entry& entry) const;
+  [[nodiscard]] std::shared_ptr<Entry> workable(const Client& client, Which which) const;
   [[nodiscard]] Portion hand_out(Client& client, std::shared_ptr<Entry> entry, SteadyTime now);
   [[nodiscard]] std::optional<Shed> too_late(const Client& client, const Entry& entry, SteadyTime now) const;
   void remove(Client& client, Entry& entry);

@@ -2,6 +2,7 @@
 
 #include "server/numerics/builds/covariance.h"
 #include "server/numerics/builds/factorisations.h"
+#include "server/numerics/builds/panels.h"
 #include "server/numerics/builds/products.h"
 #include "server/numerics/builds/triangles.h"
 
@@ -22,6 +23,9 @@ const Numerics& TRAMMEL_NUMERICS_BUILD() {
                                  .pack_triangle = pack_triangle,
                                  .unpack_triangle = unpack_triangle,
                                  .square_norms = square_norms,
+                                 .panel_size = panel_size,
+                                 .pack_panels = pack_panels,
+                                 .panel_product = panel_product,
                                  .radial_tile = radial_tile,
                                  .radial_gradient = radial_gradient,
                                  .radial_weighted_sum = radial_weighted_sum,

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace trammel {
+
+/// A request that has been answered, for the log. Its texts come from outside.
+struct CallReport {
+  std::string operation;
+  std::string request;  ///< the DDS writer that sent it, and its number
+  std::string trace;    ///< the client's own name for it; may be empty
+  std::string cell;
+  bool changes = false;  ///< something, or it was to
+  std::string refused;   ///< why; empty: carried out
+};
+
+using CallListener = std::function<void(const CallReport&)>;
+
+}  // namespace trammel

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+
+namespace trammel {
+
+/// What the disk lets a store do.
+struct StoreState {
+  std::optional<Error> why_not_written;  ///< set: every change is refused with it
+  bool readable = true;                  ///< false: only the copies of the models that were in force are there
+  std::int64_t since = 0;                ///< Unix time, s, of the last change of either; 0: none since it was opened
+  std::uint64_t failed_writes = 0;
+  std::vector<std::string> damages;  ///< what was found damaged since it was opened, the first hundred
+};
+
+}  // namespace trammel

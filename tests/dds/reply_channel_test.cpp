@@ -1,0 +1,53 @@
+#include "server/dds/reply_channel.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace trammel {
+namespace {
+
+const std::string kFastDds = "\x01\x0f..........", kCyclone = "\x01\x10..........";
+
+class ParkedChannelsTest : public testing::Test {
+ protected:
+  ParkedChannels::Channel channel(const std::string& partition) {
+    return std::make_shared<ReplyChannel>(*participant_, partition);
+  }
+
+  wire::ParticipantPtr participant_ =
+      wire::make_participant({"parked", 42, "127.0.0.1", static_cast<std::uint16_t>(30000 + ::getpid() % 3000), {}})
+          .value();
+  ParkedChannels parked_;
+  ParkedChannels::Time now_ = std::chrono::steady_clock::now();
+};
+
+TEST_F(ParkedChannelsTest, AChannelMovesOnToTheNextClientWithItsWriters) {
+  const auto topic = wire::make_reply_topic<wire::Train>(*participant_);
+  ASSERT_TRUE(topic);
+  const auto first = channel("first");
+  first->add("Train_Reply", ReplyWriter::make(*first->publisher(), *topic, [] {}));
+  parked_.park(first, now_);
+  EXPECT_EQ(parked_.take(kFastDds, "second"), first);
+  EXPECT_NE(first->writer("Train_Reply"), nullptr);
+  wire::dds::PublisherQos qos;
+  ASSERT_EQ(first->publisher()->get_qos(qos), eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK);
+  EXPECT_EQ(qos.partition().names(), std::vector<std::string>{"second"});
+  EXPECT_EQ(parked_.take(kFastDds, "third"), nullptr) << "there was one";
+}
+
+TEST_F(ParkedChannelsTest, AClientWhoseLibraryDoesNotFollowGetsANewOne) {
+  parked_.park(channel("first"), now_);
+  EXPECT_EQ(parked_.take(kCyclone, "second"), nullptr);
+  EXPECT_EQ(parked_.size(), 1u);
+}
+
+TEST_F(ParkedChannelsTest, WhatIsLeftOverIsDeletedOnceNobodyLeavesAnyMore) {
+  for (int i = 0; i < 30; ++i) parked_.park(channel("client-" + std::to_string(i)), now_);
+  EXPECT_FALSE(parked_.tend(now_ + wire::kLease)) << "clients come and go";
+  EXPECT_EQ(parked_.size(), 30u);
+  while (parked_.tend(now_ + 3 * wire::kLease)) continue;
+  EXPECT_EQ(parked_.size(), 8u);
+}
+
+}  // namespace
+}  // namespace trammel
