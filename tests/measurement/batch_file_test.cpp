@@ -116,11 +116,11 @@ ErrorCode code_of(const std::string& text) {
 
 // Each of these used up the stack, the memory or the time of the daemon.
 TEST(BatchFile, OfMillionsOfBytesEndsSoonWhateverItsKind) {
-  EXPECT_EQ(code_of("# " + std::string(2'000'000, 'x') + "\np1 1 2 3\n"), ErrorCode::kTooLarge);
+  EXPECT_EQ(code_of("# " + std::string(2'000'000, 'x') + "\np1 1 2 3\n"), ErrorCode::kRefused);
   EXPECT_EQ(code_of("p1 1 2 3 " + std::string(2'000'000, '4') + "\n"), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of("p1 1 2 3 " + repeated("a:", 1'000'000) + "\n"), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of("p1;1;2;3\n" + repeated("# units                                   \n", 500'000)),
-            ErrorCode::kTooLarge);
+            ErrorCode::kRefused);
   EXPECT_EQ(code_of(repeated("1\n", 4'000'000)), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of(repeated("1 ", 4'000'000)), ErrorCode::kTooLarge);
   EXPECT_EQ(code_of(repeated(",", 4'000'000)), ErrorCode::kTooLarge);
