@@ -52,7 +52,7 @@ class EitherStop {
 
 /// False: `stop` was requested first.
 bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
-  Mutex mutex;
+  Mutex mutex;  // local: used only to wait
   Condition never;
   MutexLock lock(mutex);
   never.wait_for(lock, stop, length, [] { return false; });
