@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/base/result.h"
 #include "tests/fuzz/mutate.h"
 
 /// What reads bytes from outside, one target for each reader. A target must end with an answer, whatever the bytes are:
