@@ -188,7 +188,6 @@ class DdsService::Running {
           const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
-        store_(store),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
@@ -284,7 +283,7 @@ class DdsService::Running {
     status.misdirected(core_.counts.misdirected);
     status.unreadable(*core_.unreadable);
     status.lost(core_.counts.lost);
-    if (const auto why = store_.state().why_not_written) status.trouble(cut(sentence(*why), wire::MAX_SENTENCE));
+    status.trouble(cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -293,7 +292,6 @@ class DdsService::Running {
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
-  const Store& store_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;

@@ -49,9 +49,10 @@ struct StoreConnection {
     if (auto open = open_anew(); !open) return tl::make_unexpected(open.error());
     try {
       SQLite::Transaction transaction(*database, SQLite::TransactionBehavior::IMMEDIATE);
+      const int changes = database->getTotalChanges();
       auto result = work(*database);
       if (result) transaction.commit();
-      if (result) note_written();
+      if (result && database->getTotalChanges() != changes) note_written();
       return result;
     } catch (const SQLite::Exception& error) {
       Failure said = failure_of(error, path);

@@ -26,7 +26,9 @@ StoreState Store::state() const { return connection_->state(); }
 Status Store::try_again() {
   if (!connection_->state().why_not_written) return {};
   return connection_->in_transaction([](SQLite::Database& database) -> Status {
-    change(database, "UPDATE store_identity SET id = id");
+    // Of an update that changes nothing SQLite writes nothing.
+    change(database, "INSERT INTO store_identity (id) VALUES ('')");
+    change(database, "DELETE FROM store_identity WHERE id = ''");
     return {};
   });
 }
