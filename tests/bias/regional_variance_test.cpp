@@ -70,11 +70,14 @@ TEST_P(VarianceByRegions, IsNeverBelowTheExactOneAndHardlyAbove) {
   const std::vector<PosteriorVariance> expected = exact.variance(targets);
   const double noise = exact.noise_variance();
   for (const auto& [form, most] : {std::pair{VarianceForm::kRegional, 0.02}, {VarianceForm::kRough, 0.06}}) {
-    const std::vector<PosteriorVariance> got = process_of(GetParam(), form).variance(targets);
+    const GaussianProcess process = process_of(GetParam(), form);
+    const std::vector<PosteriorVariance> got = process.variance(targets);
+    // Few points that stand for all of them err on the low side a little (VarianceForm::kCompressed).
+    const double least = process.variance_points() < GetParam().poses ? 1 - 0.004 : 1;
     int much = 0;
     for (std::size_t i = 0; i < got.size(); ++i) {
       EXPECT_EQ(got[i].prior, expected[i].prior);
-      EXPECT_GE(got[i].posterior, expected[i].posterior - 1e-9 * expected[i].prior - 1e-6 * noise) << i;
+      EXPECT_GE(got[i].posterior, least * expected[i].posterior - 1e-9 * expected[i].prior - 1e-6 * noise) << i;
       const double rise = std::sqrt((got[i].posterior + noise) / (expected[i].posterior + noise)) - 1;
       EXPECT_LT(rise, 3 * most) << i;
       much += rise > most ? 1 : 0;

@@ -84,9 +84,10 @@ enum class VarianceForm {
   /// small (bound: DECISIONS.md). Exact where many points would be needed.
   kCompressed,
   /// The same where 400 points are enough. Else from a few directions for each region of joint space
-  /// (regional_variance.h), some ten times faster for a single target. Never below the exact variance. Above it by so
-  /// much that the standard deviation of a measurement is too large by less than 1 % at most targets, and by 2 % where
-  /// it is noticed: there the exact variance takes over.
+  /// (regional_variance.h), some ten times faster for a single target. Then it is nowhere below the exact variance, and
+  /// above it by so much that the standard deviation of a measurement is too large by less than 1 % at most targets,
+  /// and
+  /// by 2 % where it is noticed: there the exact variance takes over.
   kRegional,
   /// As kRegional, and as kCompressedOnly where it is compressed.
   kRegionalOnly,
