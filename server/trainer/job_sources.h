@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "server/store/store.h"
-#include "server/trainer/compute/task.h"
 
 namespace trammel {
 

@@ -64,6 +64,8 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->trainer.validation_share, minimal.trainer.validation_share);
   EXPECT_EQ(shipped->trainer.accept_ratio, minimal.trainer.accept_ratio);
   EXPECT_EQ(shipped->trainer.seed, minimal.trainer.seed);
+  EXPECT_EQ(shipped->trainer.compute.memory_mb, minimal.trainer.compute.memory_mb);
+  EXPECT_EQ(shipped->trainer.compute.cpu_s, minimal.trainer.compute.cpu_s);
   EXPECT_EQ(shipped->models_in_memory, minimal.models_in_memory);
   EXPECT_EQ(shipped->log.level, minimal.log.level);
   EXPECT_EQ(shipped->log.file, minimal.log.file);
@@ -90,7 +92,8 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
       "models_in_memory_mb: 512\n"
       "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
       "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75}\n"
-      "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9}\n"
+      "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
+      "cpu_s: 30}\n"
       "log: {level: debug, file: trammel.log}\n");
   EXPECT_EQ(config.dds.server_id, "a");
   EXPECT_EQ(config.store, folder_.file("t.db")) << "relative to the file";
@@ -111,6 +114,8 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
   EXPECT_EQ(config.trainer.validation_share, 0.3);
   EXPECT_EQ(config.trainer.accept_ratio, 1.5);
   EXPECT_EQ(config.trainer.seed, 9u);
+  EXPECT_EQ(config.trainer.compute.memory_mb, 64);
+  EXPECT_EQ(config.trainer.compute.cpu_s, 30);
   EXPECT_EQ(config.log.level, "debug");
   EXPECT_EQ(config.log.file, folder_.file("trammel.log"));
 }
@@ -131,6 +136,8 @@ TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
   EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
   EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
   EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), at(5, "trainer: seed").beyond(-1, 0));
+  EXPECT_EQ(refusal_for("trainer: {memory_mb: 63}\n"), at(5, "trainer: memory_mb").beyond(63, 64));
+  EXPECT_EQ(refusal_for("trainer: {cpu_s: 0}\n"), at(5, "trainer: cpu_s").beyond(0, 1));
   EXPECT_EQ(refusal_for("log: {level: loud}\n"), at(5, "log: level").text("loud"));
 }
 

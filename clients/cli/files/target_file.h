@@ -28,7 +28,8 @@ struct TargetFile {
 [[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 
-/// Refuses joint and direction columns that are not the robot's, and conf where the robot's branches have no closed form.
+/// Refuses joint and direction columns that are not the robot's, and conf where the robot's branches have no closed
+/// form.
 [[nodiscard]] Status check_targets(const TargetFile& file, const Chain& robot);
 
 }  // namespace trammel::cli

@@ -53,7 +53,7 @@ void limit_resources(rlim_t memory_bytes, rlim_t processor_s) {
 #else
   static_cast<void>(memory_bytes);
 #endif
-  const rlimit time{processor_s, processor_s + kTimeBeyond};
+  const rlimit time{processor_s + kTimeBeyond, processor_s + kTimeBeyond};
   ::setrlimit(RLIMIT_CPU, &time);
 }
 

@@ -184,12 +184,18 @@ Status ComputeProcess::heard(const Frame& frame, const ComputeWatch& watch) {
 }
 
 Status ComputeProcess::wait(short events) {
-  ticks_still_ = 0;  // what the caller did meanwhile may have taken its time
-  time_at_last_tick_ = -1;
-  auto tick = Clock::now() + kTick;
+  if (Clock::now() > next_tick_ + kTick) {  // the caller took its time, and the process may have waited for it
+    next_tick_ = Clock::now() + kTick;
+    ticks_still_ = 0;
+    time_at_last_tick_ = -1;
+  }
   while (true) {
     if (wake_->is_asked()) return broken(Breakdown::Kind::kStopped, given_up());
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(tick - Clock::now());
+    if (Clock::now() >= next_tick_) {
+      next_tick_ = Clock::now() + kTick;
+      if (const Status well = look_after(); !well) return well;
+    }
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
     std::array<pollfd, 4> polled = {{{child_->channel(), events, 0},
                                      {child_->words(), POLLIN, 0},
                                      {child_->end(), POLLIN, 0},
@@ -199,9 +205,6 @@ Status ComputeProcess::wait(short events) {
     if (polled[1].revents != 0) read_words();
     if ((polled[0].revents & events) != 0) return {};
     if (polled[2].revents != 0 || polled[0].revents != 0) return crashed();
-    if (Clock::now() < tick) continue;
-    tick = Clock::now() + kTick;
-    if (const Status well = look_after(); !well) return well;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -61,6 +62,7 @@ class ComputeProcess : public Computing {
   FrameReader reader_;
   std::string words_;  // the last ones it wrote
   std::optional<Breakdown> breakdown_;
+  std::chrono::steady_clock::time_point next_tick_;
   int ticks_still_ = 0;
   double time_at_last_tick_ = 0;  // s, of the processor
 };

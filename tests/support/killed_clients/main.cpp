@@ -1,8 +1,8 @@
 // Kills clients of a running daemon: killed_clients PORT DOMAIN KILLS [IDLE]
-#include "tests/support/killed_clients.h"
-
 #include <cstdio>
 #include <cstdlib>
+
+#include "tests/support/killed_clients.h"
 
 int main(int argc, char** argv) {
   if (argc < 4) {

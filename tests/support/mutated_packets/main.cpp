@@ -1,8 +1,8 @@
 // Sends mutated RTPS packets to a running daemon: mutated_packets PORT DOMAIN PACKETS [SEED]
-#include "tests/support/mutated_packets.h"
-
 #include <cstdio>
 #include <cstdlib>
+
+#include "tests/support/mutated_packets.h"
 
 int main(int argc, char** argv) {
   if (argc < 4) {
