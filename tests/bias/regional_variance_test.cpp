@@ -56,9 +56,14 @@ GaussianProcess process_of(const Case& of, VarianceForm form) {
 MatrixXd targets_of(const Case& of) {
   const MatrixXd q = poses_of(of);
   const Index n = 120;
+  const Eigen::RowVectorXd middle = 0.5 * (q.colwise().maxCoeff() + q.colwise().minCoeff());
+  const Eigen::RowVectorXd half = (q.colwise().maxCoeff() - middle) / 1.2;  // random_joints() reach 1.2
+  const auto in_range = [&](double stretch, std::uint64_t seed) -> MatrixXd {
+    return (stretch * random_joints(n, seed) * half.asDiagonal()).rowwise() + middle;
+  };
   MatrixXd targets(5 * n, 6);
-  targets << q.topRows(n), q.topRows(n) + 0.02 * random_joints(n, 92), 0.5 * (q.topRows(n) + q.bottomRows(n)),
-      random_joints(n, 93), 1.5 * random_joints(n, 94);
+  targets << q.topRows(n), q.topRows(n) + MatrixXd(0.02 * random_joints(n, 92) * half.asDiagonal()),
+      0.5 * (q.topRows(n) + q.bottomRows(n)), in_range(1, 93), in_range(1.5, 94);
   return targets;
 }
 
