@@ -23,7 +23,7 @@ class ComputeTest : public testing::Test {
     daemon_.start();
     session_ = std::move(client::Session::open(daemon_.session_options()).value());
     const auto first = session_->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
-    ASSERT_TRUE(session_->wait_for_job(first.value(), kLimit)->in_force);
+    ASSERT_TRUE(session_->wait_for_job(first.value(), kLimit, nullptr)->in_force);
     context_.cell = "cell-7";
   }
   /// Until something is computed.
