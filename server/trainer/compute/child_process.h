@@ -32,9 +32,9 @@ class Descriptor {
 };
 
 /// A program that was started to compute, and nothing else: it inherits no descriptor but a socket to talk by and its
-/// standard streams (nothing to read; what it writes comes to words()), no blocked or ignored signal, and has a session
-/// of its own. It ends with this object. Not of a fork: the memory of a process with many threads and gigabytes is not
-/// copied.
+/// standard streams (nothing to read; what it writes comes to words()), no blocked or ignored signal, and has a process
+/// group of its own: a terminal's signals do not reach it. It ends with this object. Not of a fork: the memory of a
+/// process with many threads and gigabytes is not copied.
 class ChildProcess {
  public:
   static constexpr int kChannel = 3;  ///< the descriptor of its end of the socket

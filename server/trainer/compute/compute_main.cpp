@@ -24,7 +24,7 @@ namespace trammel {
 
 namespace {
 
-constexpr int kNiceness = 10;  // a tenth of an equal share where the processor is wanted by others, all of it where not
+constexpr int kNiceness = 10;       // a tenth of an equal share beside the service, all of it where nobody wants it
 constexpr rlim_t kTimeBeyond = 60;  // s after the limit of processor time: the service ends it before that
 constexpr std::chrono::milliseconds kReportInterval{50};
 constexpr int kGone = 1;  // exit code where the other end is
@@ -41,8 +41,6 @@ void step_back() {
   const sched_param batch{};
   ::sched_setscheduler(0, SCHED_BATCH, &batch);
   ::setpriority(PRIO_PROCESS, 0, kNiceness);
-  write_to("/proc/self/autogroup",
-           std::to_string(kNiceness));  // a session of its own: there the niceness is the group's
   write_to("/proc/self/oom_score_adj", "1000");
 }
 
