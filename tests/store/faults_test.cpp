@@ -222,8 +222,11 @@ std::string contents(const Store& store) {
   return all;
 }
 
-TEST_F(StoreFaults, AfterAKillAtAnyCallEveryChangeThatIsAskedForAgainHasHappenedOnce) {
-  constexpr int kSeeds = 10, kPoints = 32;
+class KilledStore : public StoreFaults, public testing::WithParamInterface<int> {};
+
+TEST_P(KilledStore, AtAnyCallHasMadeEveryChangeOnceThatIsAskedForAgain) {
+  constexpr int kPoints = 32;
+  const int seed = GetParam();
   open();
   for (int i = 1; i <= 3; ++i) put_in_force(i);
   ASSERT_TRUE(store_->add_batch(batch("first"), job_of("first")));
@@ -235,50 +238,49 @@ TEST_F(StoreFaults, AfterAKillAtAnyCallEveryChangeThatIsAskedForAgainHasHappened
   int killed = 0;
   auto* answered = static_cast<std::size_t*>(
       ::mmap(nullptr, sizeof(std::size_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
-  for (int seed = 0; seed < kSeeds; ++seed) {
-    const Changes changes(static_cast<std::uint64_t>(seed));
-    std::string expected;
-    std::size_t calls = 0;
-    {
-      test::TemporaryFolder whole;
-      test::FaultyDisk disk;
-      auto store = demand(Store::open(fresh_copy(whole)));
-      const std::size_t before = disk.calls();
-      std::size_t next = 0;
-      changes.ask(*store, &next);
-      calls = disk.calls() - before;
-      expected = contents(*store);
-      store.reset();
-    }
-    for (int point = 0; point < kPoints; ++point) {
-      test::TemporaryFolder left;
-      const std::string path = fresh_copy(left);
-      *answered = 0;
-      const pid_t child = ::fork();
-      ASSERT_GE(child, 0);
-      if (child == 0) {
-        test::FaultyDisk disk;
-        auto store = Store::open(path);
-        auto calls_left = static_cast<int>(calls) * point / kPoints;
-        disk.set_plan([calls_left](auto, const std::string&) mutable {
-          if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
-          return SQLITE_OK;
-        });
-        if (store) changes.ask(**store, answered);
-        ::_exit(0);
-      }
-      int status = 0;
-      ASSERT_EQ(::waitpid(child, &status, 0), child);
-      killed += WIFSIGNALED(status) ? 1 : 0;
-      const auto store = demand(Store::open(path));
-      EXPECT_FALSE(store->versions_to_serve("cell-7").empty());
-      changes.ask(*store, answered);  // the client knows what was answered, and repeats the rest
-      EXPECT_EQ(contents(*store), expected)
-          << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
-    }
+  const Changes changes(static_cast<std::uint64_t>(seed));
+  std::string expected;
+  std::size_t calls = 0;
+  {
+    test::TemporaryFolder whole;
+    test::FaultyDisk disk;
+    auto store = demand(Store::open(fresh_copy(whole)));
+    const std::size_t before = disk.calls();
+    std::size_t next = 0;
+    changes.ask(*store, &next);
+    calls = disk.calls() - before;
+    expected = contents(*store);
+    store.reset();
   }
-  EXPECT_GE(killed, kSeeds * (kPoints - 1));
+  for (int point = 0; point < kPoints; ++point) {
+    test::TemporaryFolder left;
+    const std::string path = fresh_copy(left);
+    *answered = 0;
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      test::FaultyDisk disk;
+      auto store = Store::open(path);
+      auto calls_left = static_cast<int>(calls) * point / kPoints;
+      disk.set_plan([calls_left](auto, const std::string&) mutable {
+        if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
+        return SQLITE_OK;
+      });
+      if (store) changes.ask(**store, answered);
+      ::_exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    killed += WIFSIGNALED(status) ? 1 : 0;
+    const auto store = demand(Store::open(path));
+    EXPECT_FALSE(store->versions_to_serve("cell-7").empty());
+    changes.ask(*store, answered);  // the client knows what was answered, and repeats the rest
+    EXPECT_EQ(contents(*store), expected) << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
+  }
+  EXPECT_GE(killed, kPoints - 1);
 }
+
+INSTANTIATE_TEST_SUITE_P(Seeds, KilledStore, testing::Range(0, 10));
 
 TEST_F(StoreFaults, WhateverPageIsDamagedTheLastModelOfEveryCellIsServed) {
   open();
