@@ -13,7 +13,7 @@ namespace trammel::model_file {
 /// deviation, whose directions and draws (regional_variance.h) another processor may choose otherwise, kStddevShare.
 constexpr double kSelfTestMetres = 1e-9;
 constexpr double kErrorShare = 1e-8;
-constexpr double kStddevShare = 0.05;
+constexpr double kStddevShare = 0.02;
 
 /// The `self_test` of a model file (MODEL_FILE.md): what the model predicts at a few joints of its range and one beside
 /// it.
