@@ -26,15 +26,19 @@ class PartSize {
     const double fits = std::min(rate * wanted_.count(), static_cast<double>(kGrowth * next_));
     next_ = std::clamp(static_cast<std::size_t>(fits), std::size_t{1}, most_);
   }
-  /// No answer came in time to a part of so many items: its items take longer than those before.
-  void timed_out(std::size_t items) { next_ = std::max(std::size_t{1}, items / kGrowth); }
+  /// No answer came in time to a part of so many items: its items take longer than those before. No part is as long
+  /// again.
+  void timed_out(std::size_t items) {
+    most_ = std::max(std::size_t{1}, items / 2);
+    next_ = std::max(std::size_t{1}, items / kGrowth);
+  }
 
  private:
   static constexpr std::size_t kFirst = 16;
   static constexpr std::size_t kGrowth = 8;
 
   const Seconds wanted_;
-  const std::size_t most_;
+  std::size_t most_;
   std::size_t next_ = std::min(kFirst, most_);
 };
 

@@ -133,6 +133,8 @@ Result<std::vector<std::string>> Trainer::start() {
       const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
       queue_.put_down();
+      // Asked for while its attempt ended: it waits again, and nobody told it.
+      if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested()) static_cast<void>(cancel(taken->job.id));
     }
   });
   keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
@@ -337,11 +339,13 @@ Status Trainer::cancel(std::int64_t id) {
   if (!job) return tl::make_unexpected(job.error());
   const auto asked_for = was_asked_for(*job);
   if (!asked_for) return tl::make_unexpected(asked_for.error());
+  const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
+  if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
   switch (queue_.cancel(id)) {
     case JobQueue::Cancelled::kStopping:
       return {};
     case JobQueue::Cancelled::kUnknown:
-      return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id);
+      return over();
     case JobQueue::Cancelled::kRemoved:
       break;
   }

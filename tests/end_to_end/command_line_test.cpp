@@ -226,7 +226,7 @@ TEST_F(CommandLine, WhatForeignFilesSayControlsNoTerminal) {
   EXPECT_EQ(finished.exit_code, kRefusedData);
   EXPECT_NE(finished.err.find("row 2: '\\u001b]0;owned\\u0007'"), std::string::npos) << finished.err;
   EXPECT_EQ((finished.err + finished.out).find('\x1b'), std::string::npos);
-  const Finished usage = trammel({"train", "\x1b[2J"});
+  const Finished usage = trammel({"train", "--cell", cell_, "--batch", batch, "-o", file("out"), "\x1b[2J"});
   EXPECT_EQ((usage.err + usage.out).find('\x1b'), std::string::npos);
   EXPECT_NE(usage.err.find("\\u001b[2J"), std::string::npos) << usage.err;
 }

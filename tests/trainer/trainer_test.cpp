@@ -304,8 +304,8 @@ TEST_F(TrainerTest, RefusesToRetrainFromWhatItDoesNotHave) {
 TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor) {
   submit("a");
   std::string kernel = "se", sources = "M1";
-  for (int i = 0; i < 200; ++i) kernel += " + se";
-  for (int i = 0; i < 600; ++i) sources += ",gear_transmission:3";
+  for (int i = 0; i < 40; ++i) kernel += " + se";
+  for (int i = 0; i < 600; ++i) sources += fmt::format(",gear_transmission:{}@{}", 1 + i % 6, 1 + i / 6);
   const auto refused_with = [this](const std::vector<std::string>& batches, const std::string& level,
                                    const std::string& bias) {
     const auto job = trainer_->retrain("cell-7", batches, level, bias);
