@@ -243,15 +243,15 @@ TEST_F(ComputeProcessTest, AJobThatAsksForMoreMemoryThanItMayHaveFailsWithTheLim
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer's own memory cannot be limited";
 #endif
-  options_.compute.memory_mb = 32;
+  options_.compute.memory_mb = 64;
   open_anew();
   start();
-  finished(submit("large", {.poses = 1500}));
-  const JobProgress failed = finished(test::demand(trainer_->retrain("cell-7", {"large"}, "", "se")));
+  finished(submit("large", {.poses = 900}));
+  const JobProgress failed = finished(test::demand(trainer_->retrain("cell-7", {"large"}, "", "se + joint_map")));
   EXPECT_EQ(failed.stage, JobStage::kFailed);
   EXPECT_EQ(failed.outcome.verdict, JobVerdict::kOverLimit) << failed.what;
   EXPECT_EQ(failed.outcome.code, ErrorCode::kTooLarge);
-  EXPECT_NE(failed.outcome.why.find("32 MiB"), std::string::npos) << failed.outcome.why;
+  EXPECT_NE(failed.outcome.why.find("64 MiB"), std::string::npos) << failed.outcome.why;
   EXPECT_FALSE(failed.outcome.next.empty());
   EXPECT_EQ(store_->job(failed.job)->attempts, 1) << "it would do so again";
   EXPECT_EQ(finished(submit("small", {.seed = 2})).stage, JobStage::kDone);
