@@ -137,7 +137,7 @@ bool cut_lease(const Parameter& lease, bool little_endian, EditedMessage& messag
   const std::uint32_t seconds = Reader(lease.value, little_endian).u32().value_or(0);
   constexpr std::uint32_t kForever = 0x7fffffff;
   if (seconds > kForever) return false;
-  if (seconds > kLongestLease_s) message.put(lease.value.first(4), kLongestLease_s, little_endian);
+  if (seconds > kLongestLeaseSeconds) message.put(lease.value.first(4), kLongestLeaseSeconds, little_endian);
   return true;
 }
 

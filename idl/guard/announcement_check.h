@@ -20,6 +20,6 @@ namespace trammel::wire {
 /// The payload of a message of the authentication handshake, which comes before anybody is known.
 [[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload);
 
-inline constexpr std::uint32_t kLongestLease_s = 300;
+inline constexpr std::uint32_t kLongestLeaseSeconds = 300;
 
 }  // namespace trammel::wire

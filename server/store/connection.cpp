@@ -13,10 +13,10 @@ constexpr std::size_t kMostDamages = 100;         // that are told
 }  // namespace
 
 Status StoreConnection::open_anew() {
-  if (!must_be_opened_anew) return {};
+  if (!must_be_opened_anew_) return {};
   const auto now = std::chrono::steady_clock::now();
-  if (now < tried_last + kBetweenTries) return tl::make_unexpected(*state().why_not_written);
-  tried_last = now;
+  if (now < tried_last_ + kBetweenTries) return tl::make_unexpected(*state().why_not_written);
+  tried_last_ = now;
   database.reset();  // one connection at a time: its locks are the process's
   auto opened = open_database(path, *copies);
   if (!opened) {
@@ -28,7 +28,7 @@ Status StoreConnection::open_anew() {
     note_trouble(*opened->why_not_written, database == nullptr);
     return tl::make_unexpected(*opened->why_not_written);
   }
-  must_be_opened_anew = false;
+  must_be_opened_anew_ = false;
   return {};
 }
 

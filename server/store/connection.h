@@ -25,7 +25,7 @@ struct StoreConnection {
   StoreConnection(std::string file, WriterLock writer, OpenedDatabase opened, std::unique_ptr<ServedCopies> kept)
       : path(std::move(file)), lock(std::move(writer)), copies(std::move(kept)), database(std::move(opened.file)) {
     if (opened.why_not_written) note_trouble(*opened.why_not_written, database == nullptr);
-    must_be_opened_anew = opened.why_not_written.has_value();
+    must_be_opened_anew_ = opened.why_not_written.has_value();
   }
 
   /// Runs `work(database)` with the lock held, for reading. An exception of SQLite becomes an error.
@@ -83,8 +83,8 @@ struct StoreConnection {
   /// Opens a file again that could not be written when it was opened.
   [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex);
 
-  bool must_be_opened_anew TRAMMEL_GUARDED_BY(mutex) = false;
-  std::chrono::steady_clock::time_point tried_last TRAMMEL_GUARDED_BY(mutex) = {};
+  bool must_be_opened_anew_ TRAMMEL_GUARDED_BY(mutex) = false;
+  std::chrono::steady_clock::time_point tried_last_ TRAMMEL_GUARDED_BY(mutex) = {};
 };
 
 }  // namespace trammel

@@ -213,7 +213,7 @@ TEST(Guard, AParticipantThatIsNotHeardIsNotKeptForEver) {
   const auto passed = guard.check(message, kSocket);
   ASSERT_TRUE(passed);
   PacketBytes cut;
-  test::put32(cut, kLongestLease_s);
+  test::put32(cut, kLongestLeaseSeconds);
   test::put32(cut, 0xffffffffu);
   EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), announcement(participant().add(0x0002, cut)));
 }
