@@ -25,6 +25,10 @@ class ComputeTest : public testing::Test {
     const auto first = session_->submit_measurements("cell-7", "first", test::virtual_batch_csv(40, 1));
     ASSERT_TRUE(session_->wait_for_job(first.value(), kLimit, nullptr)->in_force);
     context_.cell = "cell-7";
+    // A job is told to be over a moment before its process is.
+    if (const auto last = test::computing_child(daemon_.process().pid())) {
+      ASSERT_TRUE(test::Watched(*last).ends(kLimit));
+    }
   }
   /// Until something is computed.
   std::optional<pid_t> computing_now() {
