@@ -692,30 +692,45 @@ TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
   EXPECT_NE(calls.reply_to(request).job(), first.job());
 }
 
+constexpr wire::ContentId kThis{1, 4}, kThat{2, 4}, kThatElsewhere{2, 0};
+
 TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {
   UnderWay under_way;
   {
-    UnderWay::Piece first(under_way, "a"), other(under_way, "b");
+    UnderWay::Piece first(under_way, "a", kThis), other(under_way, "b", kThis);
     EXPECT_TRUE(first.is_first());
     EXPECT_TRUE(other.is_first());
-    for (int i = 0; i < 2; ++i) EXPECT_FALSE(UnderWay::Piece(under_way, "a").is_first());
+    for (int i = 0; i < 2; ++i) EXPECT_FALSE(UnderWay::Piece(under_way, "a", kThis).is_first());
     EXPECT_TRUE(first.has_repeat());
     EXPECT_TRUE(first.has_repeat());
     EXPECT_FALSE(other.has_repeat());
     EXPECT_FALSE(first.has_repeat());
-    EXPECT_TRUE(UnderWay::Piece(under_way, "a").is_first()) << "it is answered: another one begins anew";
+    EXPECT_TRUE(UnderWay::Piece(under_way, "a", kThis).is_first()) << "it is answered: another one begins anew";
   }
-  EXPECT_TRUE(UnderWay::Piece(under_way, "b").is_first());
+  EXPECT_TRUE(UnderWay::Piece(under_way, "b", kThis).is_first());
+}
+
+TEST(UnderWay, SomethingElseUnderTheSameIdIsNoRepeat) {
+  UnderWay under_way;
+  UnderWay::Piece first(under_way, "a", kThis);
+  {
+    const UnderWay::Piece that(under_way, "a", kThat);
+    EXPECT_TRUE(that.is_other());
+    EXPECT_FALSE(that.is_first());
+    EXPECT_FALSE(UnderWay::Piece(under_way, "a", kThatElsewhere).is_other()) << "headers of other lengths";
+  }
+  EXPECT_TRUE(first.has_repeat());
+  EXPECT_FALSE(first.has_repeat()) << "only the repeat has the answer of the first";
 }
 
 TEST(ReplyMemory, ForgetsTheOldest) {
   ReplyMemory<int> memory(2);
-  memory.remember("a", 1);
-  memory.remember("b", 2);
-  memory.remember("c", 3);
+  memory.remember("a", kThis, 1);
+  memory.remember("b", kThis, 2);
+  memory.remember("c", kThis, 3);
   EXPECT_FALSE(memory.find("a"));
-  EXPECT_EQ(memory.find("b"), 2);
-  EXPECT_EQ(memory.find("c"), 3);
+  EXPECT_EQ(memory.find("b").value().reply, 2);
+  EXPECT_EQ(memory.find("c").value().reply, 3);
 }
 
 TEST(Codec, PrismaticJointsTravelInMillimetres) {

@@ -185,6 +185,22 @@ TEST_F(LoadTest, ARepeatOfARequestThatWaitsIsAnsweredFromTheSameWork) {
   EXPECT_EQ(times[5], 3U);
 }
 
+TEST_F(LoadTest, AnIdThatWasGivenToSomethingElseIsAConflictAndGetsNobodyElsesTargets) {
+  start();
+  auto client = corrector("raw-1");
+  ASSERT_TRUE(client->wait_until_matched());
+  client->send(corrections(3), 1);
+  ASSERT_EQ(client->wait_for_replies(1).size(), 1U);
+  client->send(corrections(2), 1);
+  client->send(corrections(3), 1);
+  const auto replies = client->wait_for_replies(3);
+  ASSERT_EQ(replies.size(), 3U);
+  EXPECT_EQ(replies[1].header().result(), wire::RESULT_CONFLICT);
+  EXPECT_EQ(replies[1].corrections().size(), 0U);
+  EXPECT_EQ(replies[2].header().result(), wire::RESULT_OK) << "a repeat";
+  EXPECT_EQ(replies[2].corrections(), replies[0].corrections());
+}
+
 TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {
   start();
   using Manager = test::RawClient<wire::ManageModels>;
