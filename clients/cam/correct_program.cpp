@@ -16,11 +16,11 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kShareOfSigma = 0.1;         // that rounding may take
-constexpr double kLeastRoundingMm = 1e-6;     // no digits beyond
-constexpr double kDefaultRoundingMm = 1e-3;   // where no sigma is known
-constexpr double kRotationRounding = 1e-6;    // rad: 1 µm at 1 m
-constexpr double kReach = 3;                  // m, the lever of a joint
+constexpr double kShareOfSigma = 0.1;        // that rounding may take
+constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
+constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
+constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
+constexpr double kReach = 3;                 // m, the lever of a joint
 constexpr const char* kSuggestion = "; conf ";
 
 Pose from_wire(const client::PoseMm& pose) {
@@ -60,15 +60,19 @@ struct Group {
 class Correcting {
  public:
   Correcting(const Program& program, const Chain& robot, const CellTools& cell, const CorrectProgramOptions& options)
-      : program_(program), arm_(robot), cell_(cell), options_(options), asked_(program.targets.size()),
-        why_not_(program.targets.size()), rows_(program.targets.size()) {}
+      : program_(program),
+        arm_(robot),
+        cell_(cell),
+        options_(options),
+        asked_(program.targets.size()),
+        why_not_(program.targets.size()),
+        rows_(program.targets.size()) {}
 
   Result<CorrectedProgram> correct(const AskCorrections& ask) {
     if (const Status fresh = check_marks(); !fresh) return tl::make_unexpected(fresh.error());
     std::vector<bool> used(program_.tools.size(), false);
     for (const ProgramTarget& target : program_.targets) used[target.tool] = true;
-    Result<std::vector<ToolChoice>> choices =
-        choose_tools(program_, used, cell_, options_.tool, options_.payload);
+    Result<std::vector<ToolChoice>> choices = choose_tools(program_, used, cell_, options_.tool, options_.payload);
     if (!choices) return tl::make_unexpected(choices.error());
     choices_ = std::move(*choices);
     note_tools();
@@ -200,8 +204,10 @@ class Correcting {
       const auto same = std::find_if(groups.begin(), groups.end(), [&](const Group& group) {
         return group.tool == choice.tool && group.payload == choice.payload;
       });
-      if (same == groups.end()) groups.push_back({choice.tool, choice.payload, {t}});
-      else same->targets.push_back(t);
+      if (same == groups.end())
+        groups.push_back({choice.tool, choice.payload, {t}});
+      else
+        same->targets.push_back(t);
     }
     for (const Group& group : groups) {
       std::vector<client::TargetMm> targets;
@@ -277,9 +283,8 @@ class Correcting {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
         const NumberStyle style =
-            options_.keep_digits
-                ? slot.style
-                : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
+            options_.keep_digits ? slot.style
+                                 : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
         text += number + rewrite.texts[k + 1];
@@ -293,17 +298,17 @@ class Correcting {
   [[nodiscard]] double rounding(const ProgramTarget& target, const std::vector<double>& exact,
                                 const std::vector<double>& written, const JointVector& q, const Pose& X_TF) const {
     if (target.coordinates != Coordinates::kJoints) {
-      return to_mm((pose_of(target.coordinates, written).translation() -
-                    pose_of(target.coordinates, exact).translation())
-                       .norm());
+      return to_mm(
+          (pose_of(target.coordinates, written).translation() - pose_of(target.coordinates, exact).translation())
+              .norm());
     }
     std::map<int, double> external = target.external;
     const auto rounded = arm_.from_axes(written, external);
     if (!rounded) return 0;
     const Pose X_FT = X_TF.inverse();
-    return to_mm(((arm_.robot().flange_pose(*rounded) * X_FT).translation() -
-                  (arm_.robot().flange_pose(q) * X_FT).translation())
-                     .norm());
+    return to_mm(
+        ((arm_.robot().flange_pose(*rounded) * X_FT).translation() - (arm_.robot().flange_pose(q) * X_FT).translation())
+            .norm());
   }
 
   CorrectedProgram finish() {

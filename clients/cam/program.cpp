@@ -93,8 +93,8 @@ Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {
 }
 
 std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const std::vector<double>& like) {
-  const Vector3 p = coordinates == Coordinates::kRotationVector ? pose.translation().eval()
-                                                                : (pose.translation() * to_mm(1)).eval();
+  const Vector3 p =
+      coordinates == Coordinates::kRotationVector ? pose.translation().eval() : (pose.translation() * to_mm(1)).eval();
   std::vector<double> numbers = {p.x(), p.y(), p.z()};
   switch (coordinates) {
     case Coordinates::kQuaternion: {

@@ -192,6 +192,7 @@ TEST_F(LoadTest, AnIdThatWasGivenToSomethingElseIsAConflictAndGetsNobodyElsesTar
   client->send(corrections(3), 1);
   ASSERT_EQ(client->wait_for_replies(1).size(), 1U);
   client->send(corrections(2), 1);
+  ASSERT_EQ(client->wait_for_replies(2).size(), 2U);
   client->send(corrections(3), 1);
   const auto replies = client->wait_for_replies(3);
   ASSERT_EQ(replies.size(), 3U);

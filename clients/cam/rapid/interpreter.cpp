@@ -14,7 +14,7 @@ namespace {
 
 using Kind = Expression::Kind;
 
-constexpr int kDeepest = 60;             // names that stand for names
+constexpr int kDeepest = 60;               // names that stand for names
 constexpr std::size_t kMostWaysIn = 2000;  // into one routine
 
 struct BuiltIn {
@@ -34,8 +34,7 @@ const std::map<std::string, std::vector<BuiltIn>>& built_in() {
        {{"eax_a", "num"}, {"eax_b", "num"}, {"eax_c", "num"}, {"eax_d", "num"}, {"eax_e", "num"}, {"eax_f", "num"}}},
       {"pose", {{"trans", "pos"}, {"rot", "orient"}}},
       {"tooldata", {{"robhold", "bool"}, {"tframe", "pose"}, {"tload", "loaddata"}}},
-      {"loaddata",
-       {{"mass", "num"}, {"cog", "pos"}, {"aom", "orient"}, {"ix", "num"}, {"iy", "num"}, {"iz", "num"}}},
+      {"loaddata", {{"mass", "num"}, {"cog", "pos"}, {"aom", "orient"}, {"ix", "num"}, {"iy", "num"}, {"iz", "num"}}},
       {"wobjdata",
        {{"robhold", "bool"}, {"ufprog", "bool"}, {"ufmec", "string"}, {"uframe", "pose"}, {"oframe", "pose"}}},
   };
@@ -45,12 +44,13 @@ const std::map<std::string, std::vector<BuiltIn>>& built_in() {
 /// Instructions that leave the data which they are given as they are.
 bool only_reads(const std::string& name) {
   static const std::set<std::string> kReaders = {
-      "set",     "reset",    "setdo",    "setgo",   "setao",    "pulsedo", "waittime",   "waituntil", "waitdi",
-      "waitdo",  "tpwrite",  "tperase",  "write",   "errwrite", "stop",    "gripload",   "pdispset",  "pdispon",
-      "eoffsset", "eoffson", "actunit",  "confl",   "confj",    "singarea", "accset",    "velset",    "softact",
-      "waitrob", "speedrefresh", "stopmove", "startmove", "return", "triggio", "triggequip", "triggint",
-      "mechunitload", "waitsynctask", "syncmoveon", "syncmoveoff", "exit", "raise", "connect", "isignaldi",
-      "deactunit", "corron", "worldacclim", "invertdo", "tpshow", "uishow"};
+      "set",          "reset",        "setdo",      "setgo",       "setao",    "pulsedo",    "waittime",
+      "waituntil",    "waitdi",       "waitdo",     "tpwrite",     "tperase",  "write",      "errwrite",
+      "stop",         "gripload",     "pdispset",   "pdispon",     "eoffsset", "eoffson",    "actunit",
+      "confl",        "confj",        "singarea",   "accset",      "velset",   "softact",    "waitrob",
+      "speedrefresh", "stopmove",     "startmove",  "return",      "triggio",  "triggequip", "triggint",
+      "mechunitload", "waitsynctask", "syncmoveon", "syncmoveoff", "exit",     "raise",      "connect",
+      "isignaldi",    "deactunit",    "corron",     "worldacclim", "invertdo", "tpshow",     "uishow"};
   static const std::set<std::string> kMotions = {"move", "trig", "arc", "spot", "disp", "pain", "capl", "capc"};
   if (kReaders.contains(name)) return true;
   for (const std::string& beginning : kMotions) {
@@ -87,7 +87,8 @@ std::string Interpreter::place_of(std::size_t module, int line) const {
 std::string Interpreter::text_of(const Expression& expression, const Scope& scope) const {
   const std::string& text = files_[scope.module].text;
   std::string shown;
-  for (const Token& token : tokens_of(std::string_view(text).substr(expression.begin, expression.end - expression.begin))) {
+  for (const Token& token :
+       tokens_of(std::string_view(text).substr(expression.begin, expression.end - expression.begin))) {
     shown += text.substr(expression.begin + token.begin, token.end - token.begin);
   }
   return shown;
@@ -196,8 +197,9 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
                                         place_of(module, instruction.line));
     if (routine) {
       const Routine& called = modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
-      const std::string& parameter =
-          !argument.label.empty() ? argument.label : at < called.parameters.size() ? called.parameters[at] : root->name;
+      const std::string& parameter = !argument.label.empty()         ? argument.label
+                                     : at < called.parameters.size() ? called.parameters[at]
+                                                                     : root->name;
       const auto found = by_name_[routine->first].find({routine->second, parameter});
       if (found == by_name_[routine->first].end() || !found->second->may_be_changed) continue;
       if (changed_.contains(found->second)) note_change(argument, scope, why);

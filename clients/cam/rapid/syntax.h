@@ -18,10 +18,10 @@ struct Expression {
   Kind kind = Kind::kUnknown;
   std::size_t begin = 0, end = 0;
   int line = 0;
-  std::string name;   ///< of a name, a call, a field; the word of a truth value
-  double value = 0;   ///< of a number
-  char sign = 0;      ///< of a unary or binary operation
-  std::string label;  ///< of an argument `\Rx:=...`: `rx`
+  std::string name;               ///< of a name, a call, a field; the word of a truth value
+  double value = 0;               ///< of a number
+  char sign = 0;                  ///< of a unary or binary operation
+  std::string label;              ///< of an argument `\Rx:=...`: `rx`
   std::vector<Expression> parts;  ///< elements, arguments, operands; of a field or element: what it is of, first
 };
 
@@ -30,10 +30,10 @@ enum class Storage { kConst, kPers, kVar, kParameter, kLoop };
 struct Declaration {
   std::string name, type;
   Storage storage = Storage::kVar;
-  bool local = false;    ///< to its module
-  int routine = -1;      ///< of the module; -1: of the module itself
+  bool local = false;  ///< to its module
+  int routine = -1;    ///< of the module; -1: of the module itself
   bool is_array = false;
-  bool may_be_changed = false;  ///< of a parameter: INOUT, VAR, PERS
+  bool may_be_changed = false;     ///< of a parameter: INOUT, VAR, PERS
   std::size_t begin = 0, end = 0;  ///< of the statement
   int line = 0;
   std::optional<Expression> value;
@@ -47,8 +47,8 @@ struct Assignment {
 
 /// `MoveL p10,v100,fine,tool1\WObj:=wobj1;`, or a call of a procedure.
 struct Instruction {
-  std::string name;        ///< in lower case
-  std::string spelled;     ///< as it stands there
+  std::string name;     ///< in lower case
+  std::string spelled;  ///< as it stands there
   std::vector<Expression> arguments;
   std::size_t begin = 0, end = 0;
   int routine = -1;

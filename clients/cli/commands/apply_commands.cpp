@@ -222,9 +222,8 @@ Result<Extent> correct(CorrectArguments arguments) {
 }
 
 CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
-  CLI::Option* model =
-      command.add_option("--model", arguments.model,
-                         "Model file; with --service a cell id (its model in force) or CELL@VERSION");
+  CLI::Option* model = command.add_option("--model", arguments.model,
+                                          "Model file; with --service a cell id (its model in force) or CELL@VERSION");
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
   add_service_options(command, arguments.service);
@@ -267,8 +266,9 @@ void add_program_options(CLI::App& command, CorrectArguments& arguments) {
       .add_flag("--split", arguments.split, "Make a target of each use where one is used with several tools or frames")
       ->group(group);
   command.add_flag("--keep-joints", arguments.keep_joints, "Leave targets that are given as joints")->group(group);
-  CLI::Option* undo = command.add_flag("--undo", arguments.undo,
-                                       "Write the program as it was before, from what is kept beside the corrected one")
+  CLI::Option* undo = command
+                          .add_flag("--undo", arguments.undo,
+                                    "Write the program as it was before, from what is kept beside the corrected one")
                           ->group(group);
   command
       .add_flag("--again", arguments.again,

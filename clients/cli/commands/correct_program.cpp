@@ -12,8 +12,8 @@
 #include "clients/cli/text/receipt_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
-#include "server/base/unix_time.h"
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
@@ -30,9 +30,7 @@ std::string today() {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-cam::CellTools tools_of(const CompensatedModel& model) {
-  return {model.parts().physics.tools, model.cell().payloads};
-}
+cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
 
 /// As a server reads it, so that both give the same bytes.
 Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
@@ -121,13 +119,13 @@ Result<cam::CorrectedProgram> correct_by_service(const cam::Program& program,
       context.tool = tool;
       context.payload = payload;
       if (reference->version > 0) context.model = fmt::format("@{}", reference->version);
-      auto answer = (*session)->correct_targets(context, targets,
-                                                [&](double share) { progress.show("correcting", share); });
+      auto answer =
+          (*session)->correct_targets(context, targets, [&](double share) { progress.show("correcting", share); });
       another |= answer && answer->model.hash != model->provenance().hash;
       return answer;
     };
-    Result<cam::CorrectedProgram> corrected = cam::correct_program(
-        program, model->cell().robot, tools_of(*model), ask, options_of(arguments));
+    Result<cam::CorrectedProgram> corrected =
+        cam::correct_program(program, model->cell().robot, tools_of(*model), ask, options_of(arguments));
     if (!another) return corrected;
   }
   return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", reference->cell, kAttempts);
@@ -185,8 +183,7 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
       arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments);
   if (!corrected) return tl::make_unexpected(corrected.error());
   const std::string left = left_alone_text(*corrected);
-  if (arguments.strict && !left.empty())
-    return refused("nothing is written: {}", left.substr(0, left.size() - 1));
+  if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
   if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
     return tl::make_unexpected(written.error());
   fmt::print(stderr, "{}", shown_lines(receipt_summary(*corrected) + left));

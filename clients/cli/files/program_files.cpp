@@ -29,7 +29,8 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
     if (!it->is_regular_file(error)) continue;
     const std::string path = it->path().string();
     const auto dialect = cam::dialect_of_file(path);
-    if (dialect && (!wanted || dialect == wanted)) found.push_back({fs::relative(it->path(), folder, error).string(), path});
+    if (dialect && (!wanted || dialect == wanted))
+      found.push_back({fs::relative(it->path(), folder, error).string(), path});
   }
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
   return found;
@@ -107,7 +108,8 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
     if (!mark) continue;
     any = true;
     const std::string kept = cam::original_path(before.paths[k]);
-    Result<std::string> text = before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
+    Result<std::string> text =
+        before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
     if (!text) {
       return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
           .in(before.paths[k])
@@ -124,15 +126,17 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
 Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {
   std::vector<std::string> paths;
   std::error_code error;
-  const bool folder = program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) ||
-                      output.ends_with('/');
+  const bool folder =
+      program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) || output.ends_with('/');
   if (folder && output == "-") {
     return failure(ErrorCode::kUsage, "{} files do not go to standard output", program.files.size())
         .of("--output")
         .next("name a folder");
   }
   if (folder && fs::exists(output, error) && !fs::is_directory(output, error)) {
-    return failure(ErrorCode::kUsage, "a folder is needed for {} files", program.files.size()).in(output).of("--output");
+    return failure(ErrorCode::kUsage, "a folder is needed for {} files", program.files.size())
+        .in(output)
+        .of("--output");
   }
   for (std::size_t k = 0; k < program.files.size(); ++k) {
     paths.push_back(folder ? (fs::path(output) / program.files[k].name).string() : output);
