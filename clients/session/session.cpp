@@ -391,6 +391,7 @@ Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
 Result<int> Session::activate(const std::string& cell, int version, const ChangeOptions& change) {
   wire::ManageModelsRequest request;
   request.version(version);
+  request.force(change.force);
   const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();

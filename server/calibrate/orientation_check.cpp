@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
+#include "server/measurement/sessions.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel {
@@ -436,8 +437,10 @@ std::optional<Error> doubt_of(Oriented group, const Cell& cell) {
 }  // namespace
 
 std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
-  for (const Oriented& group : by_tool(batch, cell.robot)) {
-    if (auto doubt = doubt_of(group, cell)) return doubt;
+  for (const MeasurementBatch& session : by_session(batch)) {  // each was measured in a world of its own
+    for (const Oriented& group : by_tool(session, cell.robot)) {
+      if (auto doubt = doubt_of(group, cell)) return doubt;
+    }
   }
   return std::nullopt;
 }

@@ -4,7 +4,8 @@
 namespace trammel {
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
-  if (request.force()) return unsupported<wire::ManageModelsReply>("force");
+  if (request.force() && request.action() != wire::MANAGE_ACTIVATE)
+    return unsupported<wire::ManageModelsReply>("force");
   if (request.change().expected_epoch() != 0) return unsupported<wire::ManageModelsReply>("expected_epoch");
   if (request.action() == wire::MANAGE_BACKUP) return unsupported<wire::ManageModelsReply>("action");
   const std::string& cell = request.about().cell();
@@ -36,7 +37,9 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
     case wire::MANAGE_CANCEL_JOB:
       return cancel(cell, request.job()).map([] { return 0; });
     default:
-      return trainer_.activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())))
+      return trainer_
+          .activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())),
+                    request.force())
           .map([&] { return int{request.version()}; });
   }
 }

@@ -163,6 +163,25 @@ void read_model(const YamlMap& map, Cell& cell) {
   model.attempt([&] { cell.model.bias = model.text("bias", cell.model.bias); });
 }
 
+SessionRule read_sessions(const YamlMap& map) {
+  std::string word;
+  try {
+    word = map.text("sessions");
+  } catch (const YamlRefusal&) {
+    const YamlMap rule = map.map("sessions");
+    rule.only({"last", "days"});
+    if (rule.has("last") == rule.has("days")) map.refuse("sessions", "expected all, {last: N} or {days: N}");
+    const bool last = rule.has("last");
+    const char* key = last ? "last" : "days";
+    const int count = rule.integer(key, 0);
+    if (count < 1) rule.refuse(key, refused("must be 1 or more").beyond(count, 1));
+    return {last ? SessionRule::Kind::kLast : SessionRule::Kind::kDays, count};
+  }
+  if (word != "all")
+    map.refuse("sessions", refused("'{}', expected all, {{last: N}} or {{days: N}}", word).with_text(word));
+  return {};
+}
+
 void read_surroundings(const YamlMap& map, Cell& cell) {
   map.attempt([&] {
     if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
@@ -177,6 +196,9 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
     if (map.has("tracker")) cell.tracker = read_tracker(map.map("tracker"));
   });
   map.attempt([&] {
+    if (map.has("sessions")) cell.sessions = read_sessions(map);
+  });
+  map.attempt([&] {
     if (!map.has("workspace_mm")) return;
     const YamlMap box = map.map("workspace_mm");
     box.only({"lower", "upper"});
@@ -186,7 +208,7 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
 
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm"});
+            "workspace_mm", "sessions"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)

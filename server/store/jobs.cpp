@@ -220,6 +220,16 @@ Result<bool> Store::may_release(std::int64_t job) const {
   });
 }
 
+Result<bool> Store::was_made_by_job(const std::string& cell, int version) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM jobs WHERE cell = ? AND model_version = ?)");
+    query.bind(1, cell);
+    query.bind(2, version);
+    query.executeStep();
+    return query.getColumn(0).getInt() != 0;
+  });
+}
+
 Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
                                        const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {

@@ -122,6 +122,8 @@ class Store {
   /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may also
   /// train from batches in quarantine. They leave quarantine in the transaction that puts its model in force.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false, const ChangeId& change_id = {});
+  /// Whether a job made that version here; false: it was imported.
+  [[nodiscard]] Result<bool> was_made_by_job(const std::string& cell, int version) const;
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as add_job().

@@ -17,6 +17,7 @@
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
 #include "server/trainer/acceptance/judging.h"
+#include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/compute/job_batches.h"
 #include "server/trainer/job_sources.h"
 
@@ -304,6 +305,11 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   job.level = level;
   job.bias = bias;
   job.created_at = unix_now();
+  if (batch_ids.empty()) {
+    auto earlier = earlier_sessions(store_, job, (*cell)->sessions, options_.max_poses);
+    if (!earlier) return tl::make_unexpected(earlier.error());
+    job.batch_ids.insert(job.batch_ids.begin(), earlier->begin(), earlier->end());
+  }
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
@@ -360,6 +366,47 @@ Status Trainer::cancel(std::int64_t id) {
   progress.outcome = outcome;
   book_.report(progress);
   return {};
+}
+
+Status Trainer::activate(const std::string& cell, int version, const ChangeRequest& request, bool force) {
+  if (!force) {
+    const auto made = store_.outcome_of(request.id);
+    if (!made) return tl::make_unexpected(made.error());
+    const Status wanted = *made ? Status() : check_not_worse(cell, version);
+    if (!wanted) return wanted;
+  }
+  return history_.activate(cell, version, request);
+}
+
+Status Trainer::check_not_worse(const std::string& cell_name, int version) const {
+  const auto cell = find_cell(cells_, cell_name);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const auto present = registry_.in_force(cell_name);
+  const auto judged_here = store_.was_made_by_job(cell_name, version);
+  if (!judged_here) return tl::make_unexpected(judged_here.error());
+  if (*judged_here || !present || present->version == version) return {};
+  const auto imported = registry_.version(cell_name, version);
+  if (!imported) return tl::make_unexpected(imported.error());
+  StoredJob nothing;
+  nothing.cell = cell_name;
+  const auto sources = batch_sources(store_, nothing, true);
+  if (!sources) return tl::make_unexpected(sources.error());
+  JobBatches batches(**cell, held_out_by_service(options_.validation_share, options_.seed), {});
+  for (const BatchSource& source : *sources) {
+    const auto stored = store_.batch(cell_name, source.id);
+    if (!stored) return tl::make_unexpected(stored.error());
+    batches.add({source.id, stored->csv, stored->accepted_at}, true);
+  }
+  const GateVerdict verdict = verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
+                                         {Bar::kBetter, options_.accept_ratio});
+  const GateFigures& figures = verdict.figures;
+  const bool as_good = figures.before && figures.after && *figures.after <= options_.accept_ratio * *figures.before;
+  if (verdict.put_in_force || verdict.undecided || as_good) return {};
+  return refused("cell {}: version {} was imported and is worse than version {}: {}", cell_name, version,
+                 present->version, verdict.why)
+      .of("version")
+      .with_value(version)
+      .next("activate --force where it is wanted all the same");
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {

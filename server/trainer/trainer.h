@@ -92,9 +92,10 @@ class Trainer {
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {}) {
-    return history_.activate(cell, version, request);
-  }
+  /// See ModelHistory. A version that was imported is judged first, as a new one would be: where it is worse on the
+  /// same poses than the one in force it is refused with the figures, unless `force` says that it is wanted.
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
+                                bool force = false);
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
     return history_.rollback(cell, request);
   }
@@ -133,6 +134,8 @@ class Trainer {
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
+  /// Refuses an imported version that is worse than the one in force.
+  [[nodiscard]] Status check_not_worse(const std::string& cell, int version) const;
   /// Whether the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
                                       bool release) const;

@@ -419,7 +419,10 @@ std::size_t BadRequests::changes() {
   expect("an unknown action", wire::RESULT_INVALID_ARGUMENT,
          [](Request& r) { r.action(static_cast<wire::ManageAction>(5)); });
   expect("a backup", wire::RESULT_UNSUPPORTED, [](Request& r) { r.action(wire::MANAGE_BACKUP); });
-  expect("force", wire::RESULT_UNSUPPORTED, [](Request& r) { r.force(true); });
+  expect("force", wire::RESULT_UNSUPPORTED, [](Request& r) {
+    r.action(wire::MANAGE_ROLLBACK);
+    r.force(true);
+  });
   expect("another version than in force", wire::RESULT_CONFLICT, [](Request& r) {
     r.version(2);
     r.change().expected_version(2);

@@ -537,7 +537,7 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
     EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
   }
   EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
-  auto forced = manage_request(wire::MANAGE_ACTIVATE, 1);
+  auto forced = manage_request(wire::MANAGE_ROLLBACK);
   forced.force(true);
   EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
   auto of_epoch = manage_request(wire::MANAGE_ACTIVATE, 1);

@@ -19,7 +19,7 @@ struct ServiceArguments {
   std::string cell, batch, batch_id, level, bias, model, output, json;
   std::vector<std::string> batch_ids;
   std::int64_t job = 0;
-  bool watch = false, release = false;
+  bool watch = false, release = false, force = false;
   double limit_s = 3600;
   ServiceOptions service;
 };
@@ -140,7 +140,9 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
         .of("--model")
         .with_text(arguments.model);
   }
-  return now_in_force(model->cell, session.activate(model->cell, model->version), arguments);
+  client::ChangeOptions options;
+  options.force = arguments.force;
+  return now_in_force(model->cell, session.activate(model->cell, model->version, options), arguments);
 }
 
 Status rollback(client::Session& session, const ServiceArguments& arguments) {
@@ -209,6 +211,12 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
       ->capture_default_str();
 }
 
+void add_activation(CLI::App& command, ServiceArguments& arguments) {
+  command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
+  command.add_flag("--force", arguments.force,
+                   "Also where it was imported and is worse than the version in force on the poses held out");
+}
+
 }  // namespace
 
 void add_service_commands(CLI::App& app, Action& chosen) {
@@ -255,11 +263,7 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->capture_default_str();
                });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
-  commands.add(
-      "activate", "Put a stored version of a cell's model in force", activate,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
-      });
+  commands.add("activate", "Put a stored version of a cell's model in force", activate, add_activation);
   commands.add("rollback", "Put back in force the model that was before", rollback, add_cell);
   commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
     command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();

@@ -73,6 +73,7 @@ std::vector<Frame> of_task(const ComputeTask& task) {
   frames.push_back(frame("task", {{"cell", task.cell->name},
                                   {"diagnose", task.kind == JobKind::kDiagnose},
                                   {"batch_ids", task.batch_ids},
+                                  {"earlier_ids", task.earlier_ids},
                                   {"level", task.level},
                                   {"bias", task.bias},
                                   {"apply", task.apply},
@@ -92,6 +93,7 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   task.cell = std::make_shared<const Cell>(std::move(*cell));
   task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose : JobKind::kTrain;
   task.batch_ids = head.at("batch_ids").get<std::vector<std::string>>();
+  task.earlier_ids = head.at("earlier_ids").get<std::vector<std::string>>();
   task.level = head.at("level");
   task.bias = head.at("bias");
   task.apply = head.at("apply");

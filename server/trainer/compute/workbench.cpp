@@ -33,6 +33,15 @@ std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, c
   return served;
 }
 
+Made nothing_applied(const std::string& why, const ServedModel& present) {
+  Made made;
+  made.outcome.verdict = JobVerdict::kNothingApplied;
+  made.outcome.why = why;
+  made.outcome.next = "submit the batch where it is good, and release it";
+  made.message = fmt::format("nothing applied: {}; version {} stays in force", why, present.version);
+  return made;
+}
+
 /// `; ` before each that says something.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
@@ -50,7 +59,7 @@ HoldOut hold_out_of(const ComputeTask& task) {
 }  // namespace
 
 Workbench::Workbench(ComputeTask task)
-    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids) {}
+    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids, task_.earlier_ids) {}
 
 Status Workbench::take(const BatchText& batch, bool judges) {
   batches_.add(batch, judges);
@@ -86,6 +95,11 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   if (!batch) return tl::make_unexpected(batch.error());
   const auto present = in_force();
   if (!present) return tl::make_unexpected(present.error());
+  if (task_.apply && task_.batch_ids.empty() && *present) {
+    // What was sent with the question goes through the same door as what is submitted.
+    const Triage triaged = triage((*present)->model, *batch);
+    if (!triaged.learn) return nothing_applied(triaged.sentence, **present);
+  }
   DiagnoseOptions options;
   options.seed = task_.seed;
   options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage, double share) {
