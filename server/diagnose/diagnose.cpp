@@ -3,8 +3,8 @@
 #include <functional>
 
 #include "server/base/hash.h"
+#include "server/calibrate/batch_check.h"
 #include "server/calibrate/frames/frames.h"
-#include "server/calibrate/orientation_check.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
@@ -19,8 +19,7 @@ constexpr std::size_t kFewestPoses =
     12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
 
 Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
-  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
-    return tl::make_unexpected(oriented.error());
+  if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();
