@@ -147,12 +147,13 @@ struct Session::Participant {
   }
 
   /// From every server.
-  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what) {
+  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what,
+                                                                    const wire::ReadModelsRequest& asked = {}) {
     const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
     if (known.empty()) return tl::make_unexpected(no_server());
     std::vector<wire::ReadModelsReply> replies;
     for (const KnownServer& server : known) {
-      auto reply = read(cell, server.id(), what);
+      auto reply = read(cell, server.id(), what, asked);
       if (!reply) return tl::make_unexpected(reply.error());
       replies.push_back(std::move(*reply));
     }
@@ -385,6 +386,18 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
     for (const wire::Job& job : reply.jobs()) jobs.push_back(from_wire(job, reply.header().server().to_string()));
   }
   return jobs;
+}
+
+Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(since_unix_s);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_AUDIT, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<AuditText> texts;
+  for (const wire::ReadModelsReply& reply : *replies)
+    texts.push_back({reply.header().server().to_string(), reply.text()});
+  return texts;
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {

@@ -67,6 +67,10 @@ class Session {
   /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
   /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
+  /// From every server: who changed what, of one cell or (empty) of all, since then (Unix time, s), the newest `most`
+  /// (0: all).
+  [[nodiscard]] Result<std::vector<AuditText>> audit(const std::string& cell, std::int64_t since_unix_s,
+                                                     std::size_t most);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});

@@ -108,6 +108,11 @@ struct ChangeOptions {
   std::string id = {};  ///< unique for ever: the change happens once under it; empty: the session makes one
 };
 
+/// The audit trail of a server as it sends it: JSON.
+struct AuditText {
+  std::string server, json;
+};
+
 /// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
 struct DatedJob {
   JobStatus status;

@@ -21,43 +21,33 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
   const auto expected = expected_version(request.change());
   if (!expected) return tl::make_unexpected(expected.error());
   const auto under = [&](const std::string& asked) {
-    return ChangeRequest{change_id(request.change().id().to_string(), asked), *expected};
+    ChangeId id = change_id(request.change().id().to_string(), asked, request.header());
+    id.reason = request.reason();
+    return ChangeRequest{std::move(id), *expected};
   };
   switch (request.action()) {
     case wire::MANAGE_ROLLBACK:
       return trainer_.rollback(cell, under("roll back " + cell));
     case wire::MANAGE_IMPORT: {
       const std::string& text = request.model_text();
-      const ChangeId id = under(in_few_words("import", cell, {text})).id;
-      if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
-        return tl::make_unexpected(as_expected.error());
+      ChangeId id = under(in_few_words("import", cell, {text})).id;
+      id.expected_version = *expected;
       return trainer_.import_model(cell, text, id);
     }
     case wire::MANAGE_CANCEL_JOB:
-      return cancel(cell, request.job()).map([] { return 0; });
+      return cancel(cell, request.job(), requester(request.header())).map([] { return 0; });
     default:
       return trainer_.activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())))
           .map([&] { return int{request.version()}; });
   }
 }
 
-Status Handlers::cancel(const std::string& cell, std::int64_t job) {
+Status Handlers::cancel(const std::string& cell, std::int64_t job, const std::string& who) {
   const auto asked = trainer_.progress(job);
   if (!asked) return tl::make_unexpected(asked.error());
   if (asked->cell != cell)
     return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
-  return trainer_.cancel(job);
-}
-
-Status Handlers::check_expected(const std::string& cell, const std::optional<int>& expected) const {
-  if (!expected) return {};
-  const auto served = registry_.in_force(cell);
-  const int version = served ? served->version : 0;
-  if (version == *expected) return {};
-  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version, *expected)
-      .of("expected")
-      .beyond(*expected, version)
-      .next("look again, and decide anew");
+  return trainer_.cancel(job, who);
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
@@ -82,21 +72,14 @@ Result<std::int64_t> Handlers::released(const std::string& cell, const wire::Rel
         .of("batch_ids")
         .beyond(batches.size(), 1);
   }
-  const ChangeId id =
-      change_id(request.change().id().to_string(),
-                in_few_words(trains ? "release and train" : "release", cell,
-                             {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}));
-  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
-    return tl::make_unexpected(as_expected.error());
+  ChangeId id = change_id(request.change().id().to_string(),
+                          in_few_words(trains ? "release and train" : "release", cell,
+                                       {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
+                          request.header());
+  id.reason = request.reason();
+  id.expected_version = *expected;
   if (!trains) return trainer_.release(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kReleased, id);
-}
-
-Status Handlers::check_expected_once(const std::string& cell, const std::optional<int>& expected,
-                                     const ChangeId& id) const {
-  const auto made = store_.outcome_of(id);
-  if (!made) return tl::make_unexpected(made.error());
-  return *made ? Status() : check_expected(cell, expected);
 }
 
 bool happens_once(const wire::ManageModelsRequest&) { return true; }

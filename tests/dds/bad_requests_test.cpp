@@ -392,8 +392,8 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_AUDIT,
-                          wire::READ_REPLAY}) {
+  for (const auto what :
+       {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_REPLAY}) {
     expect("what is not built yet", wire::RESULT_UNSUPPORTED, what);
   }
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });
