@@ -42,7 +42,7 @@ struct Outsider {
 
 const std::map<std::string, Outsider> kOutsiders = {
     {"clients/session", {{"idl"}, 0}},
-    {"clients/cam", {{"idl", "clients/session"}, 0}},
+    {"clients/cam", {{"idl", "clients/session"}, 2}},
     {"clients/cli", {{"clients/session", "clients/cam"}, 7}},
     {"clients", {{"clients/cli"}, -1}},
     {"idl", {{"idl/guard"}, 0}},

@@ -83,14 +83,6 @@ struct Session::Participant {
     return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), ports, options.domain);
   }
 
-  /// Sends one request. An error reply of the server is an error here.
-  template <typename Operation>
-  [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
-                                                             typename Operation::Request::type request,
-                                                             const Route& route) {
-    return as_result(caller.call(std::move(request), route, deadline()));
-  }
-
   /// An error reply of the server is an error here, and one of no server says where it was looked for.
   template <typename Reply>
   [[nodiscard]] Result<Reply> as_result(Result<Reply> reply) const {
@@ -103,11 +95,12 @@ struct Session::Participant {
     return reply;
   }
 
-  /// The same for what changes nothing: a server that is busy is asked again when it says, until the deadline.
+  /// Sends one request. A server that is busy has not done it and is asked again when it says, until the deadline; a
+  /// change keeps its id.
   template <typename Operation>
-  [[nodiscard]] Result<typename Operation::Reply::type> call_patiently(Caller<Operation>& caller,
-                                                                       const typename Operation::Request::type& request,
-                                                                       const Route& route) {
+  [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
+                                                             const typename Operation::Request::type& request,
+                                                             const Route& route) {
     const auto until = deadline();
     while (true) {
       auto reply = caller.call(request, route, until);
@@ -125,7 +118,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.action(action);
     request.change(to_wire(change));
-    return call<wire::ManageModels>(*manage_models, std::move(request), {cell, {}, true});
+    return call<wire::ManageModels>(*manage_models, request, {cell, {}, true});
   }
 
   [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -133,7 +126,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
-    const auto reply = call<wire::ReleaseBatches>(*release_batches, std::move(request), {cell, {}, true});
+    const auto reply = call<wire::ReleaseBatches>(*release_batches, request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
@@ -143,7 +136,7 @@ struct Session::Participant {
                                                    wire::ReadKind what, wire::ReadModelsRequest request = {}) {
     request.about().cell(cell);
     request.what(what);
-    return call<wire::ReadModels>(*read_models, std::move(request), {cell, server, false});
+    return call<wire::ReadModels>(*read_models, request, {cell, server, false});
   }
 
   /// From every server.
@@ -196,7 +189,7 @@ struct Session::Participant {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const auto reply = call_patiently(caller, request, {context.cell, {}, false});
+      const auto reply = call(caller, request, {context.cell, {}, false});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),

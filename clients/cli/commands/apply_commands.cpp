@@ -2,6 +2,8 @@
 #include <filesystem>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/commands/correct_program.h"
+#include "clients/cli/files/program_files.h"
 #include "clients/cli/files/target_file.h"
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
@@ -163,18 +165,40 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
 }
 
-/// The options that decide whether targets without correction are errors.
+/// What correct is asked for, a program or a table of targets.
 struct CorrectArguments : ApplyArguments {
-  bool allow_failed = false, strict = false;
+  std::vector<std::string> inputs;
+  std::string receipt, report, format;
+  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
+       keep_joints = false;
+  double tolerance_mm = 0;
+
+  [[nodiscard]] CorrectProgramArguments of_program() const {
+    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,
+            allow_failed, strict, keep_digits, undo,    again,  split,  keep_joints, tolerance_mm, service};
+  }
 };
 
-Result<Extent> correct(const CorrectArguments& arguments) {
-  if (const std::string ending = std::filesystem::path(arguments.input).extension().string(); ending != ".csv") {
+Status check_usage(const CorrectArguments& arguments) {
+  if (!arguments.undo && arguments.model.empty())
+    return failure(ErrorCode::kUsage, "--model is required").of("--model").next("it may be left out with --undo only");
+  if (is_program(arguments.inputs, arguments.format)) return {};
+  const std::string ending = std::filesystem::path(arguments.inputs[0]).extension().string();
+  if (arguments.format.empty() && ending != ".csv") {
     return failure(ErrorCode::kUsage, "unknown kind of targets '{}'", ending)
-        .in(arguments.input)
+        .in(arguments.inputs[0])
         .with_text(ending)
-        .next("known: .csv");
+        .next("known: .csv and the endings of programs; --format says what it is");
   }
+  if (arguments.undo)
+    return failure(ErrorCode::kUsage, "a table of targets has nothing to undo").in(arguments.inputs[0]).of("--undo");
+  return {};
+}
+
+Result<Extent> correct(CorrectArguments arguments) {
+  if (const Status usage = check_usage(arguments); !usage) return tl::make_unexpected(usage.error());
+  if (is_program(arguments.inputs, arguments.format)) return correct_program(arguments.of_program());
+  arguments.input = arguments.inputs[0];
   const Result<TargetFile> file = read_targets_csv(arguments.input);
   if (!file) return tl::make_unexpected(file.error());
   const Result<Corrections> corrections =
@@ -187,20 +211,24 @@ Result<Extent> correct(const CorrectArguments& arguments) {
   if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
     return tl::make_unexpected(written.error());
   }
+  if (!arguments.receipt.empty()) {
+    const Status written = write_output(arguments.receipt, corrections_csv(*file, *corrections));
+    if (!written) return tl::make_unexpected(written.error());
+  }
   fmt::print(stderr, "{}", shown_lines(corrections_summary(*corrections) + left_alone));
   const Status written = write_json(arguments.json, corrections_json(*file, *corrections));
   if (!written) return tl::make_unexpected(written.error());
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
-void add_apply_options(CLI::App& command, ApplyArguments& arguments) {
-  command
-      .add_option("--model", arguments.model,
-                  "Model file; with --service a cell id (its model in force) or CELL@VERSION")
-      ->required();
+CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
+  CLI::Option* model =
+      command.add_option("--model", arguments.model,
+                         "Model file; with --service a cell id (its model in force) or CELL@VERSION");
   add_tool_options(command, arguments.tool, arguments.payload);
   add_json_option(command, arguments.json);
   add_service_options(command, arguments.service);
+  return model;
 }
 
 void add_predict(CLI::App& app, Action& chosen) {
@@ -219,22 +247,50 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--orientation", arguments->orientation,
       "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
       "file only");
-  add_apply_options(*command, *arguments);
+  add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
+}
+
+void add_program_options(CLI::App& command, CorrectArguments& arguments) {
+  const std::string group = "Programs";
+  command
+      .add_option("--format", arguments.format,
+                  fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
+      ->group(group);
+  command.add_option("--receipt", arguments.receipt, "What became of each target, as CSV")->group(group);
+  command
+      .add_flag("--keep-digits", arguments.keep_digits,
+                "Write numbers with the decimals that they have, even where rounding takes more than a tenth of what "
+                "is known")
+      ->group(group);
+  command
+      .add_flag("--split", arguments.split, "Make a target of each use where one is used with several tools or frames")
+      ->group(group);
+  command.add_flag("--keep-joints", arguments.keep_joints, "Leave targets that are given as joints")->group(group);
+  CLI::Option* undo = command.add_flag("--undo", arguments.undo,
+                                       "Write the program as it was before, from what is kept beside the corrected one")
+                          ->group(group);
+  command
+      .add_flag("--again", arguments.again,
+                "Correct a corrected program anew, from what is kept beside it of the time before")
+      ->excludes(undo)
+      ->group(group);
 }
 
 void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
   command
-      ->add_option("input", arguments->input,
-                   "Targets in the robot's base (.csv: positions in mm, joints in deg, rails in mm)")
+      ->add_option("input", arguments->inputs,
+                   "A robot program: its files, its folder, or '-' for standard input; or targets in the robot's base "
+                   "(.csv: positions in mm, joints in deg, rails in mm)")
       ->required();
   command
       ->add_option(
           "-o,--output", arguments->output,
-          "Corrected targets to write (CSV: mm, deg), behind the columns of the input; an input column that is named "
-          "as an output column comes as input_NAME")
+          "The corrected program: a file, or a folder for several; what each file was before is kept beside it as "
+          "FILE.original. Of a table the corrected targets (CSV: mm, deg), behind the columns of the input; an input "
+          "column that is named as an output column comes as input_NAME")
       ->required();
   CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
                                                 "Exit with 0, not 1, where targets are left as they were");
@@ -243,6 +299,7 @@ void add_correct(CLI::App& app, Action& chosen) {
                  "Write nothing and exit with 3 where any target would be left as it was")
       ->excludes(allow_failed);
   add_apply_options(*command, *arguments);
+  add_program_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return correct(*arguments); }; });
 }
 

@@ -1,0 +1,159 @@
+#include "clients/cam/cell_tools.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return text;
+}
+
+double distance(const Pose& a, const Pose& b) { return (a.translation() - b.translation()).norm(); }
+double angle(const Pose& a, const Pose& b) { return pose_difference(a, b).tail<3>().norm(); }
+
+bool same_tool(const ProgramTool& tool, const Pose& X_FT) {
+  return distance(*tool.X_FT, X_FT) <= kToolPositionTolerance &&
+         angle(*tool.X_FT, X_FT) <= kToolRotationTolerance + std::min(tool.rotation_rounding, from_deg(0.02));
+}
+
+std::string pose_text(const Pose& X) {
+  const Vector3 p = X.translation() * to_mm(1);
+  const Eigen::Quaterniond q(X.linear());
+  return fmt::format("[{:.3f}, {:.3f}, {:.3f}] mm [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z(), q.w(), q.x(),
+                     q.y(), q.z());
+}
+
+std::string difference_text(const ProgramTool& tool, const std::string& name, const Pose& X_FT) {
+  return fmt::format("tool {} is {} in the program, {} is {} in the cell: {:.3f} mm and {:.4f} deg apart",
+                     shown(tool.name), pose_text(*tool.X_FT), name, pose_text(X_FT),
+                     to_mm(distance(*tool.X_FT, X_FT)), to_deg(angle(*tool.X_FT, X_FT)));
+}
+
+/// A load that programs state where they do not know it.
+bool is_placeholder(const StatedLoad& load) {
+  return load.mass <= 0 || (load.mass <= 1 && load.p_F.norm() <= 1e-3 + 1e-9);
+}
+
+bool same_load(const StatedLoad& load, const Payload& payload) {
+  return std::abs(load.mass - payload.mass) <= std::max(0.1, kLoadMassTolerance * payload.mass) &&
+         (load.p_F - payload.p_FoCog_F).norm() <= kLoadCentreTolerance;
+}
+
+std::string load_text(double mass, const Vector3& p_F) {
+  const Vector3 p = p_F * to_mm(1);
+  return fmt::format("{:.3f} kg at [{:.1f}, {:.1f}, {:.1f}] mm", mass, p.x(), p.y(), p.z());
+}
+
+/// The tool of the cell whose name a program's tool has, case left aside.
+std::map<std::string, Pose>::const_iterator named(const CellTools& cell, const std::string& name) {
+  return std::find_if(cell.tools.begin(), cell.tools.end(),
+                      [&](const auto& tool) { return lower(tool.first) == lower(name); });
+}
+
+class Choosing {
+ public:
+  Choosing(const Program& program, const CellTools& cell, const std::string& tool, const std::string& payload)
+      : program_(program), cell_(cell), asked_(tool), payload_(payload) {}
+
+  Result<std::vector<ToolChoice>> choose(const std::vector<bool>& used) {
+    std::vector<ToolChoice> choices(program_.tools.size());
+    bool any = false;
+    for (std::size_t k = 0; k < choices.size(); ++k) {
+      if (!used[k]) continue;
+      choices[k] = choice(program_.tools[k]);
+      any |= choices[k].why_not.empty();
+      if (choices[k].why_not.empty()) choose_payload(program_.tools[k], choices[k]);
+    }
+    // Where no tool is the cell's, the program is not of this cell.
+    for (std::size_t k = 0; k < choices.size() && !any; ++k) {
+      if (used[k] && program_.tools[k].X_FT) refuse(program_.tools[k], choices[k].why_not);
+    }
+    if (!refusals_.empty()) return tl::make_unexpected(together(std::move(refusals_)));
+    return choices;
+  }
+
+ private:
+  void refuse(const ProgramTool& tool, const std::string& what) {
+    Failure made = refused("{}", what).of("tool " + shown(tool.name));
+    if (!tool.file.empty()) made = std::move(made).in(tool.file).at_row(tool.line);
+    refusals_.push_back(made.value());
+  }
+
+  ToolChoice choice(const ProgramTool& tool) {
+    ToolChoice choice;
+    const auto by_name = asked_.empty() ? named(cell_, tool.name) : cell_.tools.find(asked_);
+    if (by_name != cell_.tools.end()) {
+      choice.tool = by_name->first;
+      if (!tool.X_FT) {
+        choice.note = fmt::format("tool {} is not in the files: it is taken for {} of the cell without comparing them",
+                                  shown(tool.name), by_name->first);
+      } else if (!same_tool(tool, by_name->second)) {
+        // Another tool of the program may be meant by --tool; one of the same name cannot.
+        choice.why_not = difference_text(tool, by_name->first, by_name->second);
+        if (lower(by_name->first) == lower(tool.name)) refuse(tool, choice.why_not);
+      }
+      return choice;
+    }
+    if (!tool.X_FT) {
+      choice.why_not = fmt::format("tool {} is neither in the files handed over nor in the cell", shown(tool.name));
+      return choice;
+    }
+    for (const auto& [name, X_FT] : cell_.tools) {
+      if (same_tool(tool, X_FT)) choice.tool = name;
+    }
+    if (choice.tool.empty()) choice.why_not = nearest(tool);
+    return choice;
+  }
+
+  std::string nearest(const ProgramTool& tool) const {
+    const auto closest = std::min_element(cell_.tools.begin(), cell_.tools.end(), [&](const auto& a, const auto& b) {
+      return distance(*tool.X_FT, a.second) < distance(*tool.X_FT, b.second);
+    });
+    if (closest == cell_.tools.end()) return "the cell has no tools";
+    return difference_text(tool, closest->first, closest->second);
+  }
+
+  void choose_payload(const ProgramTool& tool, ToolChoice& choice) {
+    choice.payload = payload_;
+    const bool stated = tool.load && !is_placeholder(*tool.load);
+    if (choice.payload.empty() && cell_.payloads.size() == 1) choice.payload = cell_.payloads.begin()->first;
+    if (choice.payload.empty() && cell_.payloads.contains(choice.tool)) choice.payload = choice.tool;
+    if (choice.payload.empty() && stated) {
+      for (const auto& [name, payload] : cell_.payloads) {
+        if (same_load(*tool.load, payload)) choice.payload = name;
+      }
+    }
+    const auto known = cell_.payloads.find(choice.payload);
+    if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
+    refuse(tool, fmt::format("load of tool {} is {} in the program, payload {} is {} in the cell: {:.3f} kg and {:.1f} mm apart",
+                             shown(tool.name), load_text(tool.load->mass, tool.load->p_F), known->first,
+                             load_text(known->second.mass, known->second.p_FoCog_F),
+                             std::abs(tool.load->mass - known->second.mass),
+                             to_mm((tool.load->p_F - known->second.p_FoCog_F).norm())));
+  }
+
+  const Program& program_;
+  const CellTools& cell_;
+  const std::string asked_, payload_;
+  std::vector<Error> refusals_;
+};
+
+}  // namespace
+
+Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
+                                             const CellTools& cell, const std::string& tool,
+                                             const std::string& payload) {
+  return Choosing(program, cell, tool, payload).choose(used);
+}
+
+}  // namespace trammel::cam

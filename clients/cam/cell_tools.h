@@ -1,0 +1,38 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cam/program.h"
+
+/// Which tool and load of the cell each tool of a program is.
+namespace trammel::cam {
+
+/// The cell as its model has it: tools that the cell file leaves open are those that the training found.
+struct CellTools {
+  std::map<std::string, Pose> tools;  ///< X_FT
+  std::map<std::string, Payload> payloads;
+};
+
+struct ToolChoice {
+  std::string tool, payload;  ///< of the cell
+  std::string note;           ///< what could not be compared
+  std::string why_not;        ///< why targets of this tool cannot be corrected; empty: they can
+};
+
+constexpr double kToolPositionTolerance = 1e-5;  // m
+constexpr double kToolRotationTolerance = 9e-5;  // rad, 0.005 deg; and what the program's digits leave open
+constexpr double kLoadMassTolerance = 0.02;      // of the mass
+constexpr double kLoadCentreTolerance = 5e-3;    // m
+
+/// One choice a tool of the program; `used` says which of them targets need. `tool` and `payload` are what the user
+/// said, or empty. Refuses with both values and their difference: a tool that is not the cell's of that name, tools of
+/// which none is the cell's, a load that is not the cell's. A tool that is not in the files must be named as one of the
+/// cell's, or by the user.
+[[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
+                                                           const CellTools& cell, const std::string& tool,
+                                                           const std::string& payload);
+
+}  // namespace trammel::cam

@@ -1,0 +1,214 @@
+#include "clients/cam/configuration.h"
+
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+constexpr double kNoBranch = 1e9;
+constexpr int kBranches = 8;
+
+/// The chain without joints in front.
+Result<Chain> arm_of(const Chain& robot, std::size_t first) {
+  std::vector<Joint> joints;
+  for (int j = static_cast<int>(first); j < robot.size(); ++j) joints.push_back(robot.joint(j));
+  return Chain::make(robot.name(), std::move(joints));
+}
+
+/// Height of the elbow, where joint 3 is.
+double elbow_height(const Chain& arm, const JointVector& q) {
+  const std::vector<LinkGeometry> links = arm.links_at(q);
+  Pose X = Pose::Identity();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const LinkGeometry& link = links[i];
+    X = X * Eigen::Translation3d(0, 0, link.d) * Eigen::AngleAxisd(link.theta, Vector3::UnitZ()) *
+        Eigen::Translation3d(link.a, 0, 0) * Eigen::AngleAxisd(link.alpha, Vector3::UnitX()) *
+        Eigen::AngleAxisd(link.beta, Vector3::UnitY());
+  }
+  return X.translation().z();
+}
+
+/// Whether a positive joint 5 turns the tool downward where joint 4 is at zero and the arm at its zero.
+bool positive_5_bends_down(const Chain& arm) {
+  JointVector q = JointVector::Zero(arm.size());
+  const Vector3 straight = arm.flange_pose(q).linear().col(2);
+  q(4) = 0.2;
+  const Vector3 bent = arm.flange_pose(q).linear().col(2);
+  return bent.z() < straight.z();
+}
+
+/// Turns of joints 1, 4 and 6 that the limits allow, as the program says, or near to `previous`.
+void choose_turns(const Chain& arm, const Configuration& said, const std::optional<JointVector>& previous,
+                  JointVector& q) {
+  for (int j = 0; j < arm.size(); ++j) {
+    const Joint& joint = arm.joint(j);
+    const auto index = static_cast<std::size_t>(j);
+    const bool has_near = index < said.near.size() && said.near[index].has_value();
+    const bool has_sign = index < said.signs.size() && said.signs[index].has_value();
+    double best = q(j);
+    double least = kNoBranch;
+    for (const double turns : {0.0, 1.0, -1.0, 2.0, -2.0}) {
+      const double value = q(j) + 2 * kPi * turns;
+      if (value < joint.lower - 1e-9 || value > joint.upper + 1e-9) continue;
+      double cost = std::abs(value - (previous ? (*previous)(j) : 0.0)) * 1e-3;
+      if (has_near && std::abs(value - *said.near[index]) > kPi / 4 + 0.02) cost += 1;
+      if (has_sign && (value < 0) != (*said.signs[index] < 0) && std::abs(value) > 1e-6) cost += 1;
+      if (cost < least) {
+        least = cost;
+        best = value;
+      }
+    }
+    q(j) = best;
+  }
+}
+
+}  // namespace
+
+ArmOfProgram::ArmOfProgram(const Chain& robot) : robot_(robot) {
+  for (int j = 0; j < robot_.size(); ++j)
+    (robot_.joint(j).type == JointType::kRevolute ? turning_ : rails_).push_back(j);
+  const bool rail_first = rails_.size() == 1 && rails_[0] == 0;
+  Result<Chain> arm = rails_.empty() ? Result<Chain>(robot_) : arm_of(robot_, 1);
+  wrist_ = (rails_.empty() || rail_first) && arm && has_spherical_wrist(*arm);
+  if (wrist_) bends_down_ = positive_5_bends_down(*arm);
+}
+
+std::optional<ArmOfProgram::Rail> ArmOfProgram::arm_on(double rail) const {
+  Result<Chain> arm = arm_of(robot_, 1);
+  if (!arm) return std::nullopt;
+  JointVector q = JointVector::Zero(robot_.size());
+  q(0) = rail;
+  const JointVector rest = q.tail(robot_.size() - 1);
+  return Rail{*arm, robot_.flange_pose(q) * arm->flange_pose(rest).inverse()};
+}
+
+std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pose& X_BF, const Configuration& said,
+                                                     const std::optional<JointVector>& previous,
+                                                     std::optional<int>& chosen) const {
+  struct Candidate {
+    int conf = 0;
+    JointVector q;
+    bool outside = false;
+  };
+  std::vector<Candidate> candidates;
+  for (int conf = 0; conf < kBranches; ++conf) {
+    if (said.conf && *said.conf != conf) continue;
+    const Result<InverseResult> found = inverse_kinematics(arm, X_BF, conf, previous);
+    if (!found || found->status == InverseStatus::kUnreachable) continue;
+    candidates.push_back({conf, found->q, found->status == InverseStatus::kJointLimit});
+    choose_turns(arm, said, previous, candidates.back().q);
+  }
+  const auto other_elbow = [&](const Candidate& of) -> const Candidate* {
+    for (const Candidate& candidate : candidates) {
+      if ((candidate.conf ^ of.conf) == 2) return &candidate;
+    }
+    return nullptr;
+  };
+  const auto cost = [&](const Candidate& candidate) {
+    double sum = (candidate.q - previous.value_or(JointVector::Zero(arm.size()))).norm() * 1e-3;
+    if (candidate.outside) sum += 1000;
+    if (said.behind_axis_1 && *said.behind_axis_1 != ((candidate.conf & 4) != 0)) sum += 100;
+    for (std::size_t j = 0; j < said.signs.size(); ++j) {
+      const double value = candidate.q(static_cast<Eigen::Index>(j));
+      if (said.signs[j] && (value < 0) != (*said.signs[j] < 0) && std::abs(value) > 1e-6) sum += 10;
+    }
+    if (said.bends_down && *said.bends_down != (bends_down_ == (candidate.q(4) > 0))) sum += 30;
+    if (const Candidate* other = other_elbow(candidate)) {
+      if (said.elbow_up && *said.elbow_up != (elbow_height(arm, candidate.q) > elbow_height(arm, other->q))) sum += 20;
+      if (said.larger_joint_3 && *said.larger_joint_3 != (candidate.q(2) > other->q(2))) sum += 5;
+    }
+    return sum;
+  };
+  const Candidate* best = nullptr;
+  double least = 0;
+  for (const Candidate& candidate : candidates) {
+    const double sum = cost(candidate);
+    if (best != nullptr && sum >= least) continue;
+    best = &candidate;
+    least = sum;
+  }
+  if (best == nullptr) return std::nullopt;
+  chosen = best->conf;
+  return best->q;
+}
+
+NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, double>& external,
+                                       const std::optional<JointVector>& previous) const {
+  JointVector seed = previous.value_or(JointVector::Zero(robot_.size()));
+  for (std::size_t k = 0; k < rails_.size(); ++k) {
+    const auto value = external.find(static_cast<int>(k));
+    if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
+    seed(rails_[k]) = from_mm(value->second);
+  }
+  if (!previous) {
+    return {std::nullopt, std::nullopt,
+            "the program does not say the arm's configuration, and no motion to joints comes before"};
+  }
+  const InverseResult found = inverse_kinematics(robot_, X_BF, seed);
+  if (found.status == InverseStatus::kUnreachable)
+    return {std::nullopt, std::nullopt, "no joints near those before bring the tool there"};
+  return {found.q, std::nullopt, ""};
+}
+
+NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
+                                   const std::optional<JointVector>& previous) const {
+  if (!wrist_) return by_descent(X_BF, external, previous);
+  NominalJoints made;
+  if (rails_.empty()) {
+    made.q = by_branches(robot_, X_BF, said, previous, made.conf);
+  } else {
+    const auto value = external.find(0);
+    if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
+    const auto on = arm_on(from_mm(value->second));
+    if (!on) return {std::nullopt, std::nullopt, "the arm on its rail is not understood"};
+    const std::optional<JointVector> before =
+        previous ? std::optional<JointVector>(previous->tail(robot_.size() - 1)) : std::nullopt;
+    if (const auto arm = by_branches(on->arm, on->X_BR.inverse() * X_BF, said, before, made.conf)) {
+      made.q = JointVector(robot_.size());
+      *made.q << from_mm(value->second), *arm;
+    }
+  }
+  if (!made.q) {
+    made.conf = said.conf;
+    made.why_not = said.conf ? fmt::format("no joints of conf {} bring the tool there", *said.conf)
+                             : "no joints bring the tool there";
+  }
+  return made;
+}
+
+std::optional<JointVector> ArmOfProgram::from_axes(const std::vector<double>& axes,
+                                                   const std::map<int, double>& external) const {
+  JointVector q(robot_.size());
+  if (axes.size() < turning_.size()) return std::nullopt;
+  for (std::size_t k = 0; k < turning_.size(); ++k) q(turning_[k]) = from_deg(axes[k]);
+  for (std::size_t k = 0; k < rails_.size(); ++k) {
+    const auto value = external.find(static_cast<int>(k));
+    if (value == external.end()) return std::nullopt;
+    q(rails_[k]) = from_mm(value->second);
+  }
+  return q;
+}
+
+std::vector<double> ArmOfProgram::to_axes(const JointVector& q) const {
+  std::vector<double> axes;
+  for (const int j : turning_) axes.push_back(to_deg(q(j)));
+  return axes;
+}
+
+JointVector ArmOfProgram::near(const Pose& X_BF, const JointVector& q) const {
+  if (rails_.empty()) return inverse_kinematics(robot_, X_BF, q).q;
+  std::vector<Joint> joints;
+  for (int j = 0; j < robot_.size(); ++j) {
+    joints.push_back(robot_.joint(j));
+    if (joints.back().type != JointType::kPrismatic) continue;
+    joints.back().lower = q(j) - 1e-9;
+    joints.back().upper = q(j) + 1e-9;
+  }
+  const Result<Chain> held = Chain::make(robot_.name(), std::move(joints));
+  return held ? inverse_kinematics(*held, X_BF, q).q : q;
+}
+
+}  // namespace trammel::cam

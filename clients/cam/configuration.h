@@ -1,0 +1,57 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "clients/cam/program.h"
+#include "server/robot/inverse_kinematics.h"
+
+/// The joints that a controller takes for a target, by what the program says of the configuration.
+namespace trammel::cam {
+
+struct NominalJoints {
+  std::optional<JointVector> q;  ///< rad; empty: none found
+  std::optional<int> conf;       ///< the branch, where the arm has numbered branches
+  std::string why_not;
+};
+
+/// Robot arm with its rail, if any, as a chain and as the six turning axes alone.
+class ArmOfProgram {
+ public:
+  explicit ArmOfProgram(const Chain& robot);
+
+  /// Joints for X_BF. `previous`: of the motion before, which decides what the program leaves open; without one, the
+  /// joints nearest to zero.
+  [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said,
+                                     const std::map<int, double>& external,
+                                     const std::optional<JointVector>& previous) const;
+  /// The chain's joints from a dialect's axes (deg) and external axes (mm); empty where the rail's value is missing.
+  [[nodiscard]] std::optional<JointVector> from_axes(const std::vector<double>& axes,
+                                                     const std::map<int, double>& external) const;
+  [[nodiscard]] std::vector<double> to_axes(const JointVector& q) const;
+  /// The joints near `q`, with the rail where it is, that bring the flange to X_BF.
+  [[nodiscard]] JointVector near(const Pose& X_BF, const JointVector& q) const;
+  [[nodiscard]] bool has_rail() const { return !rails_.empty(); }
+  [[nodiscard]] const Chain& robot() const { return robot_; }
+
+ private:
+  struct Rail {
+    Chain arm;      ///< the turning axes
+    Pose X_BR;      ///< its base on the rail
+  };
+  /// The arm on its rail, where the rail comes first.
+  [[nodiscard]] std::optional<Rail> arm_on(double rail) const;
+  [[nodiscard]] std::optional<JointVector> by_branches(const Chain& arm, const Pose& X_BF, const Configuration& said,
+                                                       const std::optional<JointVector>& previous,
+                                                       std::optional<int>& conf) const;
+  [[nodiscard]] NominalJoints by_descent(const Pose& X_BF, const std::map<int, double>& external,
+                                         const std::optional<JointVector>& previous) const;
+
+  Chain robot_;
+  std::vector<int> turning_, rails_;
+  bool wrist_;             ///< the turning axes are an elbow arm with a spherical wrist
+  bool bends_down_ = true; ///< positive joint 5 bends the tool downward
+};
+
+}  // namespace trammel::cam

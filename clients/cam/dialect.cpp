@@ -1,0 +1,69 @@
+#include "clients/cam/dialect.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "clients/cam/rapid/rapid.h"
+
+namespace trammel::cam {
+
+namespace {
+
+struct Entry {
+  Dialect dialect;
+  const char* name;
+  std::vector<std::string> endings;
+  Program (*read)(std::vector<SourceFile>, const ReadOptions&);
+};
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> kEntries = {
+      {Dialect::kRapid, "rapid", {".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"}, read_rapid},
+  };
+  return kEntries;
+}
+
+}  // namespace
+
+std::optional<Dialect> dialect_called(const std::string& name) {
+  for (const Entry& entry : entries()) {
+    if (entry.name == name) return entry.dialect;
+  }
+  return std::nullopt;
+}
+
+const char* name_of(Dialect dialect) {
+  for (const Entry& entry : entries()) {
+    if (entry.dialect == dialect) return entry.name;
+  }
+  return "";
+}
+
+std::optional<Dialect> dialect_of_file(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  if (dot == std::string::npos) return std::nullopt;
+  std::string ending = path.substr(dot);
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  for (const Entry& entry : entries()) {
+    if (std::find(entry.endings.begin(), entry.endings.end(), ending) != entry.endings.end()) return entry.dialect;
+  }
+  return std::nullopt;
+}
+
+std::string dialect_names() {
+  std::vector<std::string> names;
+  for (const Entry& entry : entries()) names.emplace_back(entry.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadOptions& options) {
+  for (const Entry& entry : entries()) {
+    if (entry.dialect == dialect) return entry.read(std::move(files), options);
+  }
+  return {};
+}
+
+}  // namespace trammel::cam

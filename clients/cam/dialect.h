@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cam/program.h"
+
+/// The kinds of programs that are read.
+namespace trammel::cam {
+
+enum class Dialect { kRapid, kKrl, kFanuc, kInform, kUrScript, kCamRob, kRoboDk };
+
+/// As --format spells it: `rapid krl fanuc inform urscript camrob robodk`.
+[[nodiscard]] std::optional<Dialect> dialect_called(const std::string& name);
+[[nodiscard]] const char* name_of(Dialect dialect);
+/// By the ending of a file's name, whatever its case; empty: none, or one that several kinds share.
+[[nodiscard]] std::optional<Dialect> dialect_of_file(const std::string& path);
+/// All names that --format takes, for messages.
+[[nodiscard]] std::string dialect_names();
+
+[[nodiscard]] Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadOptions& options);
+
+}  // namespace trammel::cam

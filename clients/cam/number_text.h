@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+/// Numbers as programs write them: `-.384`, `+1800.`, `9E+09`.
+namespace trammel::cam {
+
+/// How a number is written, so that another value can be written the same way.
+struct NumberStyle {
+  int decimals = 0;             ///< digits behind the point (of the mantissa)
+  bool plus = false;            ///< positive numbers carry a sign
+  bool bare_point = false;      ///< no zero before the point: `.5`
+  bool ends_in_point = false;   ///< `5.`
+  char exponent = 0;            ///< `e` or `E`; 0: none
+  bool exponent_plus = false;   ///< `E+02`
+  int exponent_digits = 0;      ///< at least
+};
+
+/// The style and value of a number; empty when the text is no finite decimal number.
+struct WrittenNumber {
+  double value = 0;
+  NumberStyle style = {};
+};
+[[nodiscard]] std::optional<WrittenNumber> read_number(std::string_view text);
+
+/// Half a unit of the last digit that `style` writes of `value`.
+[[nodiscard]] double rounding_of(double value, const NumberStyle& style);
+/// `style` with so many decimals more that rounding_of() is at most `largest`; ten decimals at most.
+[[nodiscard]] NumberStyle with_rounding(double value, NumberStyle style, double largest);
+[[nodiscard]] std::string number_text(double value, const NumberStyle& style);
+
+}  // namespace trammel::cam

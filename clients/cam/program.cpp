@@ -1,0 +1,127 @@
+#include "clients/cam/program.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+/// deg about Z, new Y, new X.
+Eigen::Vector3d zyx_angles(const Matrix3& R) {
+  const double b = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) return {0, to_deg(b), to_deg(std::atan2(-R(1, 2), R(1, 1)))};
+  return {to_deg(std::atan2(R(1, 0), R(0, 0))), to_deg(b), to_deg(std::atan2(R(2, 1), R(2, 2)))};
+}
+
+double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }
+
+/// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg only a sum of the
+/// others is given: the first stays.
+Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
+  Eigen::Vector3d one = zyx_angles(R);
+  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) {
+    one(0) = like(0);
+    one(2) = to_deg(R(2, 0) < 0 ? std::atan2(R(0, 1), R(1, 1)) : std::atan2(-R(0, 1), R(1, 1)));
+    one(2) += R(2, 0) < 0 ? like(0) : -like(0);
+  }
+  Eigen::Vector3d other(one(0) + 180, 180 - one(1), one(2) + 180);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    one(i) = near_turn(one(i), like(i));
+    other(i) = near_turn(other(i), like(i));
+  }
+  return (one - like).norm() <= (other - like).norm() ? one : other;
+}
+
+Matrix3 rotation_zyx(double z, double y, double x) {
+  return (Eigen::AngleAxisd(from_deg(z), Vector3::UnitZ()) * Eigen::AngleAxisd(from_deg(y), Vector3::UnitY()) *
+          Eigen::AngleAxisd(from_deg(x), Vector3::UnitX()))
+      .toRotationMatrix();
+}
+
+Vector3 vector_of(const std::vector<double>& numbers, std::size_t first) {
+  return {numbers[first], numbers[first + 1], numbers[first + 2]};
+}
+
+/// The rotation vector, of the same rotation, nearest to `like`.
+Vector3 nearest_rotation_vector(const Matrix3& R, const Vector3& like) {
+  const Vector3 w = rotation_log(R);
+  const double angle = w.norm();
+  if (angle < 1e-9) return like.norm() > kPi ? Vector3(like.normalized() * 2 * kPi) : w;
+  Vector3 best = w;
+  for (const double turns : {-1.0, 1.0}) {
+    const Vector3 candidate = w * ((angle + 2 * kPi * turns) / angle);
+    if ((candidate - like).norm() < (best - like).norm()) best = candidate;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::size_t position_count(Coordinates coordinates) { return coordinates == Coordinates::kJoints ? 0 : 3; }
+
+int line_of(const std::string& text, std::size_t at) {
+  const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size()));
+  return 1 + static_cast<int>(std::count(text.begin(), end, '\n'));
+}
+
+std::size_t line_begin(const std::string& text, std::size_t at) {
+  const std::size_t end = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
+  return end == std::string::npos ? 0 : end + 1;
+}
+
+Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {
+  const Vector3 p = vector_of(numbers, 0);
+  switch (coordinates) {
+    case Coordinates::kQuaternion: {
+      const Eigen::Quaterniond R(numbers[3], numbers[4], numbers[5], numbers[6]);
+      return make_pose(R.normalized().toRotationMatrix(), p * from_mm(1));
+    }
+    case Coordinates::kAnglesZyx:
+      return make_pose(rotation_zyx(numbers[3], numbers[4], numbers[5]), p * from_mm(1));
+    case Coordinates::kAnglesXyz:
+      return make_pose(rotation_zyx(numbers[5], numbers[4], numbers[3]), p * from_mm(1));
+    case Coordinates::kRotationVector:
+      return make_pose(rotation_exp(vector_of(numbers, 3)), p);
+    case Coordinates::kJoints:
+      break;
+  }
+  return Pose::Identity();
+}
+
+std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const std::vector<double>& like) {
+  const Vector3 p = coordinates == Coordinates::kRotationVector ? pose.translation().eval()
+                                                                : (pose.translation() * to_mm(1)).eval();
+  std::vector<double> numbers = {p.x(), p.y(), p.z()};
+  switch (coordinates) {
+    case Coordinates::kQuaternion: {
+      Eigen::Quaterniond R(pose.linear());
+      if (R.dot(Eigen::Quaterniond(like[3], like[4], like[5], like[6])) < 0) R.coeffs() *= -1;
+      numbers.insert(numbers.end(), {R.w(), R.x(), R.y(), R.z()});
+      return numbers;
+    }
+    case Coordinates::kAnglesZyx: {
+      const Eigen::Vector3d a = nearest_zyx(pose.linear(), vector_of(like, 3));
+      numbers.insert(numbers.end(), {a(0), a(1), a(2)});
+      return numbers;
+    }
+    case Coordinates::kAnglesXyz: {
+      const Eigen::Vector3d a = nearest_zyx(pose.linear(), {like[5], like[4], like[3]});
+      numbers.insert(numbers.end(), {a(2), a(1), a(0)});
+      return numbers;
+    }
+    case Coordinates::kRotationVector: {
+      const Vector3 w = nearest_rotation_vector(pose.linear(), vector_of(like, 3));
+      numbers.insert(numbers.end(), {w.x(), w.y(), w.z()});
+      return numbers;
+    }
+    case Coordinates::kJoints:
+      break;
+  }
+  return like;
+}
+
+}  // namespace trammel::cam

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cam/number_text.h"
+#include "server/robot/cell.h"
+
+/// A robot program, whatever controller it is for: files of bytes, and what was understood of them. A reader of a
+/// dialect makes it; everything behind the readers is the same for all dialects. Bytes that no reader understood stay.
+namespace trammel::cam {
+
+struct SourceFile {
+  std::string name;  ///< as the receipt shows it: a path, relative to the folder that was handed over
+  std::string text;  ///< the bytes, in whatever encoding
+};
+
+/// Bytes [begin, end) of a file.
+struct Span {
+  std::size_t begin = 0, end = 0;
+};
+
+/// The numbers of a target in the order and units of its dialect.
+enum class Coordinates {
+  kQuaternion,      ///< x y z mm, w x y z
+  kAnglesZyx,       ///< x y z mm, deg about Z, the new Y, the new X (KUKA A B C)
+  kAnglesXyz,       ///< x y z mm, deg about X, Y, Z as they stand (FANUC W P R, Yaskawa Rx Ry Rz)
+  kRotationVector,  ///< x y z m, rotation vector rad (Universal Robots)
+  kJoints           ///< as the dialect counts them: deg, mm of a rail
+};
+[[nodiscard]] std::size_t position_count(Coordinates coordinates);  ///< 3; of joints 0
+
+/// A number that is written anew.
+struct Slot {
+  std::size_t value = 0;  ///< which number of the target
+  NumberStyle style = {};
+};
+/// Bytes that are replaced by texts and numbers in turn: texts[0] slots[0] texts[1] ... texts[n].
+struct Rewrite {
+  Span span;
+  std::vector<std::string> texts;
+  std::vector<Slot> slots;
+};
+
+/// What a program says of the arm's configuration at a target. Candidates are the closed-form solutions of a spherical
+/// wrist; a dialect scores them.
+struct Configuration {
+  std::optional<int> conf;                   ///< 0..7 as inverse_kinematics.h numbers it
+  std::vector<std::optional<double>> near;   ///< rad, a value of each joint to be near to; empty: not said
+  std::vector<std::optional<int>> signs;     ///< of each joint: -1 negative, +1 not; empty: not said
+  std::optional<bool> behind_axis_1;         ///< wrist centre behind axis 1
+  std::optional<bool> elbow_up;              ///< the higher of the two elbows
+  std::optional<bool> larger_joint_3;        ///< of the two elbows the one with the larger joint 3
+  std::optional<bool> bends_down;            ///< with joint 4 near zero the wrist would bend the tool downward
+
+  [[nodiscard]] bool said() const {
+    return conf || !near.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 || bends_down;
+  }
+};
+
+/// A load as a program states it.
+struct StatedLoad {
+  double mass = 0;                  ///< kg
+  Vector3 p_F = Vector3::Zero();    ///< centre of gravity, m, in F
+};
+
+/// A tool as the program has it.
+struct ProgramTool {
+  std::string name;
+  std::string file;  ///< empty: not in the files handed over
+  int line = 0;
+  std::optional<Pose> X_FT;          ///< empty: not known
+  std::optional<StatedLoad> load;
+  double rotation_rounding = 0;      ///< rad, what its digits leave open
+  std::string why_not;               ///< why its targets cannot be corrected; empty: they can
+};
+
+/// A frame that targets are given in, seen from the robot's base.
+struct ProgramFrame {
+  std::string name;
+  Pose X_BO = Pose::Identity();
+  std::string why_not;  ///< why its targets cannot be corrected; empty: they can
+};
+
+/// A target that may be corrected.
+struct ProgramTarget {
+  std::string name;              ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
+  std::size_t file = 0;          ///< where it is written anew
+  int line = 0;                  ///< of that place, from 1
+  std::string motion;            ///< `MoveL`, of its first use
+  std::vector<int> used_at;      ///< lines of the motions to it, in the file of each
+  std::size_t tool = 0, frame = 0;
+  Coordinates coordinates = Coordinates::kQuaternion;
+  std::vector<double> numbers;   ///< of the whole pose, in the dialect's units
+  Configuration configuration = {};
+  std::map<int, double> external;  ///< mm or deg as stated, by axis from 0
+  std::vector<Rewrite> rewrites;
+  bool folded = false;           ///< was computed by the program from other targets
+  std::string comment;           ///< a line to insert above `comment_at`, without its end; empty: none
+  std::size_t comment_at = 0;    ///< first byte of a line
+  bool linear = false;           ///< the tool's path to it is a line or an arc
+};
+
+/// What is left as it was.
+struct LeftAlone {
+  std::string name;
+  std::size_t file = 0;
+  int line = 0;
+  std::string motion;
+  std::string why;
+};
+
+/// A motion, in the order of the text.
+struct ProgramMove {
+  std::size_t file = 0;
+  int line = 0;
+  std::vector<std::size_t> targets;  ///< of Program::targets, that it may go to; empty: left alone
+  bool corrected_by_others = false;
+};
+
+/// Where and how a dialect takes the mark of a correction.
+struct MarkPlace {
+  std::size_t at = 0;       ///< first byte of the line that it goes above
+  std::string begin = "!";  ///< of the comment
+  std::string end = {};
+  bool a_line_each = false; ///< for each word of the mark
+};
+
+struct Program {
+  std::string dialect;
+  std::vector<SourceFile> files;
+  std::vector<MarkPlace> mark_places;  ///< one a file
+  std::vector<ProgramTool> tools;
+  std::vector<ProgramFrame> frames;
+  std::vector<ProgramTarget> targets;
+  std::vector<LeftAlone> left;
+  std::vector<ProgramMove> moves;
+};
+
+struct ReadOptions {
+  bool split = false;        ///< a target that is used with two tools or frames becomes two
+  bool keep_joints = false;  ///< joint targets stay as they are
+};
+
+/// The number of the line of a byte, from 1.
+[[nodiscard]] int line_of(const std::string& text, std::size_t at);
+/// The first byte of the line that `at` is in.
+[[nodiscard]] std::size_t line_begin(const std::string& text, std::size_t at);
+
+/// The pose that the numbers say, in the target's frame. Joints have none.
+[[nodiscard]] Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers);
+/// The reverse; angles and quaternions nearest to `like`, the numbers that it replaces.
+[[nodiscard]] std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const std::vector<double>& like);
+
+}  // namespace trammel::cam

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "clients/cam/program.h"
+#include "clients/cam/rapid/syntax.h"
+
+/// What the expressions of a RAPID program mean, as far as they are constant.
+namespace trammel::cam::rapid {
+
+/// A value, or one clause that says why the program decides it at run time.
+template <typename T>
+using Told = tl::expected<T, std::string>;
+[[nodiscard]] inline tl::unexpected<std::string> because(std::string why) {
+  return tl::make_unexpected(std::move(why));
+}
+
+/// Where a name is looked up: a routine of a module, called from somewhere.
+struct Scope {
+  std::size_t module = 0;
+  int routine = -1;
+  const Instruction* call = nullptr;  ///< that hands over the parameters; nullptr: not known
+  const Scope* caller = nullptr;      ///< of `call`
+};
+
+/// An expression that stands in the program, with the scope that its names are looked up in.
+struct Data {
+  const Expression* node = nullptr;
+  const Scope* scope = nullptr;
+  std::string type;
+  const Declaration* declared = nullptr;  ///< nullptr: stands in an instruction
+};
+
+/// A robtarget.
+struct TargetValue {
+  std::vector<double> numbers;      ///< x y z mm, w x y z
+  std::array<double, 4> conf{};     ///< cf1 cf4 cf6 cfx
+  std::array<double, 6> external{}; ///< 9E9: none
+  int decimals = 0;                 ///< of its positions as written
+  int rotation_decimals = 0;
+};
+
+struct JointValue {
+  std::vector<double> axes;  ///< deg
+  std::array<double, 6> external{};
+  int decimals = 0;
+};
+
+constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not there
+
+class Interpreter {
+ public:
+  Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules);
+
+  struct Found {
+    const Declaration* declaration = nullptr;
+    std::size_t module = 0;
+  };
+  /// The declaration of a name: of the routine, of the module, or of any other module that does not keep it to itself.
+  [[nodiscard]] std::optional<Found> find(const std::string& name, const Scope& scope) const;
+  /// The routine of that name which is called from a module: its module and number.
+  [[nodiscard]] std::optional<std::pair<std::size_t, int>> find_routine(const std::string& name,
+                                                                         std::size_t module) const;
+  /// Every way to come into a routine, at most some thousand: one where it has no parameters.
+  [[nodiscard]] const std::vector<const Scope*>& scopes_of(std::size_t module, int routine);
+
+  /// Why a declared value may be another one at run time; empty: it is never changed.
+  [[nodiscard]] std::string changed(const Declaration* declaration) const;
+
+  /// What an expression stands for: its literal. Several where an index is not constant.
+  [[nodiscard]] Told<std::vector<Data>> data_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  [[nodiscard]] Told<double> number_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  [[nodiscard]] Told<TargetValue> target_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  [[nodiscard]] Told<JointValue> joints_of(const Expression& expression, const Scope& scope) const;
+  /// `count` numbers of an aggregate or of what stands for one; `decimals`: raised to the most that are written.
+  [[nodiscard]] Told<std::vector<double>> numbers_of(const Expression& expression, std::size_t count,
+                                                     const Scope& scope, int* decimals, int depth = 0) const;
+  /// The type of what the expression stands for; empty: not known.
+  [[nodiscard]] std::string type_of(const Expression& expression, const Scope& scope, int depth = 0) const;
+  /// The argument that a parameter stands for; `expression` itself where it is none.
+  [[nodiscard]] Told<std::pair<const Expression*, const Scope*>> handed_over(const Expression& expression,
+                                                                             const Scope& scope) const;
+
+  [[nodiscard]] std::string text_of(const Expression& expression, const Scope& scope) const;
+  [[nodiscard]] std::string place_of(std::size_t module, int line) const;
+
+ private:
+  void note_changes();
+  void note_change(const Expression& target, const Scope& scope, const std::string& why);
+  void note_changes_by(std::size_t module, const Instruction& instruction);
+  [[nodiscard]] const Scope* own_scope(std::size_t module, int routine);
+  [[nodiscard]] Told<const Expression*> bound(const Declaration& parameter, const Scope& scope) const;
+  [[nodiscard]] Told<std::vector<Data>> field_of(const Expression& expression, const Scope& scope, int depth) const;
+  [[nodiscard]] Told<std::vector<Data>> element_of(const Expression& expression, const Scope& scope, int depth) const;
+  [[nodiscard]] Told<TargetValue> offset_of(const Expression& call, const Scope& scope, int depth) const;
+  [[nodiscard]] Told<double> operation(const Expression& expression, const Scope& scope, int depth) const;
+  struct Field {
+    std::size_t index = 0;
+    std::string type;
+  };
+  [[nodiscard]] std::optional<Field> field(const std::string& type, const std::string& name, std::size_t module) const;
+
+  const std::vector<SourceFile>& files_;
+  const std::vector<Module>& modules_;
+  std::vector<std::map<std::pair<int, std::string>, const Declaration*>> by_name_;
+  std::map<std::string, Found> global_;
+  std::map<const Declaration*, std::string> changed_;
+  std::vector<std::unique_ptr<Scope>> scopes_;
+  std::map<std::pair<std::size_t, int>, std::vector<const Scope*>> ways_in_;
+  std::map<std::pair<std::size_t, int>, const Scope*> own_;
+};
+
+}  // namespace trammel::cam::rapid

@@ -1,0 +1,601 @@
+#include "clients/cam/rapid/rapid.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "clients/cam/rapid/interpreter.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+using namespace rapid;
+using Kind = Expression::Kind;
+
+bool is_search(const std::string& name) { return name.starts_with("search"); }
+
+/// Instructions of the controller that move the tool to the targets which they are given.
+bool is_motion(const std::string& name) {
+  static const std::set<std::string> kOther = {"moveextj", "movepnp"};
+  for (const char* beginning : {"move", "trigg", "arc", "spot", "disp", "paint", "capl", "capc", "search"}) {
+    if (!name.starts_with(beginning) || kOther.contains(name)) continue;
+    const std::string rest = name.substr(std::string(beginning).size());
+    if (std::string(beginning).starts_with("cap")) return true;
+    if (!rest.empty() && (rest[0] == 'l' || rest[0] == 'j' || rest[0] == 'c' || rest.starts_with("abs") ||
+                          rest.starts_with("ml") || rest.starts_with("mj")))
+      return !rest.starts_with("check") && !rest.starts_with("jointt");
+  }
+  return false;
+}
+
+/// Whether the tool goes to the target on a line or an arc.
+bool is_linear(const std::string& name) { return name.find('j') == std::string::npos; }
+
+/// A motion goes to this place with this tool in this frame.
+struct Use {
+  std::size_t tool = 0, frame = 0;
+  const Instruction* motion = nullptr;
+  std::size_t module = 0;
+  std::size_t move = 0;  ///< of Program::moves
+  Data data;
+};
+
+/// Bytes that hold a target, and what uses them.
+struct Site {
+  std::size_t module = 0;
+  std::size_t statement = 0;  ///< first byte of the statement that it stands in
+  std::string name;
+  std::vector<Use> uses;
+  bool joints = false;
+  bool in_motion = false;  ///< stands in the motion itself
+};
+
+class Reader {
+ public:
+  Reader(std::vector<SourceFile> files, const ReadOptions& options) : options_(options) {
+    program_.dialect = "rapid";
+    program_.files = std::move(files);
+    for (const SourceFile& file : program_.files) {
+      modules_.push_back(parse(file.text));
+      program_.mark_places.push_back(mark_place(file.text, modules_.back().head_end));
+    }
+    meaning_.emplace(program_.files, modules_);
+    program_.frames.push_back({"wobj0", Pose::Identity(), ""});
+  }
+
+  Program read() {
+    note_displacements();
+    for (std::size_t m = 0; m < modules_.size(); ++m) read_motions(m);
+    for (auto& [place, site] : sites_) finish(site);
+    list_unused();
+    return std::move(program_);
+  }
+
+ private:
+  /// Below the head of the module, else at the top.
+  static MarkPlace mark_place(const std::string& text, std::size_t head_end) {
+    const std::size_t end = head_end == 0 ? std::string::npos : text.find('\n', head_end);
+    const std::size_t top = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
+    return {end == std::string::npos ? top : end + 1, "  ! "};
+  }
+
+  // Tools and frames.
+
+  std::size_t known_tool(ProgramTool tool) {
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      const ProgramTool& known = program_.tools[k];
+      if (known.name == tool.name && known.file == tool.file && known.line == tool.line) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
+  std::size_t known_frame(ProgramFrame frame) {
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      if (program_.frames[k].name == frame.name && program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12) &&
+          program_.frames[k].why_not == frame.why_not)
+        return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+
+  /// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
+  Told<Data> aggregate(const Data& of, std::size_t parts) const {
+    Data now = of;
+    for (int depth = 0; now.node->kind != Kind::kAggregate && depth < 10; ++depth) {
+      const Told<std::vector<Data>> inner = meaning_->data_of(*now.node, *now.scope);
+      if (!inner) return because(inner.error());
+      if (inner->size() != 1 || inner->front().node == now.node) return because("it is not written out");
+      now = inner->front();
+    }
+    if (now.node->kind != Kind::kAggregate || now.node->parts.size() != parts)
+      return because(fmt::format("a {} without its {} parts", shown(of.type), parts));
+    return now;
+  }
+
+  Told<Pose> pose(const Data& of, int* rotation_decimals) const {
+    const Told<Data> both = aggregate(of, 2);
+    if (!both) return because(both.error());
+    int ignored = 0;
+    const Told<std::vector<double>> p = meaning_->numbers_of(both->node->parts[0], 3, *both->scope, &ignored);
+    if (!p) return because(p.error());
+    const Told<std::vector<double>> q = meaning_->numbers_of(both->node->parts[1], 4, *both->scope, rotation_decimals);
+    if (!q) return because(q.error());
+    std::vector<double> numbers = *p;
+    numbers.insert(numbers.end(), q->begin(), q->end());
+    if (std::abs(Eigen::Vector4d((*q)[0], (*q)[1], (*q)[2], (*q)[3]).norm() - 1) > 0.01)
+      return because("a quaternion that is not of length 1");
+    return pose_of(Coordinates::kQuaternion, numbers);
+  }
+
+  static Data part(const Data& of, std::size_t index) {
+    return {&of.node->parts[index], of.scope, of.type, of.declared};
+  }
+
+  Told<bool> truth(const Data& of) const {
+    if (of.node->kind == Kind::kTruth) return of.node->name == "true";
+    const Told<std::vector<Data>> data = meaning_->data_of(*of.node, *of.scope);
+    if (!data || data->size() != 1 || data->front().node->kind != Kind::kTruth) return because("it is not constant");
+    return data->front().node->name == "true";
+  }
+
+  /// What an argument that names a tool or a work object stands for; an error where it is not in the files.
+  Told<Data> named(const Expression& argument, const Scope& scope) const {
+    const Told<std::vector<Data>> data = meaning_->data_of(argument, scope);
+    if (!data) return because(data.error());
+    if (data->size() != 1) return because(fmt::format("an index chooses {}", shown(meaning_->text_of(argument, scope))));
+    return data->front();
+  }
+
+  std::size_t tool_of(const Expression& argument, const Scope& scope) {
+    ProgramTool tool;
+    tool.name = meaning_->text_of(argument, scope);
+    const auto handed = meaning_->handed_over(argument, scope);
+    if (!handed) {
+      tool.why_not = handed.error();
+      return known_tool(std::move(tool));
+    }
+    const auto& [expression, where] = *handed;
+    tool.name = meaning_->text_of(*expression, *where);
+    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
+      if (expression->name == "tool0") tool.X_FT = Pose::Identity();
+      return known_tool(std::move(tool));
+    }
+    const Told<Data> data = named(*expression, *where);
+    if (!data) {
+      tool.why_not = data.error();
+      return known_tool(std::move(tool));
+    }
+    tool.file = program_.files[data->scope->module].name;
+    tool.line = data->node->line;
+    read_tool(*data, tool);
+    return known_tool(std::move(tool));
+  }
+
+  void read_tool(const Data& data, ProgramTool& tool) const {
+    const Told<Data> parts = aggregate(data, 3);
+    const Told<bool> held = parts ? truth(part(*parts, 0)) : because(parts.error());
+    int decimals = 0;
+    const Told<Pose> X_FT = parts ? pose(part(*parts, 1), &decimals) : because("");
+    if (!held || !X_FT) {
+      tool.why_not = fmt::format("tool {}: {}", shown(tool.name), held ? X_FT.error() : held.error());
+      return;
+    }
+    tool.X_FT = *X_FT;
+    tool.rotation_rounding = 2 * std::pow(10.0, -decimals);
+    if (!*held) tool.why_not = fmt::format("tool {} is not held by the robot", shown(tool.name));
+    const Told<Data> load = aggregate(part(*parts, 2), 6);
+    if (!load) return;
+    int ignored = 0;
+    const Told<double> mass = meaning_->number_of(load->node->parts[0], *load->scope);
+    const Told<std::vector<double>> cog = meaning_->numbers_of(load->node->parts[1], 3, *load->scope, &ignored);
+    if (!mass || !cog) return;
+    tool.load = StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
+  }
+
+  std::size_t frame_of(const Expression* argument, const Scope& scope) {
+    if (argument == nullptr) return 0;
+    ProgramFrame frame;
+    frame.name = meaning_->text_of(*argument, scope);
+    const auto handed = meaning_->handed_over(*argument, scope);
+    if (!handed) {
+      frame.why_not = handed.error();
+      return known_frame(std::move(frame));
+    }
+    const auto& [expression, where] = *handed;
+    frame.name = meaning_->text_of(*expression, *where);
+    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
+      if (expression->name == "wobj0") return 0;
+      frame.why_not = fmt::format("work object {} is not in the files handed over", shown(frame.name));
+      return known_frame(std::move(frame));
+    }
+    const Told<Data> data = named(*expression, *where);
+    const Told<Data> parts = data ? aggregate(*data, 5) : because(data.error());
+    if (!parts) {
+      frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
+      return known_frame(std::move(frame));
+    }
+    read_frame(*parts, frame);
+    return known_frame(std::move(frame));
+  }
+
+  void read_frame(const Data& parts, ProgramFrame& frame) const {
+    const Told<bool> held = truth(part(parts, 0));
+    const Told<bool> fixed = truth(part(parts, 1));
+    int ignored = 0;
+    const Told<Pose> user = pose(part(parts, 3), &ignored);
+    const Told<Pose> object = pose(part(parts, 4), &ignored);
+    std::string why;
+    if (!held || !fixed || !user || !object) {
+      why = !held ? held.error() : !fixed ? fixed.error() : !user ? user.error() : object.error();
+    } else if (*held) {
+      why = "it is held by the robot";
+    } else if (!*fixed) {
+      why = "a mechanical unit moves it";
+    } else {
+      frame.X_BO = *user * *object;
+      return;
+    }
+    frame.why_not = fmt::format("work object {}: {}", shown(frame.name), why);
+  }
+
+  // Motions.
+
+  void leave(std::size_t module, const Instruction& motion, const std::string& name, const std::string& why) {
+    if (left_.emplace(module, motion.line, name).second)
+      program_.left.push_back({name, module, motion.line, motion.spelled, why});
+  }
+
+  /// From PDispOn or PDispSet to PDispOff in the text of a routine, targets are displaced. Where it is not switched off,
+  /// all motions may be.
+  void note_displacements() {
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      std::map<int, std::string> open;
+      for (const Instruction& instruction : modules_[m].instructions) {
+        if (instruction.name == "pdispon" || instruction.name == "pdispset")
+          open[instruction.routine] =
+              fmt::format("{} displaces it ({})", instruction.spelled, meaning_->place_of(m, instruction.line));
+        if (instruction.name == "pdispoff") open.erase(instruction.routine);
+        if (const auto by = open.find(instruction.routine); by != open.end()) displaced_[&instruction] = by->second;
+      }
+      for (const auto& [routine, why] : open) open_displacement_ = why + ", and is not switched off where it stands";
+    }
+  }
+
+  void read_motions(std::size_t module) {
+    for (const Instruction& motion : modules_[module].instructions) {
+      if (!is_motion(motion.name) || meaning_->find_routine(motion.name, module)) continue;
+      program_.moves.push_back({module, motion.line, {}, false});
+      read_motion(module, motion);
+    }
+  }
+
+  void read_motion(std::size_t module, const Instruction& motion) {
+    std::vector<const Expression*> positional;
+    const Expression* frame = nullptr;
+    const Expression* tool = nullptr;
+    for (const Expression& argument : motion.arguments) {
+      if (argument.label.empty()) positional.push_back(&argument);
+      if (argument.label == "wobj") frame = &argument;
+      if (argument.label == "tool") tool = &argument;
+    }
+    if (positional.empty()) return;
+    const std::string first = meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]);
+    if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
+    const auto displaced = displaced_.find(&motion);
+    if (displaced != displaced_.end()) return leave(module, motion, first, displaced->second);
+    if (!open_displacement_.empty()) return leave(module, motion, first, open_displacement_);
+    for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
+      const Expression* with = tool != nullptr ? tool : tool_argument(motion, positional, *scope);
+      if (with == nullptr) {
+        leave(module, motion, first, "it has no tool");
+        continue;
+      }
+      const bool joints = motion.name.starts_with("moveabsj");
+      const std::size_t targets = is_arc(motion.name) ? 2 : 1;
+      for (std::size_t k = 0; k < std::min(targets, positional.size()); ++k) {
+        use(module, motion, *positional[k], joints, tool_of(*with, *scope), frame_of(frame, *scope), *scope);
+      }
+    }
+  }
+
+  /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
+  static bool is_arc(const std::string& name) {
+    for (const char* kind : {"movec", "triggc", "arcc", "dispc", "paintc", "capc"}) {
+      if (name.starts_with(kind)) return true;
+    }
+    return false;
+  }
+
+  /// The argument that is a tool: one that is declared as such, or the last.
+  const Expression* tool_argument(const Instruction& motion, const std::vector<const Expression*>& positional,
+                                  const Scope& scope) const {
+    for (const Expression* argument : positional) {
+      const auto handed = meaning_->handed_over(*argument, scope);
+      if (!handed) {
+        if (meaning_->type_of(*argument, scope) == "tooldata") return argument;
+        continue;
+      }
+      if (meaning_->type_of(*handed->first, *handed->second) == "tooldata") return argument;
+      if (argument->kind == Kind::kName && argument->name == "tool0") return argument;
+    }
+    const bool signal_last = motion.name.ends_with("do") || motion.name.ends_with("ao") || motion.name.ends_with("go") ||
+                             motion.name.ends_with("sync");
+    if (positional.size() < 3 || signal_last) return nullptr;
+    return positional.back()->kind == Kind::kName ? positional.back() : nullptr;
+  }
+
+  void use(std::size_t module, const Instruction& motion, const Expression& argument, bool joints, std::size_t tool,
+           std::size_t frame, const Scope& scope) {
+    const std::string name = meaning_->text_of(argument, scope);
+    const auto handed = meaning_->handed_over(argument, scope);
+    if (!handed) return leave(module, motion, name, handed.error());
+    const auto& [expression, where] = *handed;
+    const bool written_here = expression->kind == Kind::kAggregate || expression->kind == Kind::kCall;
+    const Told<std::vector<Data>> all =
+        written_here ? Told<std::vector<Data>>(std::vector<Data>{{expression, where, joints ? "jointtarget" : "robtarget"}})
+                     : meaning_->data_of(*expression, *where);
+    if (!all) return leave(module, motion, name, all.error());
+    for (const Data& data : *all) {
+      const std::size_t of = data.scope->module;
+      Site& site = sites_[{of, data.node->begin}];
+      if (site.uses.empty()) {
+        site.module = of;
+        site.joints = joints;
+        site.in_motion = written_here;
+        site.statement = statement_of(data, where, motion, expression, &argument);
+        site.name = all->size() > 1 ? meaning_->text_of(argument, scope) : meaning_->text_of(*expression, *where);
+      }
+      site.uses.push_back({tool, frame, &motion, module, program_.moves.size() - 1, data});
+    }
+  }
+
+  static std::size_t statement_of(const Data& data, const Scope* where, const Instruction& motion,
+                                  const Expression* expression, const Expression* argument) {
+    if (data.declared != nullptr) return data.declared->begin;
+    if (expression == argument) return motion.begin;
+    for (const Scope* scope = where; scope != nullptr; scope = scope->caller) {
+      if (scope->call != nullptr && scope->call->begin <= data.node->begin && data.node->end <= scope->call->end)
+        return scope->call->begin;
+    }
+    return data.node->begin;
+  }
+
+  // Places.
+
+  void finish(const Site& site) {
+    std::vector<std::vector<const Use*>> groups;
+    for (const Use& use : site.uses) {
+      const auto same = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
+        return group[0]->tool == use.tool && group[0]->frame == use.frame;
+      });
+      if (same == groups.end()) groups.push_back({&use});
+      else same->push_back(&use);
+    }
+    if (groups.size() > 1 && !options_.split) return leave_ambiguous(site, groups);
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+      if (k == 0) add_target(site, groups[k], site.uses.front().data);
+      else split_off(site, groups[k]);
+    }
+  }
+
+  void leave_ambiguous(const Site& site, const std::vector<std::vector<const Use*>>& groups) {
+    std::vector<std::string> ways;
+    for (const auto& group : groups) {
+      ways.push_back(fmt::format("tool {} in {} ({})", shown(program_.tools[group[0]->tool].name),
+                                 shown(program_.frames[group[0]->frame].name),
+                                 meaning_->place_of(group[0]->module, group[0]->motion->line)));
+    }
+    const Use& first = site.uses.front();
+    program_.left.push_back({site.name, site.module, first.data.node->line, first.motion->spelled,
+                             fmt::format("it is used in different ways: {}; --split makes a target of each",
+                                         fmt::join(ways, ", "))});
+  }
+
+  /// The argument of each motion becomes a target of its own.
+  void split_off(const Site& site, const std::vector<const Use*>& group) {
+    std::set<const Instruction*> done;
+    for (const Use* use : group) {
+      if (!done.insert(use->motion).second) continue;
+      const Expression* argument = nullptr;
+      for (const Expression& candidate : use->motion->arguments) {
+        if (candidate.label.empty() && meaning_->text_of(candidate, own(use->module)) == site.name) argument = &candidate;
+      }
+      if (argument == nullptr || argument->kind == Kind::kElement) {
+        leave(use->module, *use->motion, site.name, "it is used with another tool or frame too, and cannot be split");
+        continue;
+      }
+      Data data = use->data;
+      Data place{argument, &own(use->module), data.type, nullptr};
+      add_target({use->module, use->motion->begin, site.name, {}, site.joints, true}, {use}, data, &place);
+    }
+  }
+
+  const Scope& own(std::size_t module) { return own_.emplace(module, Scope{module, -1}).first->second; }
+
+  /// Writes the target at `place`, or where `data` stands.
+  void add_target(const Site& site, const std::vector<const Use*>& uses, const Data& data, const Data* place = nullptr) {
+    const Use& first = *uses.front();
+    ProgramTarget target;
+    target.name = site.name;
+    target.file = site.module;
+    target.line = place != nullptr ? first.motion->line : data.node->line;
+    target.motion = first.motion->spelled;
+    target.tool = first.tool;
+    target.frame = first.frame;
+    target.linear = is_linear(first.motion->name);
+    for (const Use* use : uses) {
+      if (std::find(target.used_at.begin(), target.used_at.end(), use->motion->line) == target.used_at.end())
+        target.used_at.push_back(use->motion->line);
+    }
+    const Told<void> read = site.joints ? read_joints(data, target) : read_target(data, uses, place, target);
+    std::string why = read ? "" : read.error();
+    if (why.empty()) why = program_.tools[target.tool].why_not;
+    if (why.empty()) why = program_.frames[target.frame].why_not;
+    if (!why.empty()) {
+      program_.left.push_back({target.name, target.file, target.line, target.motion, why});
+      return;
+    }
+    for (const Use* use : uses) program_.moves[use->move].targets.push_back(program_.targets.size());
+    if (target.folded) note_original(site, place != nullptr ? *place : data, target);
+    program_.targets.push_back(std::move(target));
+  }
+
+  /// The line above the statement that keeps what was folded.
+  void note_original(const Site& site, const Data& place, ProgramTarget& target) const {
+    const std::string& text = program_.files[site.module].text;
+    target.comment_at = line_begin(text, site.statement);
+    const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
+    std::string original = meaning_->text_of(*place.node, *place.scope);
+    target.comment = text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
+  }
+
+  Told<void> read_joints(const Data& data, ProgramTarget& target) {
+    target.coordinates = Coordinates::kJoints;
+    if (options_.keep_joints) return because("joint targets are kept (--keep-joints)");
+    const Told<JointValue> value = meaning_->joints_of(*data.node, *data.scope);
+    if (!value) return because(value.error());
+    target.numbers = value->axes;
+    note_external(value->external, target);
+    rewrite(data.node->parts[0], *data.scope, 0, 6, value->decimals, target);
+    return {};
+  }
+
+  static void note_external(const std::array<double, 6>& external, ProgramTarget& target) {
+    for (int k = 0; k < 6; ++k) {
+      if (std::abs(external[static_cast<std::size_t>(k)]) < kNoAxis)
+        target.external[k] = external[static_cast<std::size_t>(k)];
+    }
+  }
+
+  Told<void> read_target(const Data& data, const std::vector<const Use*>& uses, const Data* place,
+                         ProgramTarget& target) const {
+    const Told<TargetValue> value = meaning_->target_of(*data.node, *data.scope);
+    if (!value) return because(value.error());
+    // The same bytes reached through different callers must mean the same.
+    for (const Use* use : uses) {
+      const Told<TargetValue> other = meaning_->target_of(*use->data.node, *use->data.scope);
+      if (!other) return because(other.error());
+      if (other->numbers != value->numbers) return because("its callers hand over different values");
+    }
+    target.coordinates = Coordinates::kQuaternion;
+    target.numbers = value->numbers;
+    note_external(value->external, target);
+    target.configuration = configuration_of(value->conf);
+    const Data& where = place != nullptr ? *place : data;
+    const bool in_place = where.node->kind == Kind::kAggregate && where.node->parts.size() == 4;
+    if (in_place) {
+      rewrite(where.node->parts[0], *where.scope, 0, 3, value->decimals, target);
+      rewrite(where.node->parts[1], *where.scope, 3, 4, value->rotation_decimals, target);
+    } else {
+      rewrite_whole(*where.node, *value, target);
+    }
+    return {};
+  }
+
+  /// cf1, cf4, cf6: quarter turns of joints 1, 4, 6; cfx: the branch.
+  static Configuration configuration_of(const std::array<double, 4>& conf) {
+    Configuration configuration;
+    const double branch = conf[3];
+    if (branch >= 0 && branch <= 7 && branch == std::floor(branch)) configuration.conf = static_cast<int>(branch);
+    configuration.near.resize(6);
+    constexpr std::array<std::size_t, 3> kJoints = {0, 3, 5};
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (std::abs(conf[k]) < 100) configuration.near[kJoints[k]] = (conf[k] + 0.5) * kPi / 2;
+    }
+    return configuration;
+  }
+
+  /// `count` numbers from `first` on are written where the expression stands.
+  void rewrite(const Expression& expression, const Scope& scope, std::size_t first, std::size_t count, int decimals,
+               ProgramTarget& target) const {
+    const std::string& text = program_.files[scope.module].text;
+    if (expression.kind == Kind::kAggregate && expression.parts.size() == count) {
+      for (std::size_t k = 0; k < count; ++k) {
+        const Expression& part = expression.parts[k];
+        const auto written = part.kind == Kind::kNumber
+                                 ? read_number(std::string_view(text).substr(part.begin, part.end - part.begin))
+                                 : std::nullopt;
+        NumberStyle style;
+        style.decimals = decimals;
+        if (!written) target.folded = true;
+        target.rewrites.push_back({{part.begin, part.end}, {"", ""}, {{first + k, written ? written->style : style}}});
+      }
+      return;
+    }
+    target.folded = true;
+    Rewrite whole{{expression.begin, expression.end}, {"["}, {}};
+    add_numbers(first, count, decimals, whole);
+    whole.texts.back() += "]";
+    target.rewrites.push_back(std::move(whole));
+  }
+
+  /// Adds numbers with commas between.
+  static void add_numbers(std::size_t first, std::size_t count, int decimals, Rewrite& whole) {
+    for (std::size_t k = 0; k < count; ++k) {
+      NumberStyle style;
+      style.decimals = decimals;
+      whole.slots.push_back({first + k, style});
+      whole.texts.emplace_back(k + 1 < count ? "," : "");
+    }
+  }
+
+  static void rewrite_whole(const Expression& expression, const TargetValue& value, ProgramTarget& target) {
+    target.folded = true;
+    Rewrite whole{{expression.begin, expression.end}, {"[["}, {}};
+    add_numbers(0, 3, value.decimals, whole);
+    whole.texts.back() += "],[";
+    add_numbers(3, 4, std::max(value.rotation_decimals, 6), whole);
+    std::vector<std::string> external;
+    for (const double axis : value.external) external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
+    whole.texts.back() += fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
+    target.rewrites.push_back(std::move(whole));
+  }
+
+  /// Declared targets that nothing moves to.
+  void list_unused() {
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (const Declaration& declared : modules_[m].declarations) {
+        const bool is_target = declared.type == "robtarget" || declared.type == "jointtarget";
+        if (!is_target || declared.storage == Storage::kParameter || !declared.value) continue;
+        const Expression& value = *declared.value;
+        const auto site = sites_.lower_bound({m, value.begin});
+        const bool used = site != sites_.end() && site->first.first == m && site->first.second < value.end;
+        if (used || mentioned(declared.name)) continue;
+        program_.left.push_back({declared.name, m, declared.line, "", "no motion in these files goes to it"});
+      }
+    }
+  }
+
+  /// Whether what uses it is listed already.
+  [[nodiscard]] bool mentioned(const std::string& name) const {
+    return std::any_of(program_.left.begin(), program_.left.end(),
+                       [&](const LeftAlone& left) { return in_lower_case(left.name).find(name) != std::string::npos; });
+  }
+
+  ReadOptions options_;
+  Program program_;
+  std::vector<Module> modules_;
+  std::optional<Interpreter> meaning_;
+  std::map<std::pair<std::size_t, std::size_t>, Site> sites_;
+  std::map<std::size_t, Scope> own_;
+  std::set<std::tuple<std::size_t, int, std::string>> left_;
+  std::string open_displacement_;
+  std::map<const Instruction*, std::string> displaced_;
+};
+
+}  // namespace
+
+Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options) {
+  return Reader(std::move(files), options).read();
+}
+
+}  // namespace trammel::cam

@@ -1,0 +1,475 @@
+#include "clients/cam/rapid/syntax.h"
+
+#include <array>
+#include <set>
+
+#include "clients/cam/number_text.h"
+
+namespace trammel::cam::rapid {
+
+namespace {
+
+constexpr int kDeepest = 60;  // brackets within brackets
+
+using Kind = Expression::Kind;
+
+class Parser {
+ public:
+  explicit Parser(std::string_view text) : text_(text), tokens_(tokens_of(text)) {}
+
+  Module parse() {
+    while (!at_end()) {
+      const std::size_t before = at_;
+      statement();
+      if (at_ == before) ++at_;
+    }
+    return std::move(module_);
+  }
+
+ private:
+  [[nodiscard]] const Token& token(std::size_t ahead = 0) const {
+    return tokens_[std::min(at_ + ahead, tokens_.size() - 1)];
+  }
+  [[nodiscard]] bool at_end() const { return token().kind == TokenKind::kEnd; }
+  [[nodiscard]] std::string_view bytes(std::size_t ahead = 0) const {
+    const Token& t = token(ahead);
+    return text_.substr(t.begin, t.end - t.begin);
+  }
+  [[nodiscard]] bool is_sign(std::string_view sign, std::size_t ahead = 0) const {
+    return token(ahead).kind == TokenKind::kSign && bytes(ahead) == sign;
+  }
+  [[nodiscard]] std::string word(std::size_t ahead = 0) const {
+    return token(ahead).kind == TokenKind::kWord ? in_lower_case(bytes(ahead)) : std::string();
+  }
+  bool take(std::string_view sign) {
+    if (!is_sign(sign)) return false;
+    ++at_;
+    return true;
+  }
+  std::string take_word() {
+    std::string text = word();
+    if (!text.empty()) ++at_;
+    return text;
+  }
+  /// A word that begins or ends something wherever it stands: a statement that lacks its end goes no further.
+  [[nodiscard]] bool is_reserved() const {
+    static const std::set<std::string> kReserved = {
+        "module", "endmodule", "proc",   "endproc", "func", "endfunc",  "trap",    "endtrap", "record",
+        "local",  "task",      "const",  "pers",    "var",  "if",       "endif",   "elseif",  "else",
+        "for",    "endfor",    "while",  "endwhile", "test", "endtest", "case",    "default"};
+    return token().kind == TokenKind::kWord && kReserved.contains(word());
+  }
+  [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
+
+  [[nodiscard]] std::size_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
+
+  /// Behind the next `;`.
+  void skip_statement() {
+    while (!at_statement_end()) ++at_;
+    take(";");
+  }
+
+  void statement() {
+    static const std::set<std::string> kSingle = {"else",  "endif",   "endfor",    "endwhile",  "endtest", "error",
+                                                  "undo",  "default", "endmodule", "backward"};
+    const std::string first = word();
+    if (first.empty()) return skip_odd_statement();
+    if (first == "module") return module_head();
+    if (first == "record") return record();
+    if (first == "proc" || first == "func" || first == "trap" || first == "local" || first == "task" ||
+        first == "const" || first == "pers" || first == "var") {
+      return declaration();
+    }
+    if (first == "endproc" || first == "endfunc" || first == "endtrap") {
+      routine_ = -1;
+      ++at_;
+    } else if (first == "if" || first == "elseif") {
+      condition();
+    } else if (first == "for") {
+      loop();
+    } else if (first == "while") {
+      while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
+      ++at_;
+    } else if (first == "test") {
+      while (!at_end() && word() != "case" && word() != "default" && word() != "endtest" && !is_sign(";")) ++at_;
+    } else if (first == "case") {
+      while (!at_end() && !is_sign(":") && !is_sign(";")) ++at_;
+      ++at_;
+    } else if (kSingle.contains(first) || is_sign(":", 1)) {
+      at_ += is_sign(":", 1) ? 2 : 1;
+    } else if (first == "alias") {
+      skip_statement();
+    } else {
+      simple_statement();
+    }
+  }
+
+  /// `%%%` heads of module files, `%"name"%;`, or rubbish.
+  void skip_odd_statement() { ++at_; }
+
+  void module_head() {
+    ++at_;
+    module_.name = take_word();
+    if (take("(")) {
+      while (!at_end() && !is_sign(")") && !is_sign(";")) ++at_;
+      take(")");
+    }
+    module_.head_end = last_end();
+  }
+
+  void record() {
+    ++at_;
+    Record record;
+    record.name = take_word();
+    while (!at_end() && word() != "endrecord") {
+      const std::string type = take_word();
+      const std::string name = take_word();
+      if (type.empty() || name.empty()) {
+        ++at_;
+        continue;
+      }
+      record.types.push_back(type);
+      record.fields.push_back(name);
+      take(";");
+    }
+    ++at_;
+    module_.records.push_back(std::move(record));
+  }
+
+  void declaration() {
+    Declaration declared;
+    declared.begin = token().begin;
+    declared.line = token().line;
+    declared.routine = routine_;
+    if (word() == "local" || word() == "task") declared.local = take_word() == "local";
+    const std::string kind = take_word();
+    if (kind == "proc" || kind == "func" || kind == "trap") return routine_head(kind, declared.local);
+    if (kind != "const" && kind != "pers" && kind != "var") return skip_statement();
+    declared.storage = kind == "const" ? Storage::kConst : kind == "pers" ? Storage::kPers : Storage::kVar;
+    declared.type = take_word();
+    declared.name = take_word();
+    if (is_sign("{")) {
+      declared.is_array = true;
+      while (!at_end() && !is_sign("}") && !is_sign(";")) ++at_;
+      take("}");
+    }
+    if (take(":=")) declared.value = expression();
+    const bool ends = is_sign(";");
+    declared.end = token().end;
+    if (!ends) declared.value.reset();
+    skip_statement();
+    if (!declared.name.empty()) module_.declarations.push_back(std::move(declared));
+  }
+
+  void routine_head(const std::string& kind, bool local) {
+    Routine routine;
+    if (kind == "func") take_word();
+    routine.name = take_word();
+    routine.local = local;
+    routine_ = static_cast<int>(module_.routines.size());
+    if (take("(")) parameters(routine);
+    module_.routines.push_back(std::move(routine));
+  }
+
+  void parameters(Routine& routine) {
+    while (!at_end() && !is_sign(")") && !is_sign(";")) {
+      Declaration declared;
+      declared.storage = Storage::kParameter;
+      declared.routine = routine_;
+      declared.line = token().line;
+      declared.begin = token().begin;
+      const bool optional = take("\\");
+      for (std::string mode = word(); mode == "inout" || mode == "var" || mode == "pers" || mode == "switch";
+           mode = word()) {
+        if (mode == "switch") break;
+        declared.may_be_changed = true;
+        ++at_;
+      }
+      declared.type = take_word();
+      declared.name = take_word();
+      if (is_sign("{")) {
+        declared.is_array = true;
+        while (!at_end() && !is_sign("}") && !is_sign(")")) ++at_;
+        take("}");
+      }
+      declared.end = last_end();
+      if (!optional) routine.parameters.push_back(declared.name);
+      if (!declared.name.empty()) module_.declarations.push_back(std::move(declared));
+      while (!at_end() && !is_sign(",") && !is_sign(")") && !is_sign("\\") && !is_sign("|")) ++at_;
+      if (is_sign(",") || is_sign("|")) ++at_;
+    }
+    take(")");
+  }
+
+  /// `IF c THEN`, or `IF c instruction;`: then the instruction is found by its name behind the condition.
+  void condition() {
+    ++at_;
+    const std::size_t begin = at_;
+    while (!at_end() && !is_sign(";") && word() != "then") ++at_;
+    if (word() == "then") {
+      ++at_;
+      return;
+    }
+    const std::size_t end = at_;
+    for (at_ = begin; at_ < end; ++at_) {
+      const bool two_words = token().kind == TokenKind::kWord && at_ > begin &&
+                             (tokens_[at_ - 1].kind != TokenKind::kSign || is_closing(at_ - 1));
+      if (two_words && !is_operator(word()) && !is_operator(word_at(at_ - 1))) return simple_statement();
+    }
+    at_ = end;
+    take(";");
+  }
+  [[nodiscard]] bool is_closing(std::size_t index) const {
+    const std::string_view sign = text_.substr(tokens_[index].begin, tokens_[index].end - tokens_[index].begin);
+    return sign == ")" || sign == "]" || sign == "}";
+  }
+  [[nodiscard]] std::string word_at(std::size_t index) const {
+    const Token& t = tokens_[index];
+    return t.kind == TokenKind::kWord ? in_lower_case(text_.substr(t.begin, t.end - t.begin)) : std::string();
+  }
+  static bool is_operator(const std::string& text) {
+    return text == "and" || text == "or" || text == "not" || text == "xor" || text == "div" || text == "mod";
+  }
+
+  /// `FOR i FROM a TO b DO`: i is a number that the loop decides.
+  void loop() {
+    Declaration counter;
+    counter.begin = token().begin;
+    counter.line = token().line;
+    ++at_;
+    counter.storage = Storage::kLoop;
+    counter.routine = routine_;
+    counter.type = "num";
+    counter.name = take_word();
+    counter.end = last_end();
+    if (!counter.name.empty()) module_.declarations.push_back(std::move(counter));
+    while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
+    ++at_;
+  }
+
+  /// An assignment or an instruction.
+  void simple_statement() {
+    const std::size_t begin = at_;
+    const int line = token().line;
+    Expression target = primary(0);
+    if (take(":=")) {
+      Expression value = expression();
+      if (is_sign(";")) module_.assignments.push_back({std::move(target), std::move(value), routine_, line});
+      // A value that is not understood changes its target all the same.
+      else module_.assignments.push_back({std::move(target), {}, routine_, line});
+      return skip_statement();
+    }
+    at_ = begin;
+    instruction();
+  }
+
+  void instruction() {
+    Instruction made;
+    made.begin = token().begin;
+    made.line = token().line;
+    made.routine = routine_;
+    made.spelled = std::string(bytes());
+    made.name = take_word();
+    while (!at_statement_end()) {
+      if (take(",")) continue;
+      Expression argument;
+      if (take("\\")) {
+        const std::string label = take_word();
+        if (take(":=")) argument = expression();
+        argument.label = label.empty() ? "?" : label;
+      } else {
+        argument = expression();
+      }
+      if (argument.kind == Kind::kUnknown && argument.label.empty()) {
+        // Not understood: to the next argument.
+        int depth = 0;
+        for (; !at_statement_end(); ++at_) {
+          if (is_sign("(") || is_sign("[") || is_sign("{")) ++depth;
+          if (is_sign(")") || is_sign("]") || is_sign("}")) --depth;
+          if (depth <= 0 && (is_sign(",") || is_sign("\\"))) break;
+        }
+      }
+      made.arguments.push_back(std::move(argument));
+    }
+    made.end = is_sign(";") ? token().end : token().begin;
+    const bool ends = take(";");
+    if (ends) module_.instructions.push_back(std::move(made));
+  }
+
+  // Expressions.
+
+  Expression expression(int depth = 0) {
+    if (depth > kDeepest) return unknown();
+    Expression left = term(depth);
+    while (is_sign("+") || is_sign("-")) left = binary(std::move(left), &Parser::term, depth);
+    // Comparisons and logic decide nothing here.
+    if (is_sign("<") || is_sign(">") || is_sign("=") || is_operator(word())) return unknown();
+    return left;
+  }
+
+  Expression term(int depth) {
+    Expression left = factor(depth);
+    while (is_sign("*") || is_sign("/")) left = binary(std::move(left), &Parser::factor, depth);
+    return left;
+  }
+
+  Expression binary(Expression left, Expression (Parser::*operand)(int), int depth) {
+    Expression both;
+    both.kind = Kind::kBinary;
+    both.begin = left.begin;
+    both.line = left.line;
+    both.sign = bytes()[0];
+    ++at_;
+    both.parts.push_back(std::move(left));
+    both.parts.push_back((this->*operand)(depth));
+    both.end = last_end();
+    if (both.parts[1].kind == Kind::kUnknown) both.kind = Kind::kUnknown;
+    return both;
+  }
+
+  Expression factor(int depth) {
+    if (depth > kDeepest) return unknown();
+    if (!is_sign("-") && !is_sign("+")) return primary(depth);
+    Expression signed_one;
+    signed_one.begin = token().begin;
+    signed_one.line = token().line;
+    signed_one.sign = bytes()[0];
+    ++at_;
+    Expression inner = factor(depth + 1);
+    signed_one.end = inner.end;
+    if (inner.kind == Kind::kNumber && read_number(text_.substr(signed_one.begin, inner.end - signed_one.begin))) {
+      inner.value = signed_one.sign == '-' ? -inner.value : inner.value;
+      inner.begin = signed_one.begin;
+      return inner;
+    }
+    signed_one.kind = inner.kind == Kind::kUnknown ? Kind::kUnknown : Kind::kUnary;
+    signed_one.parts.push_back(std::move(inner));
+    return signed_one;
+  }
+
+  Expression unknown() {
+    Expression none;
+    none.begin = none.end = token().begin;
+    none.line = token().line;
+    return none;
+  }
+
+  Expression primary(int depth) {
+    if (depth > kDeepest) return unknown();
+    Expression made = unknown();
+    if (token().kind == TokenKind::kNumber) {
+      const auto number = read_number(bytes());
+      made.kind = number ? Kind::kNumber : Kind::kUnknown;
+      made.value = number ? number->value : 0;
+      ++at_;
+    } else if (token().kind == TokenKind::kString) {
+      made.kind = Kind::kText;
+      made.name = std::string(bytes());
+      ++at_;
+    } else if (is_sign("[")) {
+      aggregate(made, depth);
+    } else if (take("(")) {
+      made.sign = '+';
+      made.parts.push_back(expression(depth + 1));
+      if (take(")") && made.parts[0].kind != Kind::kUnknown) made.kind = Kind::kUnary;
+    } else if (token().kind == TokenKind::kWord) {
+      name(made, depth);
+    }
+    made.end = std::max(last_end(), made.begin);
+    return made;
+  }
+
+  void aggregate(Expression& made, int depth) {
+    ++at_;
+    made.kind = Kind::kAggregate;
+    while (!at_end() && !is_sign("]") && !is_sign(";")) {
+      made.parts.push_back(expression(depth + 1));
+      if (made.parts.back().kind == Kind::kUnknown) {
+        made.kind = Kind::kUnknown;
+        skip_to_closing("[", "]");
+        break;
+      }
+      if (!take(",") && !is_sign("]")) break;
+    }
+    if (!take("]")) made.kind = Kind::kUnknown;
+  }
+
+  void name(Expression& made, int depth) {
+    made.name = take_word();
+    made.kind = made.name == "true" || made.name == "false" ? Kind::kTruth : Kind::kName;
+    if (take("(")) call(made, depth);
+    suffixes(made, depth);
+  }
+
+  /// The arguments of a function, `\Rx:=30` among them.
+  void call(Expression& made, int depth) {
+    made.kind = Kind::kCall;
+    while (!at_end() && !is_sign(")") && !is_sign(";")) {
+      if (take(",")) continue;
+      const bool labelled = take("\\");
+      const std::string label = labelled ? take_word() : "";
+      const bool is_switch = labelled && !take(":=");
+      made.parts.push_back(is_switch ? unknown() : expression(depth + 1));
+      made.parts.back().label = label;
+      if (is_switch || made.parts.back().kind != Kind::kUnknown) continue;
+      // One argument that is not understood leaves the others in their places.
+      while (!at_end() && !is_sign(",") && !is_sign("\\") && !is_sign(")") && !is_sign(";")) {
+        const std::size_t before = at_;
+        if (take("(")) skip_to_closing("(", ")");
+        if (at_ == before || is_sign(")")) ++at_;
+      }
+    }
+    if (!take(")")) made.kind = Kind::kUnknown;
+  }
+
+  /// To the sign that closes what is open; the end of the statement at the latest.
+  void skip_to_closing(std::string_view opening, std::string_view closing) {
+    for (int open = 0; !at_statement_end(); ++at_) {
+      if (is_sign(opening)) ++open;
+      if (is_sign(closing) && open-- == 0) return;
+    }
+  }
+
+  /// `.trans.x`, `{3}`, `{i,j}`.
+  void suffixes(Expression& made, int depth) {
+    for (int count = 0; count < kDeepest; ++count) {
+      Expression outer;
+      outer.begin = made.begin;
+      outer.line = made.line;
+      if (is_sign(".") && token(1).kind == TokenKind::kWord) {
+        ++at_;
+        outer.kind = Kind::kField;
+        outer.name = take_word();
+        outer.parts.push_back(std::move(made));
+      } else if (is_sign("{")) {
+        ++at_;
+        outer.kind = Kind::kElement;
+        outer.parts.push_back(std::move(made));
+        while (!at_end() && !is_sign("}") && !is_sign(";")) {
+          outer.parts.push_back(expression(depth + 1));
+          // An index that is not understood is one that the program decides.
+          while (!at_end() && !is_sign(",") && !is_sign("}") && !is_sign(";")) ++at_;
+          take(",");
+        }
+        if (!take("}")) outer.kind = Kind::kUnknown;
+      } else {
+        return;
+      }
+      outer.end = last_end();
+      if (outer.parts[0].kind == Kind::kUnknown) outer.kind = Kind::kUnknown;
+      made = std::move(outer);
+    }
+  }
+
+  std::string_view text_;
+  std::vector<Token> tokens_;
+  std::size_t at_ = 0;
+  int routine_ = -1;
+  Module module_;
+};
+
+}  // namespace
+
+Module parse(std::string_view text) { return Parser(text).parse(); }
+
+}  // namespace trammel::cam::rapid

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace trammel::cam::rapid {
+
+enum class TokenKind { kWord, kNumber, kString, kSign, kEnd };
+
+/// A piece of a module. Bytes between tokens are blanks and comments.
+struct Token {
+  TokenKind kind = TokenKind::kEnd;
+  std::size_t begin = 0, end = 0;
+  int line = 1;
+};
+
+/// The tokens of a module, the last one kEnd. Words may hold letters of any encoding. A text that is no RAPID has
+/// tokens too.
+[[nodiscard]] std::vector<Token> tokens_of(std::string_view text);
+
+[[nodiscard]] std::string in_lower_case(std::string_view text);
+
+}  // namespace trammel::cam::rapid

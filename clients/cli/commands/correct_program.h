@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "server/base/result.h"
+
+namespace trammel::cli {
+
+/// What `correct` is asked for where the input is a program.
+struct CorrectProgramArguments {
+  std::vector<std::string> inputs;
+  std::string model, tool, payload, format, output, receipt, report, json;
+  bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
+       keep_joints = false;
+  double tolerance_mm = 0;  ///< 0: none
+  ServiceOptions service;
+};
+
+[[nodiscard]] Result<Extent> correct_program(const CorrectProgramArguments& arguments);
+
+}  // namespace trammel::cli

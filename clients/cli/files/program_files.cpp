@@ -1,0 +1,149 @@
+#include "clients/cli/files/program_files.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <iterator>
+#include <set>
+
+#include "clients/cam/mark.h"
+#include "server/base/text_file.h"
+
+namespace trammel::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargest = std::size_t{1} << 28;  // bytes
+
+struct Found {
+  std::string name, path;
+};
+
+/// The programs of a folder, by name.
+std::vector<Found> programs_in(const std::string& folder, const std::optional<cam::Dialect>& wanted) {
+  std::vector<Found> found;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (!it->is_regular_file(error)) continue;
+    const std::string path = it->path().string();
+    const auto dialect = cam::dialect_of_file(path);
+    if (dialect && (!wanted || dialect == wanted)) found.push_back({fs::relative(it->path(), folder, error).string(), path});
+  }
+  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+  return found;
+}
+
+Result<std::string> standard_input() {
+  std::string text{std::istreambuf_iterator<char>(std::cin), {}};
+  if (text.size() > kLargest) return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargest).in("standard input");
+  return text;
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+}
+
+}  // namespace
+
+bool is_program(const std::vector<std::string>& inputs, const std::string& format) {
+  if (!format.empty()) return format != "csv";
+  return inputs.size() != 1 || inputs[0] == "-" || fs::is_directory(inputs[0]) ||
+         cam::dialect_of_file(inputs[0]).has_value();
+}
+
+Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, const std::string& format) {
+  ProgramFiles program;
+  const std::optional<cam::Dialect> wanted = cam::dialect_called(format);
+  if (!format.empty() && !wanted) {
+    return failure(ErrorCode::kUsage, "--format '{}': known are csv, {}", format, cam::dialect_names())
+        .of("--format")
+        .with_text(format);
+  }
+  std::vector<Found> found;
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (fs::is_directory(input, error)) {
+      const std::vector<Found> inside = programs_in(input, wanted);
+      if (inside.empty()) return refused("a folder without programs").in(input);
+      found.insert(found.end(), inside.begin(), inside.end());
+      program.from_folder = true;
+    } else {
+      found.push_back({input == "-" ? "standard input" : fs::path(input).filename().string(), input});
+    }
+  }
+  std::optional<cam::Dialect> dialect = wanted;
+  std::set<std::string> names;
+  for (const Found& file : found) {
+    const auto own = cam::dialect_of_file(file.path);
+    if (!wanted && !own) {
+      return failure(ErrorCode::kUsage, "what kind of program is it?")
+          .in(file.path)
+          .next(fmt::format("--format says it: {}", cam::dialect_names()));
+    }
+    if (!wanted && dialect && own != dialect) {
+      return failure(ErrorCode::kUsage, "a {} program beside a {} one", cam::name_of(*own), cam::name_of(*dialect))
+          .in(file.path)
+          .next("hand over one program at a time, or choose with --format");
+    }
+    if (!dialect) dialect = own;
+    if (!names.insert(file.name).second) return refused("two files of the name {}", file.name).in(file.path);
+    Result<std::string> text = file.path == "-" ? standard_input() : read_text_file(file.path, kLargest);
+    if (!text) return tl::make_unexpected(text.error());
+    program.files.push_back({file.name, std::move(*text)});
+    program.paths.push_back(file.path);
+  }
+  program.dialect = dialect.value_or(cam::Dialect::kRapid);
+  return program;
+}
+
+Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
+  ProgramFiles before = program;
+  bool any = false;
+  for (std::size_t k = 0; k < before.files.size(); ++k) {
+    const auto mark = cam::find_mark(before.files[k].text);
+    if (!mark) continue;
+    any = true;
+    const std::string kept = cam::original_path(before.paths[k]);
+    Result<std::string> text = before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
+    if (!text) {
+      return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
+          .in(before.paths[k])
+          .next("fetch it from where it was corrected");
+    }
+    if (cam::short_hash(*text) != mark->original)
+      return refused("it is not what {} was corrected from: the mark names other bytes", before.files[k].name).in(kept);
+    before.files[k].text = std::move(*text);
+  }
+  if (!any && !all) return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
+  return before;
+}
+
+Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  const bool folder = program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) ||
+                      output.ends_with('/');
+  if (folder && output == "-") {
+    return failure(ErrorCode::kUsage, "{} files do not go to standard output", program.files.size())
+        .of("--output")
+        .next("name a folder");
+  }
+  if (folder && fs::exists(output, error) && !fs::is_directory(output, error)) {
+    return failure(ErrorCode::kUsage, "a folder is needed for {} files", program.files.size()).in(output).of("--output");
+  }
+  for (std::size_t k = 0; k < program.files.size(); ++k) {
+    paths.push_back(folder ? (fs::path(output) / program.files[k].name).string() : output);
+    for (const std::string& input : program.paths) {
+      if (output == "-" || input == "-" || !same_file(paths.back(), input)) continue;
+      return failure(ErrorCode::kUsage, "--output {} would overwrite what it is made from", paths.back())
+          .of("--output")
+          .with_text(paths.back());
+    }
+  }
+  return paths;
+}
+
+}  // namespace trammel::cli

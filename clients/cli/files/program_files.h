@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cam/dialect.h"
+#include "server/base/result.h"
+
+/// The files of one program: read from files, folders or standard input, written with what they were before.
+namespace trammel::cli {
+
+struct ProgramFiles {
+  cam::Dialect dialect = cam::Dialect::kRapid;
+  std::vector<cam::SourceFile> files;
+  std::vector<std::string> paths;  ///< of each file; `-` is standard input
+  bool from_folder = false;        ///< the output is a folder too
+};
+
+/// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
+[[nodiscard]] bool is_program(const std::vector<std::string>& inputs, const std::string& format);
+
+/// `inputs`: files, folders (with all they hold of one dialect), or `-`. `format`: the dialect, or empty: by the
+/// endings. Refuses files of several dialects, a folder without programs, the same name twice.
+[[nodiscard]] Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
+                                                      const std::string& format);
+
+/// Of a program that is marked as corrected: each file as it was before. Refuses a file whose original is not kept
+/// beside it, or is not the one that the mark names. `all`: also where no file is marked, as for a new correction.
+[[nodiscard]] Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all);
+
+/// Where each file goes: `output` itself for a single file, else into the folder of that name. Refuses to write over
+/// an input.
+[[nodiscard]] Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output);
+
+}  // namespace trammel::cli

@@ -1,0 +1,150 @@
+#include "clients/cli/text/receipt_text.h"
+
+#include <cmath>
+#include <map>
+
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using cam::CorrectedProgram;
+using cam::ReceiptRow;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kNumbers = 7;  // of the longest kind of target
+
+/// Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
+std::string millimetres(double value) {
+  return std::isfinite(value) ? fmt::format("{:.5f}", value) : "";
+}
+
+std::string numbers(const std::vector<double>& values) {
+  std::string text;
+  for (std::size_t k = 0; k < kNumbers; ++k) text += (k < values.size() ? csv_number(values[k]) : "") + ",";
+  return text;
+}
+
+const char* spelled(cam::Coordinates coordinates) {
+  switch (coordinates) {
+    case cam::Coordinates::kQuaternion:
+      return "mm_wxyz";
+    case cam::Coordinates::kAnglesZyx:
+      return "mm_abc_deg";
+    case cam::Coordinates::kAnglesXyz:
+      return "mm_wpr_deg";
+    case cam::Coordinates::kRotationVector:
+      return "m_rotvec_rad";
+    case cam::Coordinates::kJoints:
+      return "joints_deg";
+  }
+  return "";
+}
+
+std::string domain_of(const ReceiptRow& row) {
+  return row.status == "ok" ? "inside" : row.status == "out_of_domain" ? "outside" : "";
+}
+
+ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+
+/// To a tenth of a micrometre, as in the CSV.
+ordered_json json_mm(double value) { return json_of(std::isfinite(value) ? std::round(value * 1e5) / 1e5 : value); }
+
+}  // namespace
+
+std::string receipt_csv(const CorrectedProgram& program) {
+  std::string text = "file,line,name,motion,used_at,tool,frame,status,folded,units";
+  for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",before_{}", k);
+  for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",after_{}", k);
+  text += ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
+          "model_id,message,suggestion\n";
+  for (const ReceiptRow& row : program.rows) {
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
+                        csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
+                        csv_field(row.tool), csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
+                        row.before.empty() ? "" : spelled(row.coordinates));
+    text += numbers(row.before) + numbers(row.after);
+    for (Eigen::Index k = 0; k < 3; ++k)
+      text += (std::isfinite(row.p_B(k)) ? fmt::format("{:.4f}", to_mm(row.p_B(k))) : "") + ",";
+    for (const double value : {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm,
+                               row.rounding_mm}) {
+      text += millimetres(value) + ",";
+    }
+    text += fmt::format("{},{},{},{},{}\n", domain_of(row), row.iterations, program.model_id, csv_field(row.message),
+                        csv_field(row.suggestion));
+  }
+  return text;
+}
+
+ordered_json receipt_json(const CorrectedProgram& program) {
+  ordered_json rows = ordered_json::array();
+  for (const ReceiptRow& row : program.rows) {
+    ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
+                         {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
+                         {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
+    if (!row.suggestion.empty()) item["suggestion"] = row.suggestion;
+    if (!row.before.empty()) {
+      item["units"] = spelled(row.coordinates);
+      item["before"] = row.before;
+    }
+    if (row.corrected()) {
+      item["after"] = row.after;
+      item["joints"] = row.joints;
+      item["folded"] = row.folded;
+    }
+    if (std::isfinite(row.p_B.x()))
+      item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+    item["error_before_mm"] = json_mm(row.error_before_mm);
+    item["error_after_mm"] = json_mm(row.error_after_mm);
+    item["sigma_mm"] = json_mm(row.sigma_mm);
+    item["sigma_measured_mm"] = json_mm(row.sigma_measured_mm);
+    item["rounding_mm"] = json_mm(row.rounding_mm);
+    item["domain"] = domain_of(row);
+    item["iterations"] = row.iterations;
+    rows.push_back(std::move(item));
+  }
+  ordered_json inserted = ordered_json::array();
+  for (const cam::InsertedLine& line : program.inserted)
+    inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
+  return {{"model", program.model_id},
+          {"moves", program.moves},
+          {"moves_corrected", program.moves_corrected},
+          {"left_alone", program.left_alone()},
+          {"notes", program.notes},
+          {"targets", rows},
+          {"inserted_lines", inserted}};
+}
+
+std::string receipt_summary(const CorrectedProgram& program) {
+  std::map<std::string, int> counts;
+  for (const ReceiptRow& row : program.rows) ++counts[row.status];
+  std::string text = fmt::format("{} motions, {} to corrected targets; {} targets:", program.moves,
+                                 program.moves_corrected, program.rows.size());
+  const char* separator = " ";
+  for (const auto& [status, count] : counts) {
+    text += fmt::format("{}{} {}", separator, count, status);
+    separator = ", ";
+  }
+  text += "\n";
+  for (const std::string& note : program.notes) text += "note: " + note + "\n";
+  return text;
+}
+
+std::string left_alone_text(const CorrectedProgram& program) {
+  constexpr std::size_t kLines = 10;
+  const std::size_t left = program.left_alone();
+  if (left == 0) return "";
+  std::string text = fmt::format("{} of {} targets are left as they were:\n", left, program.rows.size());
+  std::size_t told = 0;
+  for (const ReceiptRow& row : program.rows) {
+    if (row.corrected() || ++told > kLines) continue;
+    text += fmt::format("  {} line {}: {}{}: {}{}\n", row.file, row.line, row.name.empty() ? "" : row.name + ": ",
+                        row.status, row.message, row.suggestion.empty() ? "" : "; " + row.suggestion);
+  }
+  if (left > kLines) text += fmt::format("  and {} more\n", left - kLines);
+  return text;
+}
+
+}  // namespace trammel::cli
