@@ -118,6 +118,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.action(action);
     request.change(to_wire(change));
+    request.reason(change.reason);
     return call<wire::ManageModels>(*manage_models, request, {cell, {}, true});
   }
 
@@ -126,6 +127,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
+    request.reason(change.reason);
     const auto reply = call<wire::ReleaseBatches>(*release_batches, request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
@@ -359,6 +361,12 @@ Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cel
 
 Status Session::release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
   return participant_->release(cell, {batch_id}, change, {}).map([](std::int64_t) {});
+}
+
+Status Session::discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
+  wire::ReleaseBatchesRequest request;
+  request.action(wire::RELEASE_DISCARD);
+  return participant_->release(cell, {batch_id}, change, std::move(request)).map([](std::int64_t) {});
 }
 
 Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,

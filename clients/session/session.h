@@ -59,6 +59,8 @@ class Session {
   /// From every server, for one cell or (empty) for all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
   /// As train(), from batches in quarantine. They are released only if the training is accepted.
   [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
                                                        const std::vector<std::string>& batch_ids,

@@ -105,7 +105,8 @@ struct JobStatus {
 /// What a change takes for granted.
 struct ChangeOptions {
   std::optional<int> expected_version = {};  ///< in force, 0: none; with another one nothing changes (kConflict)
-  std::string id = {};  ///< unique for ever: the change happens once under it; empty: the session makes one
+  std::string id = {};      ///< unique for ever: the change happens once under it; empty: the session makes one
+  std::string reason = {};  ///< for the audit trail, of changes of what is in force and of quarantine
 };
 
 /// The audit trail of a server as it sends it: JSON.

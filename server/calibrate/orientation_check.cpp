@@ -267,7 +267,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
       q(j) = -q(j);
       reversed.X_BF[i] = robot.flange_pose(q);
     }
-    add(reading(fmt::format("with joint {} reversed", j + 1), reversed, q_WB, as_it_is));
+    add(reading(fmt::format("with the other sign of q{}_deg", j + 1), reversed, q_WB, as_it_is));
   }
   for (const bool next : {true, false}) {
     Oriented shifted = group;
@@ -318,7 +318,8 @@ class Question {
   std::optional<Error> doubt() const {
     if (follow()) return std::nullopt;
     const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
-    if (two_orders_ > 0 && !better) return of_two_orders();
+    const bool one_fits_all = of_best_.fit < kMuchBetter * given_.fit && of_best_.fit < of_both_.fit;
+    if (two_orders_ > 0 && !better && !one_fits_all) return of_two_orders();
     const std::vector<std::size_t> far = far_rows();
     if (given_.scatter <= kMostOff && given_.offset <= kMostOff && far.empty() && !better) return std::nullopt;
     if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();

@@ -51,7 +51,6 @@ Status Handlers::cancel(const std::string& cell, std::int64_t job, const std::st
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
-  if (request.action() == wire::RELEASE_DISCARD) return unsupported<wire::ReleaseBatchesReply>("action");
   if (request.change().expected_epoch() != 0) return unsupported<wire::ReleaseBatchesReply>("expected_epoch");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
@@ -67,17 +66,22 @@ Result<std::int64_t> Handlers::released(const std::string& cell, const wire::Rel
   if (!expected) return tl::make_unexpected(expected.error());
   const auto& batches = request.batch_ids();
   const bool trains = request.action() == wire::RELEASE_AND_TRAIN;
+  const bool discards = request.action() == wire::RELEASE_DISCARD;
   if (!trains && batches.size() != 1) {
-    return failure(ErrorCode::kUsage, "{} batches to release, 1 is needed", batches.size())
+    return failure(ErrorCode::kUsage, "{} batches to release or to discard, 1 is needed", batches.size())
         .of("batch_ids")
         .beyond(batches.size(), 1);
   }
-  ChangeId id = change_id(request.change().id().to_string(),
-                          in_few_words(trains ? "release and train" : "release", cell,
-                                       {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
-                          request.header());
+  ChangeId id =
+      change_id(request.change().id().to_string(),
+                in_few_words(trains     ? "release and train"
+                             : discards ? "discard"
+                                        : "release",
+                             cell, {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
+                request.header());
   id.reason = request.reason();
   id.expected_version = *expected;
+  if (discards) return trainer_.discard(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   if (!trains) return trainer_.release(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kReleased, id);
 }

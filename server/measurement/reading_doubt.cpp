@@ -178,9 +178,12 @@ Error Look::of_reading() const {
   const double given = std::max(given_->off, given_->quality);
   std::string text = fmt::format("the positions do not follow the joints: {} off; read {} they would fit to {}",
                                  mm(given), best.reading->name, mm(std::max(best.fit.off, best.fit.quality)));
-  if (found_.size() > 1) {
-    std::vector<std::string> others;
-    for (std::size_t k = 1; k < found_.size(); ++k) others.push_back(found_[k].reading->name);
+  std::vector<std::string> others;
+  for (std::size_t k = 1; k < found_.size(); ++k) {
+    // Of rows, the others are the same with a few rows more.
+    if (!best.reading->of_rows) others.push_back(found_[k].reading->name);
+  }
+  if (!others.empty()) {
     text += fmt::format(" (or {})", fmt::join(others, ", or "));
   }
   return refused("{}", text)

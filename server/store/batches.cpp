@@ -15,7 +15,8 @@ namespace {
 
 constexpr const char* kRecordColumns =
     "SELECT id, hash, request_id, accepted_at, poses, job, quarantine, EXISTS (SELECT 1 FROM pruned WHERE "
-    "pruned.kind = 'batch' AND pruned.cell = batches.cell AND pruned.id = batches.id) FROM batches WHERE cell = ? ";
+    "pruned.kind = 'batch' AND pruned.cell = batches.cell AND pruned.id = batches.id), EXISTS (SELECT 1 FROM discarded "
+    "WHERE discarded.cell = batches.cell AND discarded.batch = batches.id) FROM batches WHERE cell = ? ";
 
 /// The batch in a row of kRecordColumns, without its text.
 StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
@@ -29,6 +30,7 @@ StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
                     row.getColumn(5).getInt64(),
                     row.getColumn(6).getString()};
   batch.pruned = row.getColumn(7).getInt() != 0;
+  batch.discarded = row.getColumn(8).getInt() != 0;
   return batch;
 }
 
@@ -40,6 +42,13 @@ Result<StoredBatch> read_record(SQLite::Database& database, const std::string& c
 }
 
 }  // namespace
+
+Failure discarded_failure(const std::string& cell, const std::string& id) {
+  return failure(ErrorCode::kConflict, "batch {} of cell {} was discarded", id, cell)
+      .of("batch")
+      .with_text(id)
+      .next("submit it again under another id if it is good");
+}
 
 Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
   return connection_->in_transaction([&](SQLite::Database& database) -> Result<StoredJob> {
@@ -74,6 +83,7 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());
+      if (batch->discarded) return discarded_failure(cell, id);
       if (batch->quarantine == reason) return ChangeOutcome{};
       change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
       record_audit(database,
@@ -81,6 +91,23 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
                     batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine,
                     reason.empty() ? "free" : "in quarantine: " + reason},
                    change_id);
+      return ChangeOutcome{};
+    });
+  });
+  return changed.map([](const ChangeOutcome&) {});
+}
+
+Status Store::discard(const std::string& cell, const std::string& id, const ChangeId& change_id) {
+  const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
+    return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
+      const auto batch = read_record(database, cell, id);
+      if (!batch) return tl::make_unexpected(batch.error());
+      if (batch->discarded) return ChangeOutcome{};
+      const std::string was = batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine;
+      const std::string now = "discarded" + (change_id.reason.empty() ? "" : ": " + change_id.reason);
+      change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", now, cell, id);
+      change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", cell, id);
+      record_audit(database, {cell, "discard", "batch " + id, was, now}, change_id);
       return ChangeOutcome{};
     });
   });

@@ -183,6 +183,8 @@ Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& j
     if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
       return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
     }
+    if (prepare(database, "SELECT 1 FROM discarded WHERE cell = ? AND batch = ?", job.cell, id).executeStep())
+      return discarded_failure(job.cell, id);
   }
   const std::int64_t id = insert_job(database, job);
   insert_job_batches(database, id, job.cell, job.batch_ids);

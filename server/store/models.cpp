@@ -71,10 +71,11 @@ void insert_activation(SQLite::Database& database, const std::string& cell, int 
 /// Releases from quarantine the batches that the job of this version may release.
 void release_batches_of(SQLite::Database& database, const std::string& cell, int version, const ChangeId& by) {
   auto rows = prepare(database,
-                      "SELECT id, quarantine FROM batches WHERE cell = ? AND quarantine <> '' AND id IN "
+                      "SELECT id, quarantine FROM batches WHERE cell = ?1 AND quarantine <> '' AND id IN "
                       "(SELECT batch FROM job_releases JOIN jobs ON jobs.id = job_releases.job "
-                      "WHERE jobs.cell = ? AND jobs.model_version = ?)",
-                      cell, cell, version);
+                      "WHERE jobs.cell = ?1 AND jobs.model_version = ?2) "
+                      "AND id NOT IN (SELECT batch FROM discarded WHERE cell = ?1)",
+                      cell, version);
   std::vector<std::pair<std::string, std::string>> kept_out;
   while (rows.executeStep()) kept_out.emplace_back(rows.getColumn(0).getString(), rows.getColumn(1).getString());
   for (const auto& [id, why] : kept_out) {

@@ -90,7 +90,7 @@ CREATE TABLE diagnoses (
 /// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
 /// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
 /// released if its model is put in force. And the changes that clients asked for under an id, with what came of them;
-/// what of the rest has lost its text; and the store's identity.
+/// what of the rest has lost its text; which batches nothing takes any more; and the store's identity.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -137,6 +137,12 @@ CREATE TABLE IF NOT EXISTS pruned (
   cell TEXT NOT NULL,
   id   TEXT NOT NULL,
   PRIMARY KEY (kind, cell, id)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS discarded (
+  cell  TEXT NOT NULL,
+  batch TEXT NOT NULL,
+  PRIMARY KEY (cell, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS store_identity (id TEXT NOT NULL);
 )sql";

@@ -32,6 +32,7 @@ struct StoredBatch {
   std::string quarantine = {};  ///< the reason for its quarantine; empty: not in quarantine
   std::string who = {};         ///< of a new one: who sent it, for the audit trail
   bool pruned = false;          ///< its text is gone
+  bool discarded = false;       ///< it stays in quarantine for ever
 };
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
@@ -122,8 +123,9 @@ class Store {
   /// functions that take a ChangeId record it in the transaction of the change itself; where it is recorded already
   /// they change nothing and return what was made then. The last 100,000 are kept.
   [[nodiscard]] Result<std::optional<ChangeOutcome>> outcome_of(const ChangeId& change_id) const;
-  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may also
-  /// train from batches in quarantine. They leave quarantine in the transaction that puts its model in force.
+  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones, (kConflict) discarded ones.
+  /// With `release` it may also train from batches in quarantine. They leave quarantine in the transaction that puts
+  /// its model in force.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false, const ChangeId& change_id = {});
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
@@ -140,9 +142,11 @@ class Store {
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
-  /// Puts the batch in quarantine for `reason`, or releases it (empty).
+  /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
                                       const ChangeId& change_id = {});
+  /// Nothing takes the batch any more: it is in quarantine for ever. Its text stays until it is pruned.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& id, const ChangeId& change_id = {});
   /// Newest last, without their text.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
 

@@ -376,6 +376,11 @@ Status Trainer::release(const std::string& cell_name, const std::string& batch_i
   return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
+Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
+  if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
+  return store_.discard(cell_name, batch_id, id);
+}
+
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
   std::vector<StoredBatch> all;
   for (const auto& [name, known] : cells_) {
@@ -383,7 +388,7 @@ Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_na
     auto batches = store_.batches(name);
     if (!batches) return batches;
     std::copy_if(batches->begin(), batches->end(), std::back_inserter(all),
-                 [](const StoredBatch& batch) { return !batch.quarantine.empty(); });
+                 [](const StoredBatch& batch) { return !batch.quarantine.empty() && !batch.discarded; });
   }
   return all;
 }

@@ -90,6 +90,8 @@ class Trainer {
   [[nodiscard]] Status cancel(std::int64_t job, const std::string& who = {});
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.

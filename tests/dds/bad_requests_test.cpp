@@ -462,7 +462,7 @@ std::size_t BadRequests::releases() {
   expect("an unknown batch", wire::RESULT_NOT_FOUND, [](Request&) {});
   expect("an unknown action", wire::RESULT_INVALID_ARGUMENT,
          [](Request& r) { r.action(static_cast<wire::ReleaseAction>(3)); });
-  expect("to discard", wire::RESULT_UNSUPPORTED, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
+  expect("to discard an unknown batch", wire::RESULT_NOT_FOUND, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
   expect("nothing", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({}); });
   expect("two at once", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({"lt-07", "lt-08"}); });
   expect("to train from nothing", wire::RESULT_REFUSED, [](Request& r) {

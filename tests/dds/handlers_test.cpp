@@ -545,7 +545,6 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
   auto of_epoch = manage_request(wire::MANAGE_ACTIVATE, 1);
   of_epoch.change().expected_epoch(3);
   EXPECT_TRUE(is_unsupported(handlers_.answer(of_epoch)));
-  EXPECT_TRUE(is_unsupported(handlers_.answer(release_request(wire::RELEASE_DISCARD, {"lt-07"}))));
   EXPECT_TRUE(is_unsupported(handlers_.answer(wire::CheckHealthRequest())));
   wire::TrainRequest train;
   train.batch_rule("last 3");

@@ -158,6 +158,18 @@ TEST_F(AuditTest, WhereAnotherVersionIsInForceThanExpectedNothingChangesAndNothi
   EXPECT_EQ(demand(store_->add_job(job("lt-07"), false, id)).id, queued.id) << "the repeat of what was done is none";
 }
 
+TEST_F(AuditTest, WhatIsDiscardedIsTakenByNothingAnyMore) {
+  submit("lt-07");
+  ChangeId id{"c:1", "discard", "anna", "the tracker was warm"};
+  ASSERT_TRUE(store_->discard("cell-7", "lt-07", id));
+  ASSERT_TRUE(store_->discard("cell-7", "lt-07", id));
+  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "").error().code, ErrorCode::kConflict);
+  EXPECT_EQ(store_->add_job(job("lt-07"), true).error().code, ErrorCode::kConflict);
+  const AuditTrail trail = demand(store_->audit());
+  ASSERT_EQ(trail.rows.size(), 3u);
+  EXPECT_EQ(told(trail).back(), "discard batch lt-07: free -> discarded: the tracker was warm by anna");
+}
+
 TEST_F(AuditTest, PruningTakesTheOldestTextsButNeverWhatIsNeeded) {
   for (int i = 1; i <= 8; ++i) train("lt-" + std::to_string(i), i == 2 || i == 5);
   ASSERT_TRUE(store_->rollback("cell-7")) << "2 is in force";
