@@ -241,6 +241,37 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
       ->capture_default_str();
 }
 
+/// What is in force, what may be learned from, and models as files.
+void add_model_changes(ServiceCommands& commands) {
+  commands.add(
+      "activate", "Put a stored version of a cell's model in force", activate,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
+        add_reason(command, arguments);
+      });
+  commands.add("rollback", "Put back in force the model that was before", rollback,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 add_reason(command, arguments);
+               });
+  const auto add_batch = [](CLI::App& command, ServiceArguments& arguments) {
+    add_cell(command, arguments);
+    command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")->required();
+    add_reason(command, arguments);
+  };
+  commands.add("release", "Let later trainings take a batch that is in quarantine", release, add_batch);
+  commands.add("discard", "Let nothing take a batch any more", discard, add_batch);
+  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
+    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
+    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
+  });
+  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command.add_option("--model", arguments.model, "Model file to add")->required();
+               });
+}
+
 }  // namespace
 
 void add_service_commands(CLI::App& app, Action& chosen) {
@@ -287,33 +318,7 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->capture_default_str();
                });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
-  commands.add(
-      "activate", "Put a stored version of a cell's model in force", activate,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
-        add_reason(command, arguments);
-      });
-  commands.add("rollback", "Put back in force the model that was before", rollback,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 add_cell(command, arguments);
-                 add_reason(command, arguments);
-               });
-  const auto add_batch = [](CLI::App& command, ServiceArguments& arguments) {
-    add_cell(command, arguments);
-    command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")->required();
-    add_reason(command, arguments);
-  };
-  commands.add("release", "Let later trainings take a batch that is in quarantine", release, add_batch);
-  commands.add("discard", "Let nothing take a batch any more", discard, add_batch);
-  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
-    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
-    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
-  });
-  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 add_cell(command, arguments);
-                 command.add_option("--model", arguments.model, "Model file to add")->required();
-               });
+  add_model_changes(commands);
 }
 
 }  // namespace trammel::cli
