@@ -118,6 +118,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.action(action);
     request.change(to_wire(change));
+    request.reason(change.reason);
     return call<wire::ManageModels>(*manage_models, request, {cell, {}, true});
   }
 
@@ -126,6 +127,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
+    request.reason(change.reason);
     const auto reply = call<wire::ReleaseBatches>(*release_batches, request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
@@ -140,12 +142,13 @@ struct Session::Participant {
   }
 
   /// From every server.
-  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what) {
+  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what,
+                                                                    const wire::ReadModelsRequest& asked = {}) {
     const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
     if (known.empty()) return tl::make_unexpected(no_server());
     std::vector<wire::ReadModelsReply> replies;
     for (const KnownServer& server : known) {
-      auto reply = read(cell, server.id(), what);
+      auto reply = read(cell, server.id(), what, asked);
       if (!reply) return tl::make_unexpected(reply.error());
       replies.push_back(std::move(*reply));
     }
@@ -360,6 +363,12 @@ Status Session::release(const std::string& cell, const std::string& batch_id, co
   return participant_->release(cell, {batch_id}, change, {}).map([](std::int64_t) {});
 }
 
+Status Session::discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
+  wire::ReleaseBatchesRequest request;
+  request.action(wire::RELEASE_DISCARD);
+  return participant_->release(cell, {batch_id}, change, std::move(request)).map([](std::int64_t) {});
+}
+
 Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,
                                                 const std::string& level, const std::string& bias,
                                                 const ChangeOptions& change) {
@@ -378,6 +387,18 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
     for (const wire::Job& job : reply.jobs()) jobs.push_back(from_wire(job, reply.header().server().to_string()));
   }
   return jobs;
+}
+
+Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(since_unix_s);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_AUDIT, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<AuditText> texts;
+  for (const wire::ReadModelsReply& reply : *replies)
+    texts.push_back({reply.header().server().to_string(), reply.text()});
+  return texts;
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {

@@ -59,6 +59,8 @@ class Session {
   /// From every server, for one cell or (empty) for all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
   /// As train(), from batches in quarantine. They are released only if the training is accepted.
   [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
                                                        const std::vector<std::string>& batch_ids,
@@ -67,6 +69,10 @@ class Session {
   /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
   /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
+  /// From every server: who changed what, of one cell or (empty) of all, since then (Unix time, s), the newest `most`
+  /// (0: all).
+  [[nodiscard]] Result<std::vector<AuditText>> audit(const std::string& cell, std::int64_t since_unix_s,
+                                                     std::size_t most);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});

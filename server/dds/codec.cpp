@@ -335,8 +335,17 @@ void put_error(const wire::Fault& fault, wire::ReplyHeader& header) {
   header.problems().front().code(fault.code);
 }
 
-ChangeId change_id(const std::string& id, const std::string& asked) {
-  return id.empty() ? ChangeId{} : ChangeId{id, asked};
+ChangeId change_id(const std::string& id, const std::string& asked, const wire::RequestHeader& header) {
+  return {id, asked, requester(header)};
+}
+
+std::string requester(const wire::RequestHeader& header) {
+  constexpr std::size_t kOfParticipant = 12;  // octets of a GUID
+  std::string text = "client ";
+  const auto& guid = header.request_id().writer_guid();
+  for (std::size_t i = 0; i < kOfParticipant; ++i) text += fmt::format("{:02x}", guid[i]);
+  const std::string trace = header.trace_id().to_string();
+  return trace.empty() ? text : text + " " + trace;
 }
 
 std::string in_few_words(const std::string& verb, const std::string& cell, const std::vector<std::string>& rest) {

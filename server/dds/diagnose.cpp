@@ -8,7 +8,8 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = trainer_.diagnose(
       cell, request.batch_id(), request.csv(), false,
-      change_id(request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()})));
+      change_id(request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
+                request.header()));
   if (!job) return tl::make_unexpected(job.error());
   wire::DiagnoseReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 #include <string>
 
@@ -5,6 +6,7 @@
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/store/audit_json.h"
 
 namespace trammel {
 namespace {
@@ -28,9 +30,11 @@ Status check_fits(const std::string& what, std::size_t bytes) {
 
 Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const std::string& cell = request.about().cell();
-  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE;
+  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
+                      request.what() == wire::READ_AUDIT;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
-  if (request.what() > wire::READ_FINDINGS) return unsupported<ReadModelsReply>("what");
+  if (request.what() > wire::READ_FINDINGS && request.what() != wire::READ_AUDIT)
+    return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
     if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   }
@@ -52,6 +56,8 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
       return quarantine_of(cell);
     case wire::READ_FINDINGS:
       return findings_of(cell, request.job(), request.page());
+    case wire::READ_AUDIT:
+      return audit_of(cell, request.since_unix_s(), request.most());
     default:
       return unsupported<ReadModelsReply>("what");
   }
@@ -114,6 +120,16 @@ Result<ReadModelsReply> Handlers::quarantine_of(const std::string& cell) const {
   ReadModelsReply reply;
   for (std::size_t i = first_of_last(*batches, wire::MAX_VERSIONS); i < batches->size(); ++i)
     reply.batches().push_back(to_wire((*batches)[i]));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since, std::size_t most) const {
+  const auto trail = store_.audit({cell, std::max<std::int64_t>(since, 0), most});
+  if (!trail) return tl::make_unexpected(trail.error());
+  ReadModelsReply reply;
+  reply.text(audit_json(*trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (const Status fits = check_fits("the audit trail", reply.text().size()); !fits)
+    return Failure(fits.error()).next("ask for fewer rows");
   return reply;
 }
 

@@ -5,9 +5,9 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
-#include "server/calibrate/orientation_check.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
@@ -50,8 +50,7 @@ std::vector<std::string> sources_of(const Cell& cell, const std::vector<SessionS
 
 Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
                               const std::vector<SessionSetting>& sessions) {
-  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
-    return tl::make_unexpected(oriented.error());
+  if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();

@@ -29,7 +29,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/calibrate/orientation_check.h"
+#include "server/calibrate/batch_check.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/world.h"
 #include "server/diagnose/triage/batch_alternatives.h"
@@ -214,7 +214,7 @@ Triage triage(const CompensatedModel& model, const CheckedBatch& batch) { return
 
 Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const Cell& cell) {
   MeasurementBatch batch = known_rows(model, checked.rows());
-  if (const auto doubt = orientation_doubt(batch, cell)) {
+  if (const auto doubt = reading_doubt(batch, cell)) {
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;

@@ -8,6 +8,7 @@
 #include "server/base/check.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
+#include "server/measurement/reading_doubt.h"
 #include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
 #include "server/measurement/spread_check.h"
@@ -146,8 +147,10 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   }
   divide_into_sessions(batch);
   rebase_times(batch.measurements);
-  if (const Status poses = check_poses(batch, cell, where); !poses) return tl::make_unexpected(poses.error());
-  if (const Status spread = check_spreads(batch, cell, where); !spread) return tl::make_unexpected(spread.error());
+  if (const Status poses = check_poses(batch, cell, where); !poses)
+    return tl::make_unexpected(with_likely_reading(poses.error(), batch, cell));
+  if (const Status spread = check_spreads(batch, cell, where); !spread)
+    return tl::make_unexpected(with_likely_reading(spread.error(), batch, cell));
   fill_velocity(batch);
   std::vector<bool> is_held_out = hold_out(batch);
   return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));

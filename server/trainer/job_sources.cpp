@@ -71,6 +71,7 @@ Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJ
     const auto may_judge = store.batches_learned_from(job.cell);
     if (!may_judge) return tl::make_unexpected(may_judge.error());
     for (auto batch = stored->rbegin(); batch != stored->rend() && judging.size() < kMostSessions; ++batch) {
+      if (batch->pruned) continue;
       if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge->contains(batch->id))) continue;
       judging.push_back({batch->id, true});
     }

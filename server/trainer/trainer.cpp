@@ -133,6 +133,7 @@ Result<std::vector<std::string>> Trainer::start() {
     while (const auto taken = queue_.take(stop)) {
       const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
+      if (end == JobRunner::End::kOver) prune(taken->job.cell, stop);
       queue_.put_down();
       // Asked for while its attempt ended: it waits again, and nobody told it.
       if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested()) static_cast<void>(cancel(taken->job.id));
@@ -144,6 +145,12 @@ Result<std::vector<std::string>> Trainer::start() {
     registry_.free_models(stop);
   });
   return notices;
+}
+
+void Trainer::prune(const std::string& cell, const std::stop_token& stop) {
+  // What the store refuses now is pruned after the next job.
+  while (!stop.stop_requested() && store_.prune_one(cell, options_.keep).value_or(false)) {
+  }
 }
 
 void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop) {
@@ -207,7 +214,7 @@ void Trainer::stop() {
 }
 
 Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
-                                     const std::string& request_id) {
+                                     const std::string& request_id, const std::string& who) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
@@ -224,7 +231,8 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
         .of("poses")
         .beyond(poses, options_.max_poses);
   }
-  const StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
+  StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
+  stored.who = who;
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
@@ -331,6 +339,7 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
   std::int64_t poses = 0;
   for (const StoredBatch& batch : stored) {
     if (!wanted.contains(batch.id)) continue;
+    if (batch.pruned) return refused("batch {} was pruned", batch.id).of("batch").with_text(batch.id);
     if (const Status free = check_released(batch); !free && !release) return free;
     poses += batch.poses;
   }
@@ -340,7 +349,7 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
       .beyond(poses, options_.max_poses);
 }
 
-Status Trainer::cancel(std::int64_t id) {
+Status Trainer::cancel(std::int64_t id, const std::string& who) {
   const auto job = store_.job(id);
   if (!job) return tl::make_unexpected(job.error());
   const auto asked_for = was_asked_for(*job);
@@ -356,7 +365,7 @@ Status Trainer::cancel(std::int64_t id) {
       break;
   }
   const JobOutcome outcome = cancelled_outcome();
-  if (auto ended = store_.set_job_failed(id, outcome.why, outcome); !ended) {
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome, who); !ended) {
     queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
     return ended;
   }
@@ -414,6 +423,11 @@ Status Trainer::release(const std::string& cell_name, const std::string& batch_i
   return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
+Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
+  if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
+  return store_.discard(cell_name, batch_id, id);
+}
+
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
   std::vector<StoredBatch> all;
   for (const auto& [name, known] : cells_) {
@@ -421,7 +435,7 @@ Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_na
     auto batches = store_.batches(name);
     if (!batches) return batches;
     std::copy_if(batches->begin(), batches->end(), std::back_inserter(all),
-                 [](const StoredBatch& batch) { return !batch.quarantine.empty(); });
+                 [](const StoredBatch& batch) { return !batch.quarantine.empty() && !batch.discarded; });
   }
   return all;
 }

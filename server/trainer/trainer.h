@@ -58,11 +58,12 @@ class Trainer {
 
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
   /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
-  /// Returns the job id; the same request again returns the same. Refuses what the batch reader and the cell refuse, an
-  /// unknown cell (kNotFound), an id that the cell already has (kConflict) and too many poses (kTooLarge). However many
-  /// jobs wait, a batch is taken.
+  /// Returns the job id; the same batch again returns the same, whoever sends it. Refuses what the batch reader and the
+  /// cell refuse, an unknown cell (kNotFound), an id that the cell has with other content (kConflict) and too many
+  /// poses (kTooLarge). However many jobs wait, a batch is taken.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
-                                            const std::string& csv, const std::string& request_id);
+                                            const std::string& csv, const std::string& request_id,
+                                            const std::string& who = {});
   /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by
   /// itself or by a person, or when there are too few poses to judge it by; not where it is judged and found not
   /// better.
@@ -86,9 +87,11 @@ class Trainer {
   /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
   /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
   /// that is over (kConflict).
-  [[nodiscard]] Status cancel(std::int64_t job);
+  [[nodiscard]] Status cancel(std::int64_t job, const std::string& who = {});
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
@@ -122,6 +125,8 @@ class Trainer {
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
+  /// What the rule lets go of, one small change after the other.
+  void prune(const std::string& cell, const std::stop_token& stop);
   /// Of a store that can be read only now.
   void take_up_late();
   void tell_troubles(std::vector<std::string>& told);

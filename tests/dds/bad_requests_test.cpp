@@ -392,8 +392,8 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_AUDIT,
-                          wire::READ_REPLAY}) {
+  for (const auto what :
+       {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_REPLAY}) {
     expect("what is not built yet", wire::RESULT_UNSUPPORTED, what);
   }
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });
@@ -465,7 +465,7 @@ std::size_t BadRequests::releases() {
   expect("an unknown batch", wire::RESULT_NOT_FOUND, [](Request&) {});
   expect("an unknown action", wire::RESULT_INVALID_ARGUMENT,
          [](Request& r) { r.action(static_cast<wire::ReleaseAction>(3)); });
-  expect("to discard", wire::RESULT_UNSUPPORTED, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
+  expect("to discard an unknown batch", wire::RESULT_NOT_FOUND, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
   expect("nothing", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({}); });
   expect("two at once", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({"lt-07", "lt-08"}); });
   expect("to train from nothing", wire::RESULT_REFUSED, [](Request& r) {

@@ -47,6 +47,7 @@ void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluat
 void add_apply_commands(CLI::App& app, Action& chosen);        // predict, correct
 void add_diagnose_command(CLI::App& app, Action& chosen);
 void add_study_command(CLI::App& app, Action& chosen);
+void add_audit_command(CLI::App& app, Action& chosen);
 void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
 
 }  // namespace trammel::cli

@@ -32,6 +32,7 @@ struct TrainArguments {
   std::optional<std::string> level, bias;
   std::uint64_t seed = 1;
   double validation_share = 0;
+  bool as_read = false;
 };
 
 /// Checks the batch against the model to start from, as the service does before training. Only the refitted sources may
@@ -68,6 +69,7 @@ Status train_model(const TrainArguments& arguments) {
   options.bias = arguments.bias;
   options.seed = arguments.seed;
   options.trained_at = unix_time();
+  options.looked_at = arguments.as_read;
   if (!arguments.from.empty()) {
     Result<CompensatedModel> from = load_model(arguments.from);
     if (!from) return tl::make_unexpected(from.error());
@@ -169,6 +171,8 @@ void add_train(CLI::App& app, Action& chosen) {
                    "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
+  command->add_flag("--as-read", arguments->as_read,
+                    "Learn from the positions as they are read, though another reading of the batch fits better");
   command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });

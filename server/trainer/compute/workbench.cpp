@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "server/calibrate/batch_check.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
@@ -74,12 +75,16 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const auto in_force = this->in_force();
   if (!in_force) return tl::make_unexpected(in_force.error());
   std::string seen;
-  if (task_.hold_against_in_force && *in_force) {
+  if (task_.hold_against_in_force) {
     const auto batch = batches_.first();
     if (!batch) return tl::make_unexpected(batch.error());
-    const Triage triaged = triage((*in_force)->model, *batch);
-    if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
-    if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+    if (const auto doubt = *in_force ? std::nullopt : batch_doubt(batch->rows(), *task_.cell))
+      return Made{std::nullopt, "", sentence(*doubt)};
+    if (*in_force) {
+      const Triage triaged = triage((*in_force)->model, *batch);
+      if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
+      if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+    }
   }
   const auto batch = batches_.to_learn_from();
   if (!batch) return tl::make_unexpected(batch.error());
@@ -152,6 +157,7 @@ TrainOptions Workbench::train_options(const ComputeWatch& watch) const {
   if (!task_.bias.empty()) options.bias = task_.bias;
   options.seed = task_.seed;
   options.trained_at = task_.now;
+  options.looked_at = true;  // by this job, or by whoever asked for a training from batches that he knows
   options.progress = watch.progress;
   return options;
 }

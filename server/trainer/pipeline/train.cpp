@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/calibrate/batch_check.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/orientation_check.h"
 #include "server/compensate/world.h"
@@ -186,6 +187,16 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, con
   return validated(std::move(parts), split);
 }
 
+/// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell file.
+Status check_read(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
+  const Cell known = options.from ? with_known_tools(cell, *options.from, options.refit) : cell;
+  if (options.looked_at) return check_orientations(batch, known);
+  if (!options.from) return check_batch(batch, known);
+  auto doubt = reading_doubt(batch, known);
+  if (!doubt) return {};
+  return Failure(std::move(*doubt)).in("batch " + batch.id);
+}
+
 }  // namespace
 
 Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBatch& batch,
@@ -197,9 +208,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
     const Status fits = check_may_start_from(*options.from, *cell, batch.rows(), options.refit);
     if (!fits) return tl::make_unexpected(fits.error());
   }
-  const Status oriented =
-      check_orientations(batch.rows(), options.from ? with_known_tools(*cell, *options.from, options.refit) : *cell);
-  if (!oriented) return tl::make_unexpected(oriented.error());
+  if (const Status read = check_read(batch.rows(), *cell, options); !read) return tl::make_unexpected(read.error());
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
   if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
 
