@@ -35,8 +35,8 @@ std::string pose_text(const Pose& X) {
 
 std::string difference_text(const ProgramTool& tool, const std::string& name, const Pose& X_FT) {
   return fmt::format("tool {} is {} in the program, {} is {} in the cell: {:.3f} mm and {:.4f} deg apart",
-                     shown(tool.name), pose_text(*tool.X_FT), name, pose_text(X_FT),
-                     to_mm(distance(*tool.X_FT, X_FT)), to_deg(angle(*tool.X_FT, X_FT)));
+                     shown(tool.name), pose_text(*tool.X_FT), name, pose_text(X_FT), to_mm(distance(*tool.X_FT, X_FT)),
+                     to_deg(angle(*tool.X_FT, X_FT)));
 }
 
 /// A load that programs state where they do not know it.
@@ -84,13 +84,21 @@ class Choosing {
 
  private:
   void refuse(const ProgramTool& tool, const std::string& what) {
-    Failure made = refused("{}", what).of("tool " + shown(tool.name));
-    if (!tool.file.empty()) made = std::move(made).in(tool.file).at_row(tool.line);
-    refusals_.push_back(made.value());
+    Error error = refused("{}", what).of("tool " + shown(tool.name)).value();
+    if (!tool.file.empty()) {
+      error.file = tool.file;
+      error.row = tool.line;
+    }
+    refusals_.push_back(std::move(error));
   }
 
   ToolChoice choice(const ProgramTool& tool) {
     ToolChoice choice;
+    // A table says nothing of its tool: it is the cell's, where it has one.
+    if (tool.name.empty() && asked_.empty() && cell_.tools.size() == 1) {
+      choice.tool = cell_.tools.begin()->first;
+      return choice;
+    }
     const auto by_name = asked_.empty() ? named(cell_, tool.name) : cell_.tools.find(asked_);
     if (by_name != cell_.tools.end()) {
       choice.tool = by_name->first;
@@ -135,11 +143,12 @@ class Choosing {
     }
     const auto known = cell_.payloads.find(choice.payload);
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
-    refuse(tool, fmt::format("load of tool {} is {} in the program, payload {} is {} in the cell: {:.3f} kg and {:.1f} mm apart",
-                             shown(tool.name), load_text(tool.load->mass, tool.load->p_F), known->first,
-                             load_text(known->second.mass, known->second.p_FoCog_F),
-                             std::abs(tool.load->mass - known->second.mass),
-                             to_mm((tool.load->p_F - known->second.p_FoCog_F).norm())));
+    refuse(tool,
+           fmt::format(
+               "load of tool {} is {} in the program, payload {} is {} in the cell: {:.3f} kg and {:.1f} mm apart",
+               shown(tool.name), load_text(tool.load->mass, tool.load->p_F), known->first,
+               load_text(known->second.mass, known->second.p_FoCog_F), std::abs(tool.load->mass - known->second.mass),
+               to_mm((tool.load->p_F - known->second.p_FoCog_F).norm())));
   }
 
   const Program& program_;

@@ -16,11 +16,11 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kShareOfSigma = 0.1;         // that rounding may take
-constexpr double kLeastRoundingMm = 1e-6;     // no digits beyond
-constexpr double kDefaultRoundingMm = 1e-3;   // where no sigma is known
-constexpr double kRotationRounding = 1e-6;    // rad: 1 µm at 1 m
-constexpr double kReach = 3;                  // m, the lever of a joint
+constexpr double kShareOfSigma = 0.1;        // that rounding may take
+constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
+constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
+constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
+constexpr double kReach = 3;                 // m, the lever of a joint
 constexpr const char* kSuggestion = "; conf ";
 
 Pose from_wire(const client::PoseMm& pose) {
@@ -51,6 +51,20 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
   return q;
 }
 
+std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes) {
+  if (coordinates == Coordinates::kJointRadians) {
+    for (double& axis : axes) axis = to_deg(axis);
+  }
+  return axes;
+}
+/// Of degrees.
+std::vector<double> axes_of(Coordinates coordinates, std::vector<double> axes) {
+  if (coordinates == Coordinates::kJointRadians) {
+    for (double& axis : axes) axis = from_deg(axis);
+  }
+  return axes;
+}
+
 /// Targets of one tool and payload of the cell, asked for together.
 struct Group {
   std::string tool, payload;
@@ -60,15 +74,19 @@ struct Group {
 class Correcting {
  public:
   Correcting(const Program& program, const Chain& robot, const CellTools& cell, const CorrectProgramOptions& options)
-      : program_(program), arm_(robot), cell_(cell), options_(options), asked_(program.targets.size()),
-        why_not_(program.targets.size()), rows_(program.targets.size()) {}
+      : program_(program),
+        arm_(robot),
+        cell_(cell),
+        options_(options),
+        asked_(program.targets.size()),
+        why_not_(program.targets.size()),
+        rows_(program.targets.size()) {}
 
   Result<CorrectedProgram> correct(const AskCorrections& ask) {
     if (const Status fresh = check_marks(); !fresh) return tl::make_unexpected(fresh.error());
     std::vector<bool> used(program_.tools.size(), false);
     for (const ProgramTarget& target : program_.targets) used[target.tool] = true;
-    Result<std::vector<ToolChoice>> choices =
-        choose_tools(program_, used, cell_, options_.tool, options_.payload);
+    Result<std::vector<ToolChoice>> choices = choose_tools(program_, used, cell_, options_.tool, options_.payload);
     if (!choices) return tl::make_unexpected(choices.error());
     choices_ = std::move(*choices);
     note_tools();
@@ -141,8 +159,8 @@ class Correcting {
       return;
     }
     client::TargetMm& asked = asked_[t];
-    if (target.coordinates == Coordinates::kJoints) {
-      const auto q = arm_.from_axes(target.numbers, target.external);
+    if (is_joints(target.coordinates)) {
+      const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
       if (!q) {
         why_not_[t] = "the program does not say where the rail is";
         return;
@@ -188,7 +206,11 @@ class Correcting {
     row.folded = target.folded;
     row.status = "refused";
     row.message = why_not_[t];
-    if (target.coordinates != Coordinates::kJoints)
+    if (is_joints(target.coordinates) && joints_of_.contains(t)) {
+      const Pose X_FT = cell_.tools.at(choices_[target.tool].tool);
+      row.p_B = (arm_.robot().flange_pose(joints_of_[t]) * X_FT).translation();
+    }
+    if (!is_joints(target.coordinates))
       row.p_B = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers).translation();
   }
 
@@ -200,8 +222,10 @@ class Correcting {
       const auto same = std::find_if(groups.begin(), groups.end(), [&](const Group& group) {
         return group.tool == choice.tool && group.payload == choice.payload;
       });
-      if (same == groups.end()) groups.push_back({choice.tool, choice.payload, {t}});
-      else same->targets.push_back(t);
+      if (same == groups.end())
+        groups.push_back({choice.tool, choice.payload, {t}});
+      else
+        same->targets.push_back(t);
     }
     for (const Group& group : groups) {
       std::vector<client::TargetMm> targets;
@@ -245,8 +269,8 @@ class Correcting {
       if (arm_.robot().joint(j).type == JointType::kRevolute) row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
     }
     const std::vector<double> exact =
-        target.coordinates == Coordinates::kJoints
-            ? arm_.to_axes(q)
+        is_joints(target.coordinates)
+            ? axes_of(target.coordinates, arm_.to_axes(q))
             : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
     write(target, exact, row);
     row.rounding_mm = rounding(target, exact, row.after, q, X_TF);
@@ -260,6 +284,8 @@ class Correcting {
     switch (target.coordinates) {
       case Coordinates::kJoints:
         return to_deg(from_mm(mm) / kReach);
+      case Coordinates::kJointRadians:
+        return from_mm(mm) / kReach;
       case Coordinates::kRotationVector:
         return value < 3 ? from_mm(mm) : kRotationRounding;
       case Coordinates::kQuaternion:
@@ -277,9 +303,8 @@ class Correcting {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
         const NumberStyle style =
-            options_.keep_digits
-                ? slot.style
-                : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
+            options_.keep_digits ? slot.style
+                                 : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
         text += number + rewrite.texts[k + 1];
@@ -292,22 +317,24 @@ class Correcting {
   /// mm, of the tool.
   [[nodiscard]] double rounding(const ProgramTarget& target, const std::vector<double>& exact,
                                 const std::vector<double>& written, const JointVector& q, const Pose& X_TF) const {
-    if (target.coordinates != Coordinates::kJoints) {
-      return to_mm((pose_of(target.coordinates, written).translation() -
-                    pose_of(target.coordinates, exact).translation())
-                       .norm());
+    if (!is_joints(target.coordinates)) {
+      return to_mm(
+          (pose_of(target.coordinates, written).translation() - pose_of(target.coordinates, exact).translation())
+              .norm());
     }
-    std::map<int, double> external = target.external;
-    const auto rounded = arm_.from_axes(written, external);
+    const auto rounded = arm_.from_axes(in_degrees(target.coordinates, written), target.external);
     if (!rounded) return 0;
     const Pose X_FT = X_TF.inverse();
-    return to_mm(((arm_.robot().flange_pose(*rounded) * X_FT).translation() -
-                  (arm_.robot().flange_pose(q) * X_FT).translation())
-                     .norm());
+    return to_mm(
+        ((arm_.robot().flange_pose(*rounded) * X_FT).translation() - (arm_.robot().flange_pose(q) * X_FT).translation())
+            .norm());
   }
 
   CorrectedProgram finish() {
     result_.moves = program_.moves.size();
+    for (std::size_t m = program_.moves.size(); m-- > 0;) {
+      for (const std::size_t t : program_.moves[m].targets) rows_[t].order = m;
+    }
     for (const ProgramMove& move : program_.moves) {
       const bool corrected = !move.targets.empty() && std::all_of(move.targets.begin(), move.targets.end(),
                                                                   [&](std::size_t t) { return rows_[t].corrected(); });

@@ -33,11 +33,11 @@ struct ReceiptRow {
   std::string name, file, motion, tool, frame;
   int line = 0;
   std::vector<int> used_at;
-  std::string status;                ///< `ok`, `out_of_domain`, ...; `refused` where the program leaves it open
+  std::string status;  ///< `ok`, `out_of_domain`, ...; `refused` where the program leaves it open
   std::string message, suggestion;
   Coordinates coordinates = Coordinates::kQuaternion;
-  std::vector<double> before, after; ///< numbers of the file, in its units; `after` as written, empty: left alone
-  std::vector<double> joints;        ///< deg, mm: what the controller will take; empty: left alone
+  std::vector<double> before, after;  ///< numbers of the file, in its units; `after` as written, empty: left alone
+  std::vector<double> joints;         ///< deg, mm: what the controller will take; empty: left alone
   double error_before_mm = kNotKnown, error_after_mm = kNotKnown;
   double sigma_mm = kNotKnown;           ///< of the true error, per axis
   double sigma_measured_mm = kNotKnown;  ///< of one measurement
@@ -45,6 +45,7 @@ struct ReceiptRow {
   int iterations = 0;
   bool folded = false;
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, the wanted position
+  std::size_t order = 0;                       ///< of its first motion in the program
 
   [[nodiscard]] bool corrected() const { return !after.empty(); }
 };

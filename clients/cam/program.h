@@ -29,9 +29,10 @@ enum class Coordinates {
   kAnglesZyx,       ///< x y z mm, deg about Z, the new Y, the new X (KUKA A B C)
   kAnglesXyz,       ///< x y z mm, deg about X, Y, Z as they stand (FANUC W P R, Yaskawa Rx Ry Rz)
   kRotationVector,  ///< x y z m, rotation vector rad (Universal Robots)
-  kJoints           ///< as the dialect counts them: deg, mm of a rail
+  kJoints,          ///< axes of the arm, deg
+  kJointRadians     ///< the same, rad
 };
-[[nodiscard]] std::size_t position_count(Coordinates coordinates);  ///< 3; of joints 0
+[[nodiscard]] bool is_joints(Coordinates coordinates);
 
 /// A number that is written anew.
 struct Slot {
@@ -48,23 +49,25 @@ struct Rewrite {
 /// What a program says of the arm's configuration at a target. Candidates are the closed-form solutions of a spherical
 /// wrist; a dialect scores them.
 struct Configuration {
-  std::optional<int> conf;                   ///< 0..7 as inverse_kinematics.h numbers it
-  std::vector<std::optional<double>> near;   ///< rad, a value of each joint to be near to; empty: not said
-  std::vector<std::optional<int>> signs;     ///< of each joint: -1 negative, +1 not; empty: not said
-  std::optional<bool> behind_axis_1;         ///< wrist centre behind axis 1
-  std::optional<bool> elbow_up;              ///< the higher of the two elbows
-  std::optional<bool> larger_joint_3;        ///< of the two elbows the one with the larger joint 3
-  std::optional<bool> bends_down;            ///< with joint 4 near zero the wrist would bend the tool downward
+  std::optional<int> conf;                  ///< 0..7 as inverse_kinematics.h numbers it
+  std::vector<std::optional<double>> near;  ///< rad, a value of each joint to be near to; empty: not said
+  std::vector<std::optional<int>> turns;    ///< of each joint: 0 within ±180 deg, 1 a turn above, -1 below
+  std::vector<std::optional<int>> signs;    ///< of each joint: -1 negative, +1 not; empty: not said
+  std::optional<bool> behind_axis_1;        ///< wrist centre behind axis 1
+  std::optional<bool> elbow_up;             ///< the higher of the two elbows
+  std::optional<bool> larger_joint_3;       ///< of the two elbows the one with the larger joint 3
+  std::optional<bool> bends_down;           ///< with joint 4 near zero the wrist would bend the tool downward
 
   [[nodiscard]] bool said() const {
-    return conf || !near.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 || bends_down;
+    return conf || !near.empty() || !turns.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 ||
+           bends_down;
   }
 };
 
 /// A load as a program states it.
 struct StatedLoad {
-  double mass = 0;                  ///< kg
-  Vector3 p_F = Vector3::Zero();    ///< centre of gravity, m, in F
+  double mass = 0;                ///< kg
+  Vector3 p_F = Vector3::Zero();  ///< centre of gravity, m, in F
 };
 
 /// A tool as the program has it.
@@ -72,10 +75,10 @@ struct ProgramTool {
   std::string name;
   std::string file;  ///< empty: not in the files handed over
   int line = 0;
-  std::optional<Pose> X_FT;          ///< empty: not known
+  std::optional<Pose> X_FT;  ///< empty: not known
   std::optional<StatedLoad> load;
-  double rotation_rounding = 0;      ///< rad, what its digits leave open
-  std::string why_not;               ///< why its targets cannot be corrected; empty: they can
+  double rotation_rounding = 0;  ///< rad, what its digits leave open
+  std::string why_not;           ///< why its targets cannot be corrected; empty: they can
 };
 
 /// A frame that targets are given in, seen from the robot's base.
@@ -87,21 +90,21 @@ struct ProgramFrame {
 
 /// A target that may be corrected.
 struct ProgramTarget {
-  std::string name;              ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
-  std::size_t file = 0;          ///< where it is written anew
-  int line = 0;                  ///< of that place, from 1
-  std::string motion;            ///< `MoveL`, of its first use
-  std::vector<int> used_at;      ///< lines of the motions to it, in the file of each
+  std::string name;          ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
+  std::size_t file = 0;      ///< where it is written anew
+  int line = 0;              ///< of that place, from 1
+  std::string motion;        ///< `MoveL`, of its first use
+  std::vector<int> used_at;  ///< lines of the motions to it, in the file of each
   std::size_t tool = 0, frame = 0;
   Coordinates coordinates = Coordinates::kQuaternion;
-  std::vector<double> numbers;   ///< of the whole pose, in the dialect's units
+  std::vector<double> numbers;  ///< of the whole pose, in the dialect's units
   Configuration configuration = {};
   std::map<int, double> external;  ///< mm or deg as stated, by axis from 0
   std::vector<Rewrite> rewrites;
-  bool folded = false;           ///< was computed by the program from other targets
-  std::string comment;           ///< a line to insert above `comment_at`, without its end; empty: none
-  std::size_t comment_at = 0;    ///< first byte of a line
-  bool linear = false;           ///< the tool's path to it is a line or an arc
+  bool folded = false;         ///< was computed by the program from other targets
+  std::string comment;         ///< a line to insert above `comment_at`, without its end; empty: none
+  std::size_t comment_at = 0;  ///< first byte of a line
+  bool linear = false;         ///< the tool's path to it is a line or an arc
 };
 
 /// What is left as it was.
@@ -126,7 +129,7 @@ struct MarkPlace {
   std::size_t at = 0;       ///< first byte of the line that it goes above
   std::string begin = "!";  ///< of the comment
   std::string end = {};
-  bool a_line_each = false; ///< for each word of the mark
+  bool a_line_each = false;  ///< for each word of the mark
 };
 
 struct Program {
@@ -141,8 +144,9 @@ struct Program {
 };
 
 struct ReadOptions {
-  bool split = false;        ///< a target that is used with two tools or frames becomes two
-  bool keep_joints = false;  ///< joint targets stay as they are
+  bool split = false;                       ///< a target that is used with two tools or frames becomes two
+  bool keep_joints = false;                 ///< joint targets stay as they are
+  std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
 };
 
 /// The number of the line of a byte, from 1.
@@ -153,6 +157,7 @@ struct ReadOptions {
 /// The pose that the numbers say, in the target's frame. Joints have none.
 [[nodiscard]] Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers);
 /// The reverse; angles and quaternions nearest to `like`, the numbers that it replaces.
-[[nodiscard]] std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const std::vector<double>& like);
+[[nodiscard]] std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose,
+                                             const std::vector<double>& like);
 
 }  // namespace trammel::cam

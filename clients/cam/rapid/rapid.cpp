@@ -19,6 +19,8 @@ namespace {
 using namespace rapid;
 using Kind = Expression::Kind;
 
+constexpr const char* kToolArgument = "tool";  // `\Tool:=`
+
 bool is_search(const std::string& name) { return name.starts_with("search"); }
 
 /// Instructions of the controller that move the tool to the targets which they are given.
@@ -151,7 +153,8 @@ class Reader {
   Told<Data> named(const Expression& argument, const Scope& scope) const {
     const Told<std::vector<Data>> data = meaning_->data_of(argument, scope);
     if (!data) return because(data.error());
-    if (data->size() != 1) return because(fmt::format("an index chooses {}", shown(meaning_->text_of(argument, scope))));
+    if (data->size() != 1)
+      return because(fmt::format("an index chooses {}", shown(meaning_->text_of(argument, scope))));
     return data->front();
   }
 
@@ -167,6 +170,7 @@ class Reader {
     tool.name = meaning_->text_of(*expression, *where);
     if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
       if (expression->name == "tool0") tool.X_FT = Pose::Identity();
+      if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
       return known_tool(std::move(tool));
     }
     const Told<Data> data = named(*expression, *where);
@@ -214,7 +218,12 @@ class Reader {
     frame.name = meaning_->text_of(*expression, *where);
     if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
       if (expression->name == "wobj0") return 0;
-      frame.why_not = fmt::format("work object {} is not in the files handed over", shown(frame.name));
+      if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
+        frame.X_BO = given->second;
+      } else {
+        frame.why_not =
+            fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
+      }
       return known_frame(std::move(frame));
     }
     const Told<Data> data = named(*expression, *where);
@@ -254,8 +263,8 @@ class Reader {
       program_.left.push_back({name, module, motion.line, motion.spelled, why});
   }
 
-  /// From PDispOn or PDispSet to PDispOff in the text of a routine, targets are displaced. Where it is not switched off,
-  /// all motions may be.
+  /// From PDispOn or PDispSet to PDispOff in the text of a routine, targets are displaced. Where it is not switched
+  /// off, all motions may be.
   void note_displacements() {
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       std::map<int, std::string> open;
@@ -285,9 +294,10 @@ class Reader {
     for (const Expression& argument : motion.arguments) {
       if (argument.label.empty()) positional.push_back(&argument);
       if (argument.label == "wobj") frame = &argument;
-      if (argument.label == "tool") tool = &argument;
+      if (argument.label == kToolArgument) tool = &argument;
     }
     if (positional.empty()) return;
+    for (const Expression* argument : positional) note_names(*argument);
     const std::string first = meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]);
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
     const auto displaced = displaced_.find(&motion);
@@ -327,8 +337,8 @@ class Reader {
       if (meaning_->type_of(*handed->first, *handed->second) == "tooldata") return argument;
       if (argument->kind == Kind::kName && argument->name == "tool0") return argument;
     }
-    const bool signal_last = motion.name.ends_with("do") || motion.name.ends_with("ao") || motion.name.ends_with("go") ||
-                             motion.name.ends_with("sync");
+    const bool signal_last = motion.name.ends_with("do") || motion.name.ends_with("ao") ||
+                             motion.name.ends_with("go") || motion.name.ends_with("sync");
     if (positional.size() < 3 || signal_last) return nullptr;
     return positional.back()->kind == Kind::kName ? positional.back() : nullptr;
   }
@@ -341,8 +351,9 @@ class Reader {
     const auto& [expression, where] = *handed;
     const bool written_here = expression->kind == Kind::kAggregate || expression->kind == Kind::kCall;
     const Told<std::vector<Data>> all =
-        written_here ? Told<std::vector<Data>>(std::vector<Data>{{expression, where, joints ? "jointtarget" : "robtarget"}})
-                     : meaning_->data_of(*expression, *where);
+        written_here
+            ? Told<std::vector<Data>>(std::vector<Data>{{expression, where, joints ? "jointtarget" : "robtarget"}})
+            : meaning_->data_of(*expression, *where);
     if (!all) return leave(module, motion, name, all.error());
     for (const Data& data : *all) {
       const std::size_t of = data.scope->module;
@@ -377,13 +388,17 @@ class Reader {
       const auto same = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
         return group[0]->tool == use.tool && group[0]->frame == use.frame;
       });
-      if (same == groups.end()) groups.push_back({&use});
-      else same->push_back(&use);
+      if (same == groups.end())
+        groups.push_back({&use});
+      else
+        same->push_back(&use);
     }
     if (groups.size() > 1 && !options_.split) return leave_ambiguous(site, groups);
     for (std::size_t k = 0; k < groups.size(); ++k) {
-      if (k == 0) add_target(site, groups[k], site.uses.front().data);
-      else split_off(site, groups[k]);
+      if (k == 0)
+        add_target(site, groups[k], site.uses.front().data);
+      else
+        split_off(site, groups[k]);
     }
   }
 
@@ -395,9 +410,9 @@ class Reader {
                                  meaning_->place_of(group[0]->module, group[0]->motion->line)));
     }
     const Use& first = site.uses.front();
-    program_.left.push_back({site.name, site.module, first.data.node->line, first.motion->spelled,
-                             fmt::format("it is used in different ways: {}; --split makes a target of each",
-                                         fmt::join(ways, ", "))});
+    program_.left.push_back(
+        {site.name, site.module, first.data.node->line, first.motion->spelled,
+         fmt::format("it is used in different ways: {}; --split makes a target of each", fmt::join(ways, ", "))});
   }
 
   /// The argument of each motion becomes a target of its own.
@@ -407,7 +422,8 @@ class Reader {
       if (!done.insert(use->motion).second) continue;
       const Expression* argument = nullptr;
       for (const Expression& candidate : use->motion->arguments) {
-        if (candidate.label.empty() && meaning_->text_of(candidate, own(use->module)) == site.name) argument = &candidate;
+        if (candidate.label.empty() && meaning_->text_of(candidate, own(use->module)) == site.name)
+          argument = &candidate;
       }
       if (argument == nullptr || argument->kind == Kind::kElement) {
         leave(use->module, *use->motion, site.name, "it is used with another tool or frame too, and cannot be split");
@@ -422,7 +438,8 @@ class Reader {
   const Scope& own(std::size_t module) { return own_.emplace(module, Scope{module, -1}).first->second; }
 
   /// Writes the target at `place`, or where `data` stands.
-  void add_target(const Site& site, const std::vector<const Use*>& uses, const Data& data, const Data* place = nullptr) {
+  void add_target(const Site& site, const std::vector<const Use*>& uses, const Data& data,
+                  const Data* place = nullptr) {
     const Use& first = *uses.front();
     ProgramTarget target;
     target.name = site.name;
@@ -555,7 +572,8 @@ class Reader {
     whole.texts.back() += "],[";
     add_numbers(3, 4, std::max(value.rotation_decimals, 6), whole);
     std::vector<std::string> external;
-    for (const double axis : value.external) external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
+    for (const double axis : value.external)
+      external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
     whole.texts.back() += fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
     target.rewrites.push_back(std::move(whole));
   }
@@ -569,16 +587,16 @@ class Reader {
         const Expression& value = *declared.value;
         const auto site = sites_.lower_bound({m, value.begin});
         const bool used = site != sites_.end() && site->first.first == m && site->first.second < value.end;
-        if (used || mentioned(declared.name)) continue;
+        if (used || named_.contains(declared.name)) continue;
         program_.left.push_back({declared.name, m, declared.line, "", "no motion in these files goes to it"});
       }
     }
   }
 
-  /// Whether what uses it is listed already.
-  [[nodiscard]] bool mentioned(const std::string& name) const {
-    return std::any_of(program_.left.begin(), program_.left.end(),
-                       [&](const LeftAlone& left) { return in_lower_case(left.name).find(name) != std::string::npos; });
+  /// The names in what motions go to: what becomes of them is told there.
+  void note_names(const Expression& expression) {
+    if (expression.kind == Kind::kName) named_.insert(expression.name);
+    for (const Expression& part : expression.parts) note_names(part);
   }
 
   ReadOptions options_;
@@ -588,6 +606,7 @@ class Reader {
   std::map<std::pair<std::size_t, std::size_t>, Site> sites_;
   std::map<std::size_t, Scope> own_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
+  std::set<std::string> named_;
   std::string open_displacement_;
   std::map<const Instruction*, std::string> displaced_;
 };

@@ -9,11 +9,12 @@
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/receipt_page.h"
 #include "clients/cli/text/receipt_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
-#include "server/base/unix_time.h"
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
 
@@ -30,9 +31,7 @@ std::string today() {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-cam::CellTools tools_of(const CompensatedModel& model) {
-  return {model.parts().physics.tools, model.cell().payloads};
-}
+cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
 
 /// As a server reads it, so that both give the same bytes.
 Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
@@ -121,13 +120,13 @@ Result<cam::CorrectedProgram> correct_by_service(const cam::Program& program,
       context.tool = tool;
       context.payload = payload;
       if (reference->version > 0) context.model = fmt::format("@{}", reference->version);
-      auto answer = (*session)->correct_targets(context, targets,
-                                                [&](double share) { progress.show("correcting", share); });
+      auto answer =
+          (*session)->correct_targets(context, targets, [&](double share) { progress.show("correcting", share); });
       another |= answer && answer->model.hash != model->provenance().hash;
       return answer;
     };
-    Result<cam::CorrectedProgram> corrected = cam::correct_program(
-        program, model->cell().robot, tools_of(*model), ask, options_of(arguments));
+    Result<cam::CorrectedProgram> corrected =
+        cam::correct_program(program, model->cell().robot, tools_of(*model), ask, options_of(arguments));
     if (!another) return corrected;
   }
   return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", reference->cell, kAttempts);
@@ -163,10 +162,23 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
 }
 
 Status write_receipts(const cam::CorrectedProgram& corrected, const CorrectProgramArguments& arguments) {
+  if (!arguments.report.empty()) {
+    const Status written = write_output(arguments.report, receipt_page(corrected, arguments.tolerance_mm));
+    if (!written) return written;
+  }
   if (!arguments.receipt.empty()) {
     if (const Status written = write_output(arguments.receipt, receipt_csv(corrected)); !written) return written;
   }
-  return write_json(arguments.json, receipt_json(corrected));
+  nlohmann::ordered_json json = receipt_json(corrected);
+  if (arguments.tolerance_mm > 0) {
+    const ToleranceVerdict verdict = tolerance_verdict(corrected, arguments.tolerance_mm);
+    json["tolerance"] = {{"tolerance_mm", verdict.tolerance_mm},
+                         {"targets", verdict.targets},
+                         {"inside_before", verdict.before},
+                         {"inside_after", verdict.after},
+                         {"expected_inside_after", verdict.expected_after}};
+  }
+  return write_json(arguments.json, json);
 }
 
 }  // namespace
@@ -179,17 +191,23 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (!files) return tl::make_unexpected(files.error());
   const auto paths = output_paths(*files, arguments.output);
   if (!paths) return tl::make_unexpected(paths.error());
-  const cam::Program program =
-      cam::read_program(files->dialect, files->files, {arguments.split, arguments.keep_joints});
+  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}};
+  if (!arguments.frames.empty()) {
+    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
+    if (!frames) return tl::make_unexpected(frames.error());
+    reading.frames = std::move(*frames);
+  }
+  const cam::Program program = cam::read_program(files->dialect, files->files, reading);
   const Result<cam::CorrectedProgram> corrected =
       arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments);
   if (!corrected) return tl::make_unexpected(corrected.error());
   const std::string left = left_alone_text(*corrected);
-  if (arguments.strict && !left.empty())
-    return refused("nothing is written: {}", left.substr(0, left.size() - 1));
+  if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
   if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
     return tl::make_unexpected(written.error());
-  fmt::print(stderr, "{}", shown_lines(receipt_summary(*corrected) + left));
+  std::string told = receipt_summary(*corrected) + left;
+  if (arguments.tolerance_mm > 0) told += verdict_text(tolerance_verdict(*corrected, arguments.tolerance_mm)) + "\n";
+  fmt::print(stderr, "{}", shown_lines(told));
   if (const Status written = write_receipts(*corrected, arguments); !written)
     return tl::make_unexpected(written.error());
   return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;

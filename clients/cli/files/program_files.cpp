@@ -8,6 +8,8 @@
 
 #include "clients/cam/mark.h"
 #include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
 
 namespace trammel::cli {
 
@@ -29,7 +31,8 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
     if (!it->is_regular_file(error)) continue;
     const std::string path = it->path().string();
     const auto dialect = cam::dialect_of_file(path);
-    if (dialect && (!wanted || dialect == wanted)) found.push_back({fs::relative(it->path(), folder, error).string(), path});
+    if (dialect && (!wanted || dialect == wanted))
+      found.push_back({fs::relative(it->path(), folder, error).string(), path});
   }
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
   return found;
@@ -107,7 +110,8 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
     if (!mark) continue;
     any = true;
     const std::string kept = cam::original_path(before.paths[k]);
-    Result<std::string> text = before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
+    Result<std::string> text =
+        before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
     if (!text) {
       return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
           .in(before.paths[k])
@@ -121,18 +125,46 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
   return before;
 }
 
+Result<std::map<std::string, Pose>> read_frames_csv(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::make_unexpected(text.error());
+  const Result<CsvTable> table = CsvTable::parse(*text, path);
+  if (!table) return tl::make_unexpected(table.error());
+  const Result<std::size_t> name = table->require("name");
+  if (!name) return tl::make_unexpected(name.error());
+  const auto columns = table->all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
+  if (!columns) return tl::make_unexpected(columns.error());
+  if (columns->empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
+  std::map<std::string, Pose> frames;
+  for (std::size_t row = 0; row < table->size(); ++row) {
+    Vector3 p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Result<double> value = table->number(row, (*columns)[k], 1e6);
+      if (!value) return tl::make_unexpected(value.error());
+      p(static_cast<Eigen::Index>(k)) = from_mm(*value);
+    }
+    const Result<Matrix3> R = table->rotation(row, {columns->begin() + 3, columns->end()});
+    if (!R) return tl::make_unexpected(R.error());
+    if (!frames.emplace(table->field(row, *name), make_pose(*R, p)).second)
+      return table->refuse(row, "{} is there twice", table->field(row, *name)).of("name");
+  }
+  return frames;
+}
+
 Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {
   std::vector<std::string> paths;
   std::error_code error;
-  const bool folder = program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) ||
-                      output.ends_with('/');
+  const bool folder =
+      program.files.size() > 1 || program.from_folder || fs::is_directory(output, error) || output.ends_with('/');
   if (folder && output == "-") {
     return failure(ErrorCode::kUsage, "{} files do not go to standard output", program.files.size())
         .of("--output")
         .next("name a folder");
   }
   if (folder && fs::exists(output, error) && !fs::is_directory(output, error)) {
-    return failure(ErrorCode::kUsage, "a folder is needed for {} files", program.files.size()).in(output).of("--output");
+    return failure(ErrorCode::kUsage, "a folder is needed for {} files", program.files.size())
+        .in(output)
+        .of("--output");
   }
   for (std::size_t k = 0; k < program.files.size(); ++k) {
     paths.push_back(folder ? (fs::path(output) / program.files[k].name).string() : output);

@@ -17,9 +17,7 @@ using nlohmann::ordered_json;
 constexpr std::size_t kNumbers = 7;  // of the longest kind of target
 
 /// Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
-std::string millimetres(double value) {
-  return std::isfinite(value) ? fmt::format("{:.5f}", value) : "";
-}
+std::string millimetres(double value) { return std::isfinite(value) ? fmt::format("{:.5f}", value) : ""; }
 
 std::string numbers(const std::vector<double>& values) {
   std::string text;
@@ -39,6 +37,8 @@ const char* spelled(cam::Coordinates coordinates) {
       return "m_rotvec_rad";
     case cam::Coordinates::kJoints:
       return "joints_deg";
+    case cam::Coordinates::kJointRadians:
+      return "joints_rad";
   }
   return "";
 }
@@ -58,8 +58,9 @@ std::string receipt_csv(const CorrectedProgram& program) {
   std::string text = "file,line,name,motion,used_at,tool,frame,status,folded,units";
   for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",before_{}", k);
   for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",after_{}", k);
-  text += ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
-          "model_id,message,suggestion\n";
+  text +=
+      ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
+      "model_id,message,suggestion\n";
   for (const ReceiptRow& row : program.rows) {
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
                         csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
@@ -68,8 +69,8 @@ std::string receipt_csv(const CorrectedProgram& program) {
     text += numbers(row.before) + numbers(row.after);
     for (Eigen::Index k = 0; k < 3; ++k)
       text += (std::isfinite(row.p_B(k)) ? fmt::format("{:.4f}", to_mm(row.p_B(k))) : "") + ",";
-    for (const double value : {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm,
-                               row.rounding_mm}) {
+    for (const double value :
+         {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm}) {
       text += millimetres(value) + ",";
     }
     text += fmt::format("{},{},{},{},{}\n", domain_of(row), row.iterations, program.model_id, csv_field(row.message),
@@ -94,8 +95,7 @@ ordered_json receipt_json(const CorrectedProgram& program) {
       item["joints"] = row.joints;
       item["folded"] = row.folded;
     }
-    if (std::isfinite(row.p_B.x()))
-      item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+    if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
     item["error_before_mm"] = json_mm(row.error_before_mm);
     item["error_after_mm"] = json_mm(row.error_after_mm);
     item["sigma_mm"] = json_mm(row.sigma_mm);
@@ -108,12 +108,8 @@ ordered_json receipt_json(const CorrectedProgram& program) {
   ordered_json inserted = ordered_json::array();
   for (const cam::InsertedLine& line : program.inserted)
     inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
-  return {{"model", program.model_id},
-          {"moves", program.moves},
-          {"moves_corrected", program.moves_corrected},
-          {"left_alone", program.left_alone()},
-          {"notes", program.notes},
-          {"targets", rows},
+  return {{"model", program.model_id},          {"moves", program.moves}, {"moves_corrected", program.moves_corrected},
+          {"left_alone", program.left_alone()}, {"notes", program.notes}, {"targets", rows},
           {"inserted_lines", inserted}};
 }
 
