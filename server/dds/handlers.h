@@ -90,6 +90,7 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> quarantine_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
 
   Trainer& trainer_;
   Store& store_;

@@ -7,6 +7,7 @@
 #include "server/calibrate/orientation_check.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/split.h"
+#include "server/trainer/pipeline/among_twins.h"
 #include "server/trainer/pipeline/bias_learning.h"
 #include "server/trainer/pipeline/extrapolation.h"
 #include "server/trainer/pipeline/given_up.h"
@@ -37,7 +38,8 @@ Result<CalibrationResult> identify(const std::shared_ptr<const Cell>& cell, cons
                                    const TrainOptions& options) {
   const Result<std::vector<std::string>> sources = sources_of(*cell, options);
   if (!sources) return tl::make_unexpected(sources.error());
-  return calibrate(cell, *sources, batch, {});
+  return options.fleet ? calibrate_among_twins(cell, *sources, batch, *options.fleet)
+                       : calibrate(cell, *sources, batch, {});
 }
 
 /// What to take the arm's temperature for where a request does not say it.
