@@ -70,6 +70,8 @@ int run_command_line(int argc, const char* const* argv) {
   add_structure_commands(app, chosen);
   add_model_commands(app, chosen);
   add_apply_commands(app, chosen);
+  add_check_command(app, chosen);
+  add_fleet_command(app, chosen);
   add_diagnose_command(app, chosen);
   add_study_command(app, chosen);
   add_service_commands(app, chosen);

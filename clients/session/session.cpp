@@ -70,6 +70,7 @@ struct Session::Participant {
   std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
   std::unique_ptr<Caller<wire::Train>> train;
   std::unique_ptr<Caller<wire::Diagnose>> diagnose;
+  std::unique_ptr<Caller<wire::CheckHealth>> check_health;
   std::unique_ptr<Caller<wire::ReadModels>> read_models;
   std::unique_ptr<Caller<wire::ManageModels>> manage_models;
   std::unique_ptr<Caller<wire::ReleaseBatches>> release_batches;
@@ -232,9 +233,9 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
      ...);
     return opened;
   };
-  const Status opened =
-      open_all(inside->predict_error, inside->correct_target, inside->submit_measurements, inside->train,
-               inside->diagnose, inside->read_models, inside->manage_models, inside->release_batches);
+  const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
+                                 inside->train, inside->diagnose, inside->check_health, inside->read_models,
+                                 inside->manage_models, inside->release_batches);
   if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
@@ -338,6 +339,21 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   return reply->job();
 }
 
+Result<std::int64_t> Session::check_health(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                           double tolerance_mm, const ChangeOptions& change) {
+  if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  wire::CheckHealthRequest request;
+  request.about().cell(cell);
+  request.change_id(change_id(change));
+  request.batch_id(batch_id);
+  request.csv(csv);
+  request.tolerance_mm(tolerance_mm);
+  const auto reply =
+      participant_->call<wire::CheckHealth>(*participant_->check_health, std::move(request), Route{cell, {}, true});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job();
+}
+
 Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
@@ -398,6 +414,14 @@ Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int6
   std::vector<AuditText> texts;
   for (const wire::ReadModelsReply& reply : *replies)
     texts.push_back({reply.header().server().to_string(), reply.text()});
+  return texts;
+}
+
+Result<std::vector<std::string>> Session::fleet() {
+  const auto replies = participant_->read_all("", wire::READ_FLEET);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::string> texts;
+  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
   return texts;
 }
 

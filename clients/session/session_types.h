@@ -118,7 +118,7 @@ struct AuditText {
 /// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
 struct DatedJob {
   JobStatus status;
-  std::string server, kind;  ///< kind: `train diagnose`
+  std::string server, kind;  ///< kind: `train diagnose check`
   std::vector<std::string> batches;
   std::int64_t created_unix_s = 0;
   std::optional<std::int64_t> started_unix_s, finished_unix_s;

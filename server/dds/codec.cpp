@@ -232,9 +232,25 @@ wire::Job to_wire(const JobProgress& progress) {
   return job;
 }
 
+namespace {
+
+wire::JobKind to_wire(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return wire::JOB_TRAINING_OF_BATCHES;
+    case JobKind::kDiagnose:
+      return wire::JOB_DIAGNOSIS;
+    case JobKind::kCheck:
+      return wire::JOB_CHECK;
+  }
+  return wire::JOB_TRAINING_OF_BATCHES;
+}
+
+}  // namespace
+
 wire::Job to_wire(const Trainer::DatedJob& dated) {
   wire::Job job = to_wire(dated.progress);
-  job.kind(dated.asked.kind == JobKind::kDiagnose ? wire::JOB_DIAGNOSIS : wire::JOB_TRAINING_OF_BATCHES);
+  job.kind(to_wire(dated.asked.kind));
   job.batch_ids(dated.asked.batch_ids);
   job.created_unix_s(dated.asked.created_at);
   job.started_unix_s(dated.asked.started_at.value_or(kNoTime));

@@ -87,6 +87,7 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> audit_of(const std::string& cell, std::int64_t since,
                                                        std::size_t most) const;
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
 
   Trainer& trainer_;
   Store& store_;

@@ -6,6 +6,7 @@
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/report/fleet_json.h"
 #include "server/store/audit_json.h"
 
 namespace trammel {
@@ -33,6 +34,7 @@ Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
                       request.what() == wire::READ_AUDIT;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
+  if (request.what() == wire::READ_FLEET) return fleet();
   if (request.what() > wire::READ_FINDINGS && request.what() != wire::READ_AUDIT)
     return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
@@ -146,6 +148,29 @@ Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int6
   if (const Status fits = check_fits(fmt::format("what job {} found", job), bytes); !fits)
     return Failure(fits.error()).next("ask without the page");
   reply.text(std::move(found->findings));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::fleet() const {
+  std::map<std::string, std::string> checks;  // the last of each cell
+  const auto jobs = trainer_.jobs("");
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  for (const Trainer::DatedJob& job : *jobs) {
+    if (job.asked.kind != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
+    if (const auto found = trainer_.diagnosis(job.asked.id)) checks[job.asked.cell] = found->findings;
+  }
+  std::vector<FleetEntry> cells;
+  for (const auto& [name, cell] : trainer_.cells()) {
+    FleetEntry entry{name, 0, std::nullopt, checks[name]};
+    if (const auto served = registry_.in_force(name)) {
+      entry.version = served->version;
+      entry.model = served->model;
+    }
+    cells.push_back(std::move(entry));
+  }
+  ReadModelsReply reply;
+  reply.text(fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (const Status fits = check_fits("the fleet", reply.text().size()); !fits) return tl::make_unexpected(fits.error());
   return reply;
 }
 

@@ -9,6 +9,7 @@
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
 #include "server/robot/cell_row.h"
+#include "server/robot/cell_rules.h"
 
 namespace trammel {
 
@@ -206,9 +207,27 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
   });
 }
 
+CellRules read_rules(const YamlMap& map) {
+  CellRules rules;
+  map.attempt([&] {
+    if (map.is_null("tolerance_mm")) return;
+    const double tolerance = map.number("tolerance_mm");
+    if (!(tolerance > 0)) map.refuse("tolerance_mm", refused("expected more than 0").beyond(tolerance, 0));
+    rules.tolerance = tolerance * from_mm(1);
+  });
+  map.attempt([&] {
+    if (!map.has("prior")) return;
+    const std::string prior = map.text("prior");
+    if (prior != "fleet" && prior != "none")
+      map.refuse("prior", refused("'{}', expected fleet or none", prior).with_text(prior));
+    rules.fleet_prior = prior == "fleet";
+  });
+  return rules;
+}
+
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm", "sessions"});
+            "workspace_mm", "sessions", "tolerance_mm", "prior"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -225,6 +244,7 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { read_tools(map, cell); });
   map.attempt([&] { read_payloads(map, cell); });
   map.attempt([&] { read_model(map, cell); });
+  static_cast<void>(read_rules(map));
   return cell;
 }
 
@@ -315,6 +335,11 @@ std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
     return map.has("model") ? map.map("model").row_of(key) : std::nullopt;
   });
   return row ? *row : std::nullopt;
+}
+
+Result<CellRules> rules_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return CellRules{};
+  return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_rules(map); });
 }
 
 Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {

@@ -70,6 +70,22 @@ JobOutcome outcome_of(SQLite::Statement& row) {
   return outcome;
 }
 
+std::string to_text(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return "train";
+    case JobKind::kDiagnose:
+      return "diagnose";
+    case JobKind::kCheck:
+      return "check";
+  }
+  return "train";
+}
+
+JobKind job_kind_of(const std::string& text) {
+  return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
+}
+
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
   job.id = row.getColumn(0).getInt64();
@@ -81,7 +97,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.created_at = row.getColumn(6).getInt64();
   job.model_version = row.getColumn(7).getInt();
   job.attempts = row.getColumn(8).getInt();
-  job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
+  job.kind = job_kind_of(row.getColumn(9).getString());
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
@@ -137,8 +153,7 @@ void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& 
 std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
   change(database,
          "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
-         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at,
-         job.kind == JobKind::kDiagnose ? "diagnose" : "train");
+         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, to_text(job.kind));
   return database.getLastInsertRowid();
 }
 

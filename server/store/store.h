@@ -37,7 +37,7 @@ struct StoredBatch {
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
 
-enum class JobKind { kTrain, kDiagnose };
+enum class JobKind { kTrain, kDiagnose, kCheck };
 
 /// A training or a diagnosis, finished or not.
 struct StoredJob {

@@ -97,7 +97,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   if (!running) return failed(running.error());
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
-  if (job->kind == JobKind::kDiagnose) {
+  if (job->kind != JobKind::kTrain) {
     auto stored = store_.diagnosis(id);
     if (!stored) return failed(stored.error());
     asked = std::move(*stored);

@@ -244,14 +244,32 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
                                        const std::string& csv, bool apply, const ChangeId& id) {
-  const auto cell = find_cell(cells_, cell_name);
-  if (!cell) return tl::make_unexpected(cell.error());
-  if (!batch_id.empty() && !csv.empty()) {
-    return failure(ErrorCode::kUsage, "a diagnosis is of a stored batch or of one that is sent, not of both");
-  }
   StoredJob job;
   job.kind = JobKind::kDiagnose;
   job.cell = cell_name;
+  return look_at(std::move(job), batch_id, csv, apply, id);
+}
+
+Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
+                                    std::optional<double> tolerance_mm, const ChangeId& id) {
+  if (find_cell(cells_, cell_name) && !registry_.in_force(cell_name))
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force to hold a check against", cell_name).of("cell");
+  StoredJob job;
+  job.kind = JobKind::kCheck;
+  job.cell = cell_name;
+  if (tolerance_mm) job.level = fmt::format("{}", *tolerance_mm);
+  return look_at(std::move(job), batch_id, csv, false, id);
+}
+
+Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id, const std::string& csv, bool apply,
+                                      const ChangeId& id) {
+  const std::string& cell_name = job.cell;
+  const auto cell = find_cell(cells_, cell_name);
+  if (!cell) return tl::make_unexpected(cell.error());
+  if (!batch_id.empty() && !csv.empty()) {
+    return failure(ErrorCode::kUsage, "a {} is of a stored batch or of one that is sent, not of both",
+                   job.kind == JobKind::kCheck ? "check" : "diagnosis");
+  }
   job.created_at = unix_now();
   if (csv.empty()) {
     const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
@@ -494,7 +512,7 @@ void Trainer::enqueue(const StoredJob& job, bool asked_for) {
 }
 
 Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
-  if (job.kind == JobKind::kDiagnose || job.batch_ids.size() != 1) return true;
+  if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return true;
   return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
     return batch.job != job.id;
   });

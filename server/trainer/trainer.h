@@ -81,7 +81,12 @@ class Trainer {
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply, const ChangeId& id = {});
-  /// Of a job whose diagnosis is found; kBusy while it is not.
+  /// Holds a few poses against the model in force: whether the robot still is as that has it (check_health()).
+  /// `tolerance_mm`: empty as the cell file says. Returns the job; what it found is diagnosis(). Refuses as diagnose(),
+  /// and a cell without a model in force (kNotFound).
+  [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                           std::optional<double> tolerance_mm, const ChangeId& id = {});
+  /// Of a job whose diagnosis or check is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
   /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
@@ -144,6 +149,9 @@ class Trainer {
   /// Whether the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
                                       bool release) const;
+  /// Queues a job that looks at one batch and learns nothing from it, unless it is to `apply` what it finds.
+  [[nodiscard]] Result<std::int64_t> look_at(StoredJob job, const std::string& batch_id, const std::string& csv,
+                                             bool apply, const ChangeId& id);
   /// The id of a stored batch, of the newest where none is named; refused in quarantine where what is found in it is to
   /// be applied.
   [[nodiscard]] Result<std::string> batch_to_diagnose(const std::string& cell, const std::string& batch_id,

@@ -373,9 +373,13 @@ std::size_t BadRequests::diagnoses() {
     r.csv("{}");
   });
   wire::CheckHealthRequest check;
+  check.batch_id("lt-99");
+  check.tolerance_mm(std::numeric_limits<double>::quiet_NaN());
   auto checks = sender<wire::CheckHealth>(check);
   send_what_is_always_wrong(checks);
-  checks.expect("a check", wire::RESULT_UNSUPPORTED, [](wire::CheckHealthRequest&) {});
+  checks.expect("an unknown batch", wire::RESULT_NOT_FOUND, [](wire::CheckHealthRequest&) {});
+  checks.expect("a tolerance below 0", wire::RESULT_INVALID_ARGUMENT,
+                [](wire::CheckHealthRequest& r) { r.tolerance_mm(-0.1); });
   return send.check() + checks.check();
 }
 
@@ -392,8 +396,7 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  for (const auto what :
-       {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_REPLAY}) {
+  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_REPLAY}) {
     expect("what is not built yet", wire::RESULT_UNSUPPORTED, what);
   }
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });

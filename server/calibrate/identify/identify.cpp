@@ -161,7 +161,8 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
 }  // namespace
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
-  const ScaledParameters s = scaled_parameters(problem.model, options.held);
+  ScaledParameters s = scaled_parameters(problem.model, options.held);
+  take_priors(options.priors, s);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = problem.model;

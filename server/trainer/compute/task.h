@@ -27,6 +27,7 @@ struct ComputeTask {
   std::vector<std::string> batch_ids;         ///< to learn from or to diagnose, together; none: the one that was sent
   std::vector<std::string> earlier_ids = {};  ///< sessions of the same arm to learn from as well, oldest first
   std::string level, bias;                    ///< of a training; empty: as usual
+                                              ///< `level` of a check: its tolerance in mm; empty: as the cell file says
   bool apply = false;                         ///< of a diagnosis: train a model with the causes found
   bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;

@@ -2,13 +2,17 @@
 
 #include <utility>
 
+#include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
 #include "server/diagnose/triage.h"
+#include "server/health/health_check.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
+#include "server/report/health_json.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/acceptance/fits_cell.h"
 #include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/pipeline/extend.h"
@@ -53,8 +57,8 @@ std::string joined_by_semicolons(const std::vector<std::string>& parts) {
 }
 
 HoldOut hold_out_of(const ComputeTask& task) {
-  return task.kind == JobKind::kDiagnose ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
-                                         : held_out_by_service(task.validation_share, task.seed);
+  return task.kind != JobKind::kTrain ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
+                                      : held_out_by_service(task.validation_share, task.seed);
 }
 
 }  // namespace
@@ -68,7 +72,15 @@ Status Workbench::take(const BatchText& batch, bool judges) {
 }
 
 Result<Made> Workbench::make(const ComputeWatch& watch) {
-  return task_.kind == JobKind::kTrain ? trained(watch) : diagnosed(watch);
+  switch (task_.kind) {
+    case JobKind::kTrain:
+      return trained(watch);
+    case JobKind::kDiagnose:
+      return diagnosed(watch);
+    case JobKind::kCheck:
+      return checked(watch);
+  }
+  return trained(watch);
 }
 
 Result<Made> Workbench::trained(const ComputeWatch& watch) {
@@ -92,6 +104,31 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   auto successor = train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(watch));
   if (!successor) return tl::make_unexpected(successor.error());
   return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
+}
+
+Result<Made> Workbench::checked(const ComputeWatch& watch) {
+  const auto batch = batches_.first();
+  if (!batch) return tl::make_unexpected(batch.error());
+  const auto present = in_force();
+  if (!present) return tl::make_unexpected(present.error());
+  if (!*present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
+  const auto rules = rules_of(*task_.cell);
+  if (!rules) return tl::make_unexpected(rules.error());
+  HealthOptions options;
+  options.tolerance = rules->tolerance.value_or(kUsualTolerance);
+  if (!task_.level.empty()) options.tolerance = std::stod(task_.level) * from_mm(1);
+  const auto health = check_health((*present)->model, *batch, options);
+  if (!health) return tl::make_unexpected(health.error());
+  const auto& rows = batch->rows().measurements;
+  const auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
+  const Status stored =
+      watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", "");
+  if (!stored) return tl::make_unexpected(stored.error());
+  Made made;
+  made.outcome.verdict = JobVerdict::kDiagnosed;
+  made.outcome.why = health->sentence;
+  made.message = to_string(health->verdict);
+  return made;
 }
 
 Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {

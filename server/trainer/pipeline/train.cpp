@@ -10,6 +10,7 @@
 #include "server/measurement/repeats.h"
 #include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
+#include "server/trainer/pipeline/among_twins.h"
 #include "server/trainer/pipeline/bias_learning.h"
 #include "server/trainer/pipeline/extrapolation.h"
 #include "server/trainer/pipeline/given_up.h"
@@ -160,7 +161,11 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
                                       const TrainOptions& options, const Report& report) {
   const Result<std::vector<std::string>> sources = sources_of(*cell, options);
   if (!sources) return tl::make_unexpected(sources.error());
-  auto found = identify_sessions(cell, *sources, split.train, [&](double share) {
+  const Identify identify = [&](const std::vector<std::string>& names) {
+    return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
+                         : calibrate(cell, names, split.train, {});
+  };
+  auto found = identify_sessions(identify, *sources, split.train, [&](double share) {
     return report("asking what changed between the sessions", 0.3 * share);
   });
   if (!found) return found;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/fleet/fleet_prior.h"
 #include "server/measurement/checked_batch.h"
 
 namespace trammel {
@@ -17,6 +18,9 @@ struct TrainOptions {
   /// A model of this robot to start from: only `refit` is identified anew, and a bias only where `bias` names one.
   std::optional<CompensatedModel> from;
   std::vector<std::string> refit = {"base", "tool"};
+  /// What robots of this type have in common: the prior of the arm's parameters, but for those in which this robot is
+  /// unlike its twins. Empty: the drawing alone.
+  std::optional<FleetPrior> fleet = {};
   std::uint64_t seed = 1;
   std::int64_t trained_at = 0;  ///< Unix time, s, as recorded
   /// Somebody who knows the batch has looked at it: positions are learned from as they are read.

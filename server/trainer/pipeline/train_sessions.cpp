@@ -19,12 +19,12 @@ std::vector<std::string> names_of(const PhysicalModel& model) {
 }
 
 /// Drops changes, the weakest first, that the sessions do not speak for once the others are known.
-Result<IdentifiedSessions> without_idle_changes(const std::shared_ptr<const Cell>& cell, IdentifiedSessions found,
+Result<IdentifiedSessions> without_idle_changes(const Identify& identify, IdentifiedSessions found,
                                                 const MeasurementBatch& batch) {
   for (std::size_t k = 0; k < found.changes.size() && found.changes.size() > 1;) {
     std::vector<std::string> fewer = names_of(found.calibration.model);
     std::erase(fewer, found.changes[k].source);
-    auto without = calibrate(cell, fewer, batch, {});
+    auto without = identify(fewer);
     if (!without) return tl::make_unexpected(without.error());
     const std::optional<Change> missed = strongest_change(*without, batch);
     if (missed) {
@@ -54,10 +54,10 @@ std::vector<LeftOutSession> leave_out_unplaced(BatchSplit& split) {
   return left_out;
 }
 
-Result<IdentifiedSessions> identify_sessions(const std::shared_ptr<const Cell>& cell,
-                                             const std::vector<std::string>& sources, const MeasurementBatch& batch,
+Result<IdentifiedSessions> identify_sessions(const Identify& identify, const std::vector<std::string>& sources,
+                                             const MeasurementBatch& batch,
                                              const std::function<bool(double share)>& go_on) {
-  auto calibration = calibrate(cell, sources, batch, {});
+  auto calibration = identify(sources);
   if (!calibration) return tl::make_unexpected(calibration.error());
   IdentifiedSessions found{std::move(*calibration), {}};
   if (!has_sessions(batch)) return found;
@@ -67,12 +67,12 @@ Result<IdentifiedSessions> identify_sessions(const std::shared_ptr<const Cell>& 
     if (!change) break;
     std::vector<std::string> more = names_of(found.calibration.model);
     more.push_back(change->source);
-    auto with = calibrate(cell, more, batch, {});
+    auto with = identify(more);
     if (!with || with->log_likelihood <= found.calibration.log_likelihood) break;
     found.calibration = std::move(*with);
     found.changes.push_back(std::move(*change));
   }
-  return without_idle_changes(cell, std::move(found), batch);
+  return without_idle_changes(identify, std::move(found), batch);
 }
 
 }  // namespace trammel

@@ -20,10 +20,12 @@ struct IdentifiedSessions {
   CalibrationResult calibration;
   std::vector<Change> changes;  ///< of the arm between sessions, in the order in which they were found
 };
+/// calibrate() of the batch with these sources.
+using Identify = std::function<Result<CalibrationResult>(const std::vector<std::string>& sources)>;
 /// Identifies `sources` on `batch` and, where it has several sessions, what changed between them: while one change is
 /// beyond chance it joins the sources, and only what it changes starts anew from its session on. `go_on`: false gives
 /// up. Refusals as calibrate().
-[[nodiscard]] Result<IdentifiedSessions> identify_sessions(const std::shared_ptr<const Cell>& cell,
+[[nodiscard]] Result<IdentifiedSessions> identify_sessions(const Identify& identify,
                                                            const std::vector<std::string>& sources,
                                                            const MeasurementBatch& batch,
                                                            const std::function<bool(double share)>& go_on);
