@@ -28,9 +28,10 @@ Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest& 
   if (tolerance && !(*tolerance > 0 && std::isfinite(*tolerance))) {
     return failure(ErrorCode::kUsage, "a tolerance of {} mm", *tolerance).of("tolerance_mm").beyond(*tolerance, 0);
   }
-  const auto job = trainer_.check(
-      cell, request.batch_id(), request.csv(), tolerance,
-      change_id(request.change_id().to_string(), in_few_words("check", cell, {request.batch_id(), request.csv()})));
+  const auto job =
+      trainer_.check(cell, request.batch_id(), request.csv(), tolerance,
+                     change_id(request.change_id().to_string(),
+                               in_few_words("check", cell, {request.batch_id(), request.csv()}), request.header()));
   if (!job) return tl::make_unexpected(job.error());
   wire::CheckHealthReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
