@@ -190,7 +190,7 @@ BENCHMARK(mean_and_stddev)->Apply(sizes_and_targets)->Unit(benchmark::kMicroseco
 BENCHMARK_CAPTURE(variance, exact, VarianceForm::kExact)
     ->ArgsProduct({{200, 1200, 4000}, {1, 1000}})
     ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(variance, by_regions, VarianceForm::kRegional)
+BENCHMARK_CAPTURE(variance, served, VarianceForm::kServed)
     ->ArgsProduct({{200, 1200, 4000}, {1, 1000}})
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK(coupled_mean)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);
