@@ -62,7 +62,7 @@ VirtualRobot as_delivered(const FirstBatch& first, const std::shared_ptr<const C
     } else if (name.starts_with("alpha") || name.starts_with("beta")) {
       value = gauss(random, first.twist);
     } else if (name.starts_with("C")) {
-      value = std::abs(gauss(random, from_rad_per_nmm(5e-10)));
+      value = std::abs(gauss(random, from_rad_per_nmm(first.compliance)));
     } else {
       value = gauss(random, first.length);
     }
@@ -223,6 +223,7 @@ FirstBatch first_batch(std::uint64_t seed, Robots robots) {
   first.zero = drawn(0, 0.05);
   first.twist = drawn(0, 3e-3);
   first.noise = drawn(10e-6, 200e-6);
+  first.compliance = drawn(0, 2e-9);
   first.outliers = either() ? 0 : drawn(0, 0.1);
   first.tracker = either() ? 0 : 2;
   return first;
@@ -231,7 +232,7 @@ FirstBatch first_batch(std::uint64_t seed, Robots robots) {
 std::shared_ptr<const Cell> new_cell(const FirstBatch& first) {
   const std::string text = fmt::format(
       "version: 1\ncell: new\nrobot: robot.yaml\nbase: {}\ntools: {{spindle: {}}}\n"
-      "payloads: {{spindle: {{mass_kg: 20, cog_mm: [10, 5, 120]}}}}\ntracker: {{sigma_mm: 0.03}}\n"
+      "payloads: {{spindle: {{mass_kg: 100, cog_mm: [10, 5, 120]}}}}\ntracker: {{sigma_mm: 0.03}}\n"
       "model: {{error_sources: [base, geometry], bias: none}}\n",
       first.base_known ? "{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}" : "null",
       first.tool_known ? "{xyz_mm: [58.553, -193.735, 165.958], q_wxyz: [1, 0, 0, 0]}" : "null");

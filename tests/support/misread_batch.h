@@ -18,13 +18,14 @@ struct FirstBatch {
   bool base_known = true, tool_known = true;
   bool orientation = true;
   int poses = 60;
-  double spread = 0.6;   ///< share of each joint's range that is measured
-  double length = 2e-3;  ///< m, standard deviation of every length, and of the tool point
-  double zero = 0.01;    ///< rad, of every joint's zero
-  double twist = 1e-3;   ///< rad, of every axis
-  double noise = 30e-6;  ///< m, of one coordinate
-  double outliers = 0;   ///< share of the rows, each off by up to 0.3 m
-  double tracker = 2;    ///< m, how far off the drawn base the tracker may stand; it is turned about the vertical, too
+  double spread = 0.6;        ///< share of each joint's range that is measured
+  double length = 2e-3;       ///< m, standard deviation of every length, and of the tool point
+  double zero = 0.01;         ///< rad, of every joint's zero
+  double twist = 1e-3;        ///< rad, of every axis
+  double compliance = 5e-10;  ///< rad/Nmm, standard deviation of every joint's, under the load of 100 kg
+  double noise = 30e-6;       ///< m, of one coordinate
+  double outliers = 0;        ///< share of the rows, each off by up to 0.3 m
+  double tracker = 2;  ///< m, how far off the drawn base the tracker may stand; it is turned about the vertical, too
   std::uint64_t seed = 1;
 };
 /// One of them, drawn: 15 to 300 poses, positions alone or full poses, what is known of base and tool, errors up to
