@@ -1,6 +1,7 @@
 #include "idl/guard/announcement_check.h"
 
 #include <algorithm>
+#include <string_view>
 
 namespace trammel::wire {
 namespace {
@@ -133,12 +134,26 @@ bool is_locator(std::uint16_t id) {
 bool is_of(Bytes guid, Bytes source) { return std::equal(source.begin(), source.end(), guid.begin()); }
 
 /// False when the lease is negative.
-bool cut_lease(const Parameter& lease, bool little_endian, EditedMessage& message) {
+bool cut_lease(const Parameter& lease, bool little_endian, EditedMessage& message, std::uint32_t& left) {
   const std::uint32_t seconds = Reader(lease.value, little_endian).u32().value_or(0);
   constexpr std::uint32_t kForever = 0x7fffffff;
   if (seconds > kForever) return false;
-  if (seconds > kLongestLeaseSeconds) message.put(lease.value.first(4), kLongestLeaseSeconds, little_endian);
+  left = std::min(seconds, kLongestLeaseSeconds);
+  if (left != seconds) message.put(lease.value.first(4), left, little_endian);
   return true;
+}
+
+/// A reader whose partition has wildcards would get every client's replies. `list` fits().
+bool has_wildcard(Reader list) {
+  constexpr std::string_view kWildcards = "*?[\\";
+  const std::uint32_t count = list.u32().value_or(0);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Reader ahead = list;
+    const Bytes name = ahead.take(ahead.u32().value_or(0)).value_or(Bytes());
+    if (std::find_first_of(name.begin(), name.end(), kWildcards.begin(), kWildcards.end()) != name.end()) return true;
+    if (!skip_partition(list)) return false;
+  }
+  return false;
 }
 
 bool is_blanked(std::uint16_t id) {
@@ -175,7 +190,8 @@ Fault check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says
   }
 }
 
-Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message) {
+Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, std::uint32_t& lease_seconds) {
+  lease_seconds = kUsualLeaseSeconds;
   constexpr unsigned char kListBigEndian = 0x02, kListLittleEndian = 0x03;
   if (payload.size() < 4 || payload[0] != 0) return Dropped::kParameters;
   if (payload[1] != kListBigEndian && payload[1] != kListLittleEndian) return Dropped::kParameters;
@@ -196,7 +212,9 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message) {
     if (is_locator(parameter.id) && ++locators > kMostLocators) return Dropped::kParameters;
     const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid || parameter.id == kKeyHash;
     if (names && !is_of(parameter.value, source)) return Dropped::kSource;
-    if (parameter.id == kLease && !cut_lease(parameter, little_endian, message)) return Dropped::kParameters;
+    if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian))) return Dropped::kWildcard;
+    if (parameter.id == kLease && !cut_lease(parameter, little_endian, message, lease_seconds))
+      return Dropped::kParameters;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "idl/guard/dropped.h"
@@ -14,12 +15,15 @@ namespace trammel::wire {
 
 /// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its
 /// parameter, GUIDs of `source`. Parameters that only this library reads, that nobody here needs and whose parsers
-/// trust what they read (type objects, content filters) are blanked in `message`. Leases are cut to kLongestLease.
-[[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message);
+/// trust what they read (type objects, content filters) are blanked in `message`. Leases are cut to
+/// kLongestLeaseSeconds; `lease_seconds` is the one that is left, kUsualLeaseSeconds where none is said.
+[[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
+                                                        std::uint32_t& lease_seconds);
 
 /// The payload of a message of the authentication handshake, which comes before anybody is known.
 [[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload);
 
-inline constexpr std::uint32_t kLongestLeaseSeconds = 300;
+inline constexpr std::uint32_t kLongestLeaseSeconds = 120;
+inline constexpr std::uint32_t kUsualLeaseSeconds = 100;  // RTPS 2.2, table 9.12
 
 }  // namespace trammel::wire

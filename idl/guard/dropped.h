@@ -24,8 +24,9 @@ enum class Dropped : std::uint8_t {
   kParticipants,  ///< too many participants, or too many from one source
   kNotSent,       ///< asks for fragments of a sample that was never sent in fragments
   kSecurity,      ///< a security submessage without its head or its tail
+  kWildcard,      ///< an endpoint in partitions with wildcards
 };
-inline constexpr std::size_t kDroppedReasons = 15;
+inline constexpr std::size_t kDroppedReasons = 16;
 
 /// For people: "statistics submessage".
 [[nodiscard]] const char* name_of(Dropped reason);

@@ -16,7 +16,7 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
                                                              "sample size",           "unfinished samples",
                                                              "counts that jump",      "numbers skipped",
                                                              "too many participants", "fragments that were never sent",
-                                                             "security submessages"};
+                                                             "security submessages",  "partitions with wildcards"};
 
 }  // namespace
 

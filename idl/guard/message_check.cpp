@@ -147,20 +147,25 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   }
   const bool payload = (submessage.flags & kPayload) != 0, key = (submessage.flags & kKey) != 0;
   if (payload && key) return Dropped::kLength;
+  if (!payload && head->writer == kAnnouncer) {
+    const MutexLock lock(memory_.mutex);
+    memory_.participants.left(source_);
+  }
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
   return payload ? check_announced(head->writer, after.rest()) : Fault();
 }
 
 std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes payload) {
+  std::uint32_t lease_seconds = 0;
   if (is_announcement_writer(writer)) {
-    if (const Fault fault = check_announcement(payload, source_, edited_)) return fault;
+    if (const Fault fault = check_announcement(payload, source_, edited_, lease_seconds)) return fault;
   }
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
   if (writer == kHandshake) return check_handshake(payload);
   if (writer != kAnnouncer) return {};
   const MutexLock lock(memory_.mutex);
-  return memory_.participants.announced(source_, received_.socket, received_.now);
+  return memory_.participants.announced(source_, received_.socket, std::chrono::seconds(lease_seconds), received_.now);
 }
 
 std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {

@@ -1,6 +1,7 @@
 #include "idl/guard/participant_watch.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace trammel::wire {
 
@@ -13,17 +14,30 @@ bool ParticipantWatch::may_be_new(Time now) {
   return true;
 }
 
-std::optional<Dropped> ParticipantWatch::announced(Bytes prefix, std::uint64_t socket, Time now) {
-  Known& participant = participants_.at(key_of(prefix, 0), now);
-  if (participant.known) return {};
-  EndpointKey key;
-  std::memcpy(key.prefix.data(), &socket, sizeof socket);
-  Socket& from = sockets_.at(key, now);
+bool ParticipantWatch::has_room(const EndpointKey& key, Time now) {
+  const std::size_t known = participants_.count([now](const Participant& one) { return one.until > now; });
+  if (known < kCrowd) return true;
+  Stranger& stranger = strangers_.at(key, now);
+  return std::exchange(stranger.seen, true) && known < kMost;
+}
+
+std::optional<Dropped> ParticipantWatch::announced(Bytes prefix, std::uint64_t socket, std::chrono::seconds lease,
+                                                   Time now) {
+  const EndpointKey key = key_of(prefix, 0);
+  if (Participant* known = participants_.find(key, now); known != nullptr && known->until > now) {
+    known->until = now + lease;
+    return {};
+  }
+  EndpointKey address;
+  std::memcpy(address.prefix.data(), &socket, sizeof socket);
+  Socket& from = sockets_.at(address, now);
   if (now - from.since > kWindow) from = {now, 0};
-  if (from.participants >= kNewOfOneSocket || !may_be_new(now)) return Dropped::kParticipants;
+  if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now)) return Dropped::kParticipants;
   ++from.participants;
-  participant.known = true;
+  participants_.at(key, now).until = now + lease;
   return {};
 }
+
+void ParticipantWatch::left(Bytes prefix) { participants_.forget(key_of(prefix, 0)); }
 
 }  // namespace trammel::wire

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <random>
 #include <span>
 
 #include "idl/guard/rtps_bytes.h"
@@ -46,6 +47,29 @@ class RecentTable {
     *oldest = Entry{key, now, true, Value()};
     return oldest->value;
   }
+  /// Null: not known.
+  Value* find(const EndpointKey& key, Time now) {
+    for (Entry& entry : (*sets_)[hash(key) % kSets]) {
+      if (!entry.used || entry.key != key) continue;
+      entry.seen = now;
+      return &entry.value;
+    }
+    return nullptr;
+  }
+  void forget(const EndpointKey& key) {
+    for (Entry& entry : (*sets_)[hash(key) % kSets]) {
+      if (entry.used && entry.key == key) entry = Entry();
+    }
+  }
+  /// Of all values.
+  template <typename Counts>
+  [[nodiscard]] std::size_t count(const Counts& counts) const {
+    std::size_t number = 0;
+    for (const Set& set : *sets_) {
+      for (const Entry& entry : set) number += entry.used && counts(entry.value) ? 1 : 0;
+    }
+    return number;
+  }
 
  private:
   static constexpr std::size_t kWays = 8;
@@ -57,16 +81,22 @@ class RecentTable {
   };
   using Set = std::array<Entry, kWays>;
 
-  static std::uint64_t hash(const EndpointKey& key) {
+  /// Nobody outside can know which keys share a set.
+  [[nodiscard]] std::uint64_t hash(const EndpointKey& key) const {
     std::uint64_t first = 0;
     std::uint32_t rest = 0;
     std::memcpy(&first, key.prefix.data(), sizeof first);
     std::memcpy(&rest, key.prefix.data() + sizeof first, sizeof rest);
-    std::uint64_t mixed = (first ^ (std::uint64_t{rest} << 32 | key.entity)) * 0x9e3779b97f4a7c15u;
-    mixed ^= mixed >> 32;
-    return mixed * 0xbf58476d1ce4e5b9u >> 20;
+    return mixed(mixed(first ^ seed_) + (std::uint64_t{rest} << 32 | key.entity));
+  }
+  /// Every bit of the result depends on every bit of `x` (Stafford's thirteenth variant).
+  static std::uint64_t mixed(std::uint64_t x) {
+    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
+    return x ^ x >> 31;
   }
 
+  const std::uint64_t seed_ = std::uint64_t{std::random_device()()} << 32 | std::random_device()();
   std::unique_ptr<std::array<Set, kSets>> sets_ = std::make_unique<std::array<Set, kSets>>();
 };
 

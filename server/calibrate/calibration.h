@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/calibrate/identify/identifiability.h"
+#include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
@@ -22,10 +23,17 @@ struct CalibrationProblem {
   MeasurementBatch batch;  ///< checked against the cell
 };
 
+/// What is known of a parameter before, instead of its source's prior.
+struct ParameterPrior {
+  std::string name;             ///< of the parameter: `C3`
+  double mean = 0, stddev = 0;  ///< SI
+};
+
 struct CalibrateOptions {
   int max_iterations = 100;
-  std::vector<bool> held;  ///< a flag for each parameter that stays as it is; empty: none
-  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
+  std::vector<ParameterPrior> priors = {};  ///< names that the model has not do not matter
+  std::vector<bool> held;                   ///< a flag for each parameter that stays as it is; empty: none
+  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
 };
 
 /// A pose whose residual is far above its sigma.
@@ -59,7 +67,10 @@ struct CalibrationResult {
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  std::vector<double> cost_record;    ///< half the weighted sum of squares, of all iterations in their order
+  /// Of a batch of several sessions: what belongs to each, the newest last. aligned() moves its measurements into the
+  /// world of the model. Empty: one session.
+  std::vector<SessionSetting> sessions;
+  std::vector<double> cost_record;  ///< half the weighted sum of squares, of all iterations in their order
   bool converged = false;
   int iterations = 0;
   std::string message;  ///< of the solver

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "idl/safe_type.h"
 #include "server/base/mutex.h"
 
 namespace trammel {
@@ -15,18 +16,22 @@ namespace trammel {
 template <typename Reply>
 class ReplyMemory {
  public:
+  struct Kept {
+    wire::ContentId asked;  ///< what was asked for under this id
+    Reply reply;
+  };
   explicit ReplyMemory(std::size_t capacity) : capacity_(capacity) {}
 
-  [[nodiscard]] std::optional<Reply> find(const std::string& request_id) const {
+  [[nodiscard]] std::optional<Kept> find(const std::string& request_id) const {
     const MutexLock lock(mutex_);
     const auto found = replies_.find(request_id);
     if (found == replies_.end()) return std::nullopt;
     return found->second;
   }
 
-  void remember(const std::string& request_id, Reply reply) {
+  void remember(const std::string& request_id, const wire::ContentId& asked, Reply reply) {
     const MutexLock lock(mutex_);
-    if (!replies_.emplace(request_id, std::move(reply)).second) return;
+    if (!replies_.emplace(request_id, Kept{asked, std::move(reply)}).second) return;
     order_.push_back(request_id);
     if (order_.size() > capacity_) {
       replies_.erase(order_.front());
@@ -37,57 +42,68 @@ class ReplyMemory {
  private:
   const std::size_t capacity_;
   mutable Mutex mutex_;
-  std::unordered_map<std::string, Reply> replies_ TRAMMEL_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, Kept> replies_ TRAMMEL_GUARDED_BY(mutex_);
   std::deque<std::string> order_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
 };
 
 /// The requests that are being answered, so that a repeat is not carried out beside them: it gets the same answer once
 /// more. Thread-safe.
 class UnderWay {
+  enum class Stand { kFirst, kRepeat, kOther };
+
  public:
   /// One request while it is being answered.
   class Piece {
    public:
-    Piece(UnderWay& all, std::string request)
-        : all_(all), request_(std::move(request)), is_first_(all.begin(request_)) {}
+    Piece(UnderWay& all, std::string request, const wire::ContentId& asked)
+        : all_(all), request_(std::move(request)), stand_(all.begin(request_, asked)) {}
     ~Piece() {
-      if (is_first_) all_.end(request_);
+      if (is_first()) all_.end(request_);
     }
     Piece(const Piece&) = delete;
     Piece& operator=(const Piece&) = delete;
     /// False: it is being answered already, and will be once more for this repeat.
-    [[nodiscard]] bool is_first() const { return is_first_; }
+    [[nodiscard]] bool is_first() const { return stand_ == Stand::kFirst; }
+    /// Something else is being answered under the same id.
+    [[nodiscard]] bool is_other() const { return stand_ == Stand::kOther; }
     /// Of the first: whether a repeat has come that has no answer yet; it counts as answered then. False is the end.
     [[nodiscard]] bool has_repeat() { return all_.take_repeat(request_); }
 
    private:
     UnderWay& all_;
     const std::string request_;
-    const bool is_first_;
+    const Stand stand_;
   };
 
  private:
-  [[nodiscard]] bool begin(const std::string& request) {
+  struct First {
+    wire::ContentId asked;
+    int repeats = 0;
+  };
+
+  [[nodiscard]] Stand begin(const std::string& request, const wire::ContentId& asked) {
     const MutexLock lock(mutex_);
-    const auto [entry, is_first] = repeats_.try_emplace(request, 0);
-    if (!is_first) ++entry->second;
-    return is_first;
+    const auto [entry, is_first] = under_way_.try_emplace(request, First{asked});
+    if (is_first) return Stand::kFirst;
+    if (asked.is_other_than(entry->second.asked)) return Stand::kOther;
+    ++entry->second.repeats;
+    return Stand::kRepeat;
   }
   [[nodiscard]] bool take_repeat(const std::string& request) {
     const MutexLock lock(mutex_);
-    const auto entry = repeats_.find(request);
-    if (entry == repeats_.end()) return false;
-    if (entry->second-- > 0) return true;
-    repeats_.erase(entry);
+    const auto entry = under_way_.find(request);
+    if (entry == under_way_.end()) return false;
+    if (entry->second.repeats-- > 0) return true;
+    under_way_.erase(entry);
     return false;
   }
   void end(const std::string& request) {
     const MutexLock lock(mutex_);
-    repeats_.erase(request);
+    under_way_.erase(request);
   }
 
   Mutex mutex_;
-  std::unordered_map<std::string, int> repeats_ TRAMMEL_GUARDED_BY(mutex_);  // by request
+  std::unordered_map<std::string, First> under_way_ TRAMMEL_GUARDED_BY(mutex_);  // by request
 };
 
 }  // namespace trammel

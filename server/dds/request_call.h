@@ -43,6 +43,10 @@ struct CallCounts {
                      {}};
 }
 
+/// Of a request whose id was given to something else before.
+inline const wire::Fault kIdIsUsed{
+    wire::RESULT_CONFLICT, "request_id is that of another request", {}, "request_id", {}, {}};
+
 /// What the calls of one operation share. Outlives them.
 template <typename Operation>
 struct CallContext {
@@ -79,10 +83,23 @@ class Call final : public Job {
         to_(std::move(to)),
         sent_(sent),
         while_under_way_(std::move(while_under_way)),
-        answering_(context.under_way, sent) {}
+        answering_(context.under_way, sent, request_->content) {}
 
   /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for it.
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
+
+  /// Instead of begin(), where something else is being answered under its id. True: it is answered so.
+  [[nodiscard]] bool is_refused_for_its_id() {
+    if (!answering_.is_other()) return false;
+    refuse(kIdIsUsed);
+    put_identity();
+    ++context_.counts.requests;
+    ++context_.counts.refused;
+    report(false);
+    const std::size_t bytes = bytes_of_reply(reply_);
+    context_.replies.post(to_, std::make_shared<Reply>(std::move(reply_)), bytes);
+    return true;
+  }
 
   std::size_t begin() override {
     if (request_->fault) {
@@ -110,7 +127,8 @@ class Call final : public Job {
       if (portions_ && !is_refused()) reply_ = portions_->take();
     }
     const bool is_good = reply_.header().result() == wire::RESULT_OK;
-    if (!is_known_) remember(is_good);
+    put_identity();
+    if (is_good && !is_known_) remember();
     report(is_good);
     const std::uint64_t times = answer(&ReplySink::send);
     context_.counts.requests += times;
@@ -138,8 +156,12 @@ class Call final : public Job {
     if (!known && happens_once(*request_))
       known = context_.memory.find(request_id_text(request_->header().request_id()));
     if (!known) return false;
-    reply_ = std::move(*known);
     is_known_ = true;
+    if (request_->content.is_other_than(known->asked)) {
+      refuse(kIdIsUsed);
+    } else {
+      reply_ = std::move(known->reply);
+    }
     return true;
   }
 
@@ -192,12 +214,10 @@ class Call final : public Job {
     reply_.header().trace_id(request_->header().trace_id());
   }
 
-  void remember(bool is_good) {
-    put_identity();
-    if (!is_good) return;
-    if (kComputes) context_.lately.remember(sent_, reply_);
+  void remember() {
+    if (kComputes) context_.lately.remember(sent_, request_->content, reply_);
     if (happens_once(*request_)) {
-      context_.memory.remember(request_id_text(request_->header().request_id()), reply_);
+      context_.memory.remember(request_id_text(request_->header().request_id()), request_->content, reply_);
     }
   }
 

@@ -60,6 +60,16 @@ template <typename Reply>
   return bytes;
 }
 
+/// Whose changes come one after the other: those of a cell. To read a model that is imported takes seconds and changes
+/// nothing yet: the cell does not wait for it, and imports come one at a time, for the memory.
+template <typename Request>
+[[nodiscard]] std::string turn_of(const Request& request, const std::string& cell) {
+  if constexpr (requires { request.model_text(); }) {
+    if (request.action() == wire::MANAGE_IMPORT) return "/imports";  // no name of a cell
+  }
+  return cell;
+}
+
 /// Requests that cost alike: of one cell, with the same action.
 template <typename Request>
 [[nodiscard]] std::string work_of(const Request& request, const std::string& cell, const char* operation) {

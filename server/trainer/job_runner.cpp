@@ -97,7 +97,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   if (!running) return failed(running.error());
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
-  if (job->kind == JobKind::kDiagnose) {
+  if (job->kind != JobKind::kTrain) {
     auto stored = store_.diagnosis(id);
     if (!stored) return failed(stored.error());
     asked = std::move(*stored);
@@ -109,9 +109,10 @@ JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<
                                       const StopRequests& stop) {
   auto task = task_of(job, asked);
   if (!task) return tl::make_unexpected(Failed{task.error(), verdict_of(task.error())});
+  const std::vector<std::string> earlier = task->earlier_ids;
   const auto computing = start_computing(options_.compute, std::move(*task), stop);
   if (!computing) return tl::make_unexpected(Failed{computing.error(), JobVerdict::kBroken, true});
-  if (const Status given = give_batches(**computing, job, asked); !given)
+  if (const Status given = give_batches(**computing, job, asked, earlier); !given)
     return tl::make_unexpected(failed_by(**computing, given.error()));
   ComputeWatch watch;
   watch.progress = reporter(job, stop);
@@ -136,6 +137,13 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   const auto came = came_with_batch(job);
   if (!came) return tl::make_unexpected(came.error());
   task.hold_against_in_force = *came;
+  const auto alone = learns_alone(job, *came);
+  if (!alone) return tl::make_unexpected(alone.error());
+  if (!*alone) {
+    auto earlier = earlier_sessions(store_, job, task.cell->sessions, options_.max_poses);
+    if (!earlier) return tl::make_unexpected(earlier.error());
+    task.earlier_ids = std::move(*earlier);
+  }
   if (const auto present = registry_.in_force(job.cell))
     task.in_force = ModelText{present->version, serialize(present->model)};
   task.seed = options_.seed;
@@ -145,6 +153,15 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   return task;
 }
 
+Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch) const {
+  if (job.kind != JobKind::kTrain) return true;
+  if (came_with_batch) return false;
+  // Somebody asked: for what he released, with all that the cell knows; else for the batches that he named.
+  const auto releases = store_.may_release(job.id);
+  if (!releases) return releases;
+  return !*releases;
+}
+
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
   if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return false;
   return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
@@ -152,9 +169,9 @@ Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
   });
 }
 
-Status JobRunner::give_batches(Computing& computing, const StoredJob& job,
-                               const std::optional<StoredDiagnosis>& asked) const {
-  const auto sources = batch_sources(store_, job, !asked || asked->apply);
+Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+                               const std::vector<std::string>& earlier) const {
+  const auto sources = batch_sources(store_, job, !asked || asked->apply, earlier);
   if (!sources) return tl::make_unexpected(sources.error());
   for (const BatchSource& source : *sources) {
     const auto stored = store_.batch(job.cell, source.id);

@@ -388,15 +388,77 @@ TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
   EXPECT_TRUE(guard.check(announcement(participant()), kSocket + 1)) << "from another socket";
 }
 
+/// A participant of a socket of its own.
+Prefix inhabitant(std::uint64_t number) {
+  Prefix prefix = kSource;
+  for (std::size_t i = 0; i < 4; ++i) prefix[8 + i] = static_cast<unsigned char>(number >> 8 * (3 - i));
+  return prefix;
+}
+bool hears(Guard& guard, std::uint64_t number, Guard::Time now, std::uint32_t lease_s = 20) {
+  PacketBytes lease;
+  test::put32(lease, lease_s);
+  test::put32(lease, 0);
+  const Prefix prefix = inhabitant(number);
+  const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lease);
+  return guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), 1000 + number, now)
+      .has_value();
+}
+
 TEST(Guard, TwoHundredCellsThatStartAtOnceAreAllHeard) {
   Guard guard(kMaxTextSample);
-  for (std::uint64_t socket = 0; socket < 1000; ++socket) {
-    Prefix prefix = kSource;
-    prefix[10] = static_cast<unsigned char>(socket >> 8);
-    prefix[11] = static_cast<unsigned char>(socket);
-    const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1);
-    EXPECT_TRUE(guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), socket));
+  const Guard::Time now = Guard::Time() + std::chrono::hours(1);
+  for (std::uint64_t i = 0; i < ParticipantWatch::kCrowd; ++i) EXPECT_TRUE(hears(guard, i, now)) << i;
+}
+
+TEST(Guard, InACrowdWhoAnnouncesItselfAgainIsHeard) {
+  Guard guard(kMaxTextSample);
+  const Guard::Time now = Guard::Time() + std::chrono::hours(1);
+  for (std::uint64_t i = 0; i < ParticipantWatch::kCrowd; ++i) ASSERT_TRUE(hears(guard, i, now));
+  EXPECT_FALSE(hears(guard, 5000, now));
+  EXPECT_TRUE(hears(guard, 5000, now + std::chrono::milliseconds(100)));
+  EXPECT_TRUE(hears(guard, 0, now)) << "known";
+}
+
+TEST(Guard, InventedParticipantsAreNoMoreThanTheLibraryCanBearAndTheirPlacesAreFreeAgain) {
+  Guard guard(kMaxTextSample);
+  const Guard::Time begun = Guard::Time() + std::chrono::hours(1);
+  std::size_t heard = 0;
+  for (std::uint64_t i = 0; i < 60000; ++i) {  // 2000 a second, each twice
+    const Guard::Time now = begun + std::chrono::microseconds(500 * i);
+    for (int k = 0; k < 2; ++k) heard += hears(guard, i, now, 300) ? 1 : 0;
+    if (i % 1000 == 0) {
+      EXPECT_TRUE(hears(guard, 0, now)) << "whoever is known stays so: " << i;
+    }
   }
+  EXPECT_LE(heard, 2 * ParticipantWatch::kMost);
+  const Guard::Time over = begun + std::chrono::seconds(30 + kLongestLeaseSeconds);
+  EXPECT_TRUE(hears(guard, 70000, over));
+}
+
+TEST(Guard, WhoLeavesMakesRoom) {
+  Guard guard(kMaxTextSample);
+  const Guard::Time now = Guard::Time() + std::chrono::hours(1);
+  for (std::uint64_t i = 0; i < ParticipantWatch::kCrowd; ++i) ASSERT_TRUE(hears(guard, i, now));
+  const Prefix leaver = inhabitant(7);
+  const PacketBytes leaves = ParameterList().guid(0x0070, leaver, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  ASSERT_TRUE(guard.check(Packet(leaver).data({0, kAnnouncer, 2, leaves, {}}).bytes(), 1007, now));
+  EXPECT_TRUE(hears(guard, 5000, now));
+}
+
+TEST(Guard, AReaderOfAllPartitionsIsNotHeard) {
+  const auto of_partition = [](const std::string& name) {
+    PacketBytes value;
+    test::put32(value, 1);
+    test::put32(value, static_cast<std::uint32_t>(name.size() + 1));
+    value.insert(value.end(), name.begin(), name.end());
+    do {
+      value.push_back(0);
+    } while (value.size() % 4 != 0);
+    return fate(announcement(writer().add(0x0029, value), kSubscriptions));
+  };
+  for (const char* name : {"*", "vict*", "[a-z]*-1", "client-?"}) EXPECT_EQ(of_partition(name), Dropped::kWildcard);
+  EXPECT_EQ(of_partition("client-7.a_b"), kPasses);
+  EXPECT_EQ(of_partition(std::string(41, 'a')), kPasses) << "a length is no wildcard";
 }
 
 TEST(Guard, SecuredMessagesPassWhenTheyHaveHeadAndTail) {

@@ -168,10 +168,13 @@ TEST_F(LoadTest, ARepeatOfARequestThatWaitsIsAnsweredFromTheSameWork) {
   start();
   auto client = corrector("raw-1");
   ASSERT_TRUE(client->wait_until_matched());
-  for (std::int64_t i = 0; i < 5; ++i) client->send(corrections(wire::MAX_TARGETS / 2), i);
-  client->send(corrections(10), 5);
-  client->send(corrections(10), 5);
-  client->send(corrections(10), 5);
+  const auto patient = [](std::size_t targets) {  // however slow the processor is
+    auto request = corrections(targets);
+    request.header().deadline_ms(300000);
+    return request;
+  };
+  for (std::int64_t i = 0; i < 5; ++i) client->send(patient(200), i);
+  for (int i = 0; i < 3; ++i) client->send(patient(10), 5);
   const auto replies = client->wait_for_replies(8);
   ASSERT_EQ(replies.size(), 8U);
   std::map<std::int64_t, std::size_t> times;
@@ -180,6 +183,22 @@ TEST_F(LoadTest, ARepeatOfARequestThatWaitsIsAnsweredFromTheSameWork) {
     ++times[reply.header().related_request_id().sequence_number()];
   }
   EXPECT_EQ(times[5], 3U);
+}
+
+TEST_F(LoadTest, AnIdThatWasGivenToSomethingElseIsAConflictAndGetsNobodyElsesTargets) {
+  start();
+  auto client = corrector("raw-1");
+  ASSERT_TRUE(client->wait_until_matched());
+  client->send(corrections(3), 1);
+  ASSERT_EQ(client->wait_for_replies(1).size(), 1U);
+  client->send(corrections(2), 1);
+  client->send(corrections(3), 1);
+  const auto replies = client->wait_for_replies(3);
+  ASSERT_EQ(replies.size(), 3U);
+  EXPECT_EQ(replies[1].header().result(), wire::RESULT_CONFLICT);
+  EXPECT_EQ(replies[1].corrections().size(), 0U);
+  EXPECT_EQ(replies[2].header().result(), wire::RESULT_OK) << "a repeat";
+  EXPECT_EQ(replies[2].corrections(), replies[0].corrections());
 }
 
 TEST_F(LoadTest, SlowChangesOfOneCellHoldUpNeitherReadingNorAnotherCell) {

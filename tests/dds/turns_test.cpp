@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <latch>
 #include <map>
 #include <memory>
 #include <string>
@@ -229,6 +230,54 @@ TEST(Turns, NobodyWorksForAClientThatNoLongerWaits) {
   work_all(shop);
   EXPECT_EQ(shop.shed["gone"], 1);
   EXPECT_LE(shop.served["gone"].count(), 0.110);
+}
+
+TEST(Turns, WhatWaitsPastItsTimeIsToldSoThoughNoWorkerComes) {
+  Shop shop;
+  ASSERT_TRUE(ask(shop, "a", {1, milliseconds(1), milliseconds(100)}));
+  ASSERT_TRUE(ask(shop, "b", {1, milliseconds(1), milliseconds(1000)}));
+  shop.lane.shed_late();
+  EXPECT_EQ(shop.shed["a"], 0);
+  shop.now += milliseconds(200);
+  shop.lane.shed_late();
+  EXPECT_EQ(shop.shed["a"], 1);
+  EXPECT_EQ(shop.shed["b"], 0);
+  work_all(shop);
+  EXPECT_EQ(shop.answered["b"], 1);
+  EXPECT_EQ(shop.answered["a"], 0);
+}
+
+/// Computes until it is let go.
+class LongWork final : public Job {
+ public:
+  std::size_t begin() override { return 1; }
+  void compute(std::size_t, std::size_t) override {
+    begun.count_down();
+    let_go.wait();
+  }
+  void finish() override {}
+  void shed(const Shed&) override {}
+  std::latch begun{1}, let_go{1};
+};
+
+TEST(Turns, WorkThatTakesLongBesideIdleWorkersIsNoHang) {
+  TurnLimits limits;
+  limits.workers = 4;
+  limits.cell_workers = 1;
+  Room room({});
+  Lane lane(limits, room);
+  lane.start();
+  const auto first = std::make_shared<LongWork>(), second = std::make_shared<LongWork>();
+  const SteadyTime by = std::chrono::steady_clock::now() + std::chrono::hours(1);
+  ASSERT_FALSE(lane.submit(first, {"a", "cell-7", "import", 1, 1000, by}));
+  first->begun.wait();
+  EXPECT_FALSE(lane.unseen()) << "nothing waits for a worker";
+  ASSERT_FALSE(lane.submit(second, {"a", "cell-7", "import", 1, 1000, by}));
+  first->let_go.count_down();
+  second->begun.wait();
+  EXPECT_FALSE(lane.unseen());
+  second->let_go.count_down();
+  lane.stop();
 }
 
 TEST(Turns, AFigureOfAStalledMachineDoesNotShutAClientOutForEver) {

@@ -179,7 +179,7 @@ class Changes {
  public:
   explicit Changes(std::uint64_t seed) {
     std::mt19937_64 random(seed);
-    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 4)(random));
+    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 7)(random));
   }
   /// Those from `*next` on, which rises with every answer.
   void ask(Store& store, std::size_t* next) const {
@@ -202,6 +202,18 @@ class Changes {
         case 3:
           static_cast<void>(store.add_job(job_of("first"), false, id));
           break;
+        case 4:
+          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, true,
+                                            "better", false, id));
+          break;
+        case 5:
+          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, false,
+                                            "not better", false, id));
+          break;
+        case 6:
+          while (store.prune_one("cell-7", {1, 1, 1}).value_or(false)) {
+          }
+          break;
         default:
           static_cast<void>(store.set_quarantine("cell-7", "first", name, id));
       }
@@ -210,16 +222,30 @@ class Changes {
 
  private:
   std::vector<int> kinds_;
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
 };
+
+/// The trail without its times; "broken" where it does not verify.
+std::string audited(const Store& store) {
+  const AuditTrail trail = demand(store.audit());
+  std::string all = trail.broken ? "broken: " + sentence(*trail.broken) : "";
+  for (const AuditRow& row : trail.rows)
+    all += fmt::format("\n{} {} {}: {} -> {} ({}) {}", row.number, row.what, row.subject, row.before, row.after,
+                       row.why, row.request);
+  return all;
+}
 
 /// Everything that the changes change.
 std::string contents(const Store& store) {
   std::string all = fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
   if (const auto before = store.previous_in_force("cell-7")) all += fmt::format(", before {}", fmt::join(*before, " "));
-  for (const StoredBatch& one : demand(store.batches("cell-7"))) all += "\n" + one.id + " " + one.quarantine;
+  for (const StoredBatch& one : demand(store.batches("cell-7")))
+    all += "\n" + one.id + " " + one.quarantine + (one.pruned ? " pruned" : "");
+  for (const StoredModel& one : demand(store.models("cell-7")))
+    all += fmt::format("\nversion {} {}", one.version, store.model("cell-7", one.version) ? "there" : "pruned");
   for (const StoredJob& one : demand(store.unfinished_jobs()))
     all += fmt::format("\njob of {}", fmt::join(one.batch_ids, " "));
-  return all;
+  return all + "\n" + audited(store);
 }
 
 class KilledStore : public StoreFaults, public testing::WithParamInterface<int> {};
@@ -278,6 +304,55 @@ TEST_P(KilledStore, AtAnyCallHasMadeEveryChangeOnceThatIsAskedForAgain) {
     EXPECT_EQ(contents(*store), expected) << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
   }
   EXPECT_GE(killed, kPoints - 1);
+}
+
+TEST_P(KilledStore, WhileAFileOfBeforeTheTrailIsTakenOnHasTakenItOnOnce) {
+  constexpr int kPoints = 30;
+  open();
+  for (int i = 1; i <= 1 + GetParam(); ++i) {
+    put_in_force(i);
+    ASSERT_TRUE(store_->add_batch(batch(std::to_string(i)), job_of(std::to_string(i))));
+  }
+  store_.reset();
+  {
+    SQLite::Database before(path_, SQLite::OPEN_READWRITE);
+    before.exec("DROP TABLE audit; DROP TABLE audit_end; DROP TABLE pruned");
+  }
+  std::size_t calls = 0;
+  const auto fresh_copy = [&](const test::TemporaryFolder& to) {
+    fs::copy(folder_.path(), to.path(), fs::copy_options::recursive);
+    return to.file("trammel.db");
+  };
+  {
+    test::TemporaryFolder whole;
+    test::FaultyDisk disk;
+    demand(Store::open(fresh_copy(whole))).reset();
+    calls = disk.calls();
+  }
+  for (int point = 0; point < kPoints; ++point) {
+    test::TemporaryFolder left;
+    const std::string path = fresh_copy(left);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      test::FaultyDisk disk;
+      auto calls_left = static_cast<int>(calls) * point / kPoints;
+      disk.set_plan([calls_left](auto, const std::string&) mutable {
+        if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
+        return SQLITE_OK;
+      });
+      static_cast<void>(Store::open(path));
+      ::_exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    const auto store = demand(Store::open(path));
+    const AuditTrail trail = demand(store->audit());
+    EXPECT_FALSE(trail.broken) << sentence(*trail.broken);
+    ASSERT_EQ(trail.rows.size(), 1u) << "call " << static_cast<int>(calls) * point / kPoints;
+    EXPECT_EQ(trail.rows.front().what, "migrate");
+    EXPECT_EQ(demand(store->version_in_force("cell-7")), 1 + GetParam());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, KilledStore, testing::Range(0, 10));

@@ -3,14 +3,15 @@
 #include <chrono>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
-#include "server/measurement/files/batch_file.h"
 #include "server/report/model_page.h"
 #include "server/trainer/pipeline/refitted.h"
 #include "server/trainer/pipeline/train.h"
@@ -23,19 +24,15 @@ std::int64_t unix_time() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-Result<CheckedBatch> read_checked_batch(const std::string& path, const Cell& cell,
-                                        const HoldOut& hold_out = drawn(0, 0)) {
-  return read_batch(path).and_then(
-      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), cell, hold_out); });
-}
-
 struct TrainArguments {
   std::string from;
   std::string refit = "base,tool";
-  std::string cell, batch, output, json;
+  std::string cell, output, json;
+  std::vector<std::string> batches;
   std::optional<std::string> level, bias;
   std::uint64_t seed = 1;
   double validation_share = 0;
+  bool as_read = false;
 };
 
 /// Checks the batch against the model to start from, as the service does before training. Only the refitted sources may
@@ -65,13 +62,14 @@ Status train_model(const TrainArguments& arguments) {
       arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<CheckedBatch> batch =
-      read_checked_batch(arguments.batch, *cell, drawn(arguments.validation_share, arguments.seed));
+      read_checked_batches(arguments.batches, *cell, drawn(arguments.validation_share, arguments.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   TrainOptions options;
   options.level = arguments.level;
   options.bias = arguments.bias;
   options.seed = arguments.seed;
   options.trained_at = unix_time();
+  options.looked_at = arguments.as_read;
   if (!arguments.from.empty()) {
     Result<CompensatedModel> from = load_model(arguments.from);
     if (!from) return tl::make_unexpected(from.error());
@@ -103,17 +101,27 @@ Status train_model(const TrainArguments& arguments) {
 }
 
 struct EvaluateArguments {
-  std::string model, batch, json;
+  std::string model, json;
+  std::vector<std::string> batches;
 };
+
+/// What the sessions of a batch stand on for a model, for people; empty where nothing had to be found.
+std::string located_text(const InWorld& world) {
+  if (world.located.empty()) return "";
+  return fmt::format("note: where the instrument of session {} stood was found from its own poses\n",
+                     fmt::join(world.located, ", "));
+}
 
 Status evaluate(const EvaluateArguments& arguments) {
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
-  const Result<CheckedBatch> batch = read_checked_batch(arguments.batch, model->cell());
+  const Result<CheckedBatch> batch = read_checked_batches(arguments.batches, model->cell());
   if (!batch) return tl::make_unexpected(batch.error());
-  const Evaluation evaluation = model->evaluate(batch->rows());
+  const Result<InWorld> world = in_world_of(*model, batch->rows());
+  if (!world) return tl::make_unexpected(world.error());
+  const Evaluation evaluation = model->evaluate(world->batch);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id()) +
-           evaluation_table(evaluation),
+           evaluation_table(evaluation) + located_text(*world),
        {arguments.json});
   return write_json(arguments.json, evaluation_json(evaluation));
 }
@@ -127,9 +135,11 @@ Status report(const ReportArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   std::optional<MeasurementBatch> batch;
   if (!arguments.batch.empty()) {
-    const Result<CheckedBatch> checked = read_checked_batch(arguments.batch, model->cell());
+    const Result<CheckedBatch> checked = read_checked_batches({arguments.batch}, model->cell());
     if (!checked) return tl::make_unexpected(checked.error());
-    batch = checked->rows();
+    Result<InWorld> world = in_world_of(*model, checked->rows());
+    if (!world) return tl::make_unexpected(world.error());
+    batch = std::move(world->batch);
   }
   if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
   tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
@@ -141,8 +151,7 @@ void add_train(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot, and learn what calibration leaves over");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
-      ->required();
+  add_batches_option(*command, arguments->batches)->required();
   command->add_option(
       "--level", arguments->level,
       "What to identify instead of the cell's error sources: M0 (nothing), M1 (base), M2 (base, geometry), M3 "
@@ -162,6 +171,8 @@ void add_train(CLI::App& app, Action& chosen) {
                    "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
+  command->add_flag("--as-read", arguments->as_read,
+                    "Learn from the positions as they are read, though another reading of the batch fits better");
   command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
@@ -172,8 +183,7 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
-      ->required();
+  add_batches_option(*command, arguments->batches)->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }

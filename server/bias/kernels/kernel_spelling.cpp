@@ -6,11 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/plain_text.h"
+
 namespace trammel {
 namespace {
 
 constexpr int kMostParentheses = 20;              // inside one another: reading recurses, and nobody means more
 constexpr std::size_t kMostSpellingBytes = 1000;  // as long as 32 words with room to spare
+constexpr std::size_t kMostShownBytes = 80;       // of a spelling in a message
 constexpr std::size_t kMostWords =
     32;  // the search for their hyperparameters takes more than twice as long for twice as many
 
@@ -32,7 +35,8 @@ bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 
 // sum = product {"+" product};  product = factor {"*" factor};  factor = "(" sum ")" | word ["(" "sincos" ")"].
 class Reader {
  public:
-  explicit Reader(std::string_view spelling) : all_(spelling), rest_(spelling) {}
+  explicit Reader(std::string_view spelling)
+      : all_(spelling), rest_(spelling), shown_(shown_short(spelling, kMostShownBytes)) {}
 
   Result<KernelPtr> whole() {
     auto kernel = list(
@@ -56,7 +60,7 @@ class Reader {
         continue;
       }
       if (bias.has(block->name()))
-        return refused("bias kernel `{}`: `{}` is named twice", all_, block->name()).of("bias").with_text(all_);
+        return refused("bias kernel `{}`: `{}` is named twice", shown_, block->name()).of("bias").with_text(all_);
       if (take('*') || take('(')) return misplaced(block->name());
       bias.blocks.push_back(block);
     } while (take('+'));
@@ -64,7 +68,7 @@ class Reader {
     if (!rest_.empty()) return expected("`+`, `*` or the end");
     if (parts.empty()) {
       const std::string_view block = bias.blocks.front()->name();
-      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", all_, block, block)
+      return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", shown_, block, block)
           .of("bias")
           .with_text(all_);
     }
@@ -92,7 +96,7 @@ class Reader {
   Result<KernelPtr> factor() {
     if (!take('(')) return leaf();
     if (++depth_ > kMostParentheses)
-      return refused("bias kernel `{}`: more than {} parentheses deep", all_, kMostParentheses)
+      return refused("bias kernel `{}`: more than {} parentheses deep", shown_, kMostParentheses)
           .of("bias")
           .with_text(all_)
           .beyond(depth_, kMostParentheses);
@@ -109,7 +113,7 @@ class Reader {
     if (find_block(name)) return misplaced(name);
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
-      return refused("bias kernel `{}`: `{}` is unknown", all_, name)
+      return refused("bias kernel `{}`: `{}` is unknown", shown_, shown_short(name))
           .of("bias")
           .with_text(name)
           .next(fmt::format("known are none and auto (alone), {}, and to be added joint_map, parameters",
@@ -120,13 +124,13 @@ class Reader {
   }
 
   Failure misplaced(std::string_view block) const {
-    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", all_, block, block)
+    return refused("bias kernel `{}`: `{}` can only be added to a whole bias, as in `se + {}`", shown_, block, block)
         .of("bias")
         .with_text(all_);
   }
 
   Failure expected(std::string_view what) const {
-    return refused("bias kernel `{}`, character {}: {} is expected", all_, all_.size() - rest_.size() + 1, what)
+    return refused("bias kernel `{}`, character {}: {} is expected", shown_, all_.size() - rest_.size() + 1, what)
         .of("bias")
         .with_text(all_)
         .with_value(all_.size() - rest_.size() + 1);
@@ -151,6 +155,7 @@ class Reader {
 
   std::string_view all_;
   std::string_view rest_;
+  std::string shown_;  // all_, as messages quote it
   int depth_ = 0;
 };
 
@@ -167,7 +172,8 @@ Status check_length(std::string_view spelling) {
   }
   const auto joins = std::count_if(spelling.begin(), spelling.end(), [](char c) { return c == '+' || c == '*'; });
   if (const auto words = static_cast<std::size_t>(joins) + 1; words > kMostWords) {
-    return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}", spelling, words, kMostWords)
+    return failure(ErrorCode::kTooLarge, "bias kernel `{}`: {} kernels, limit {}",
+                   shown_short(spelling, kMostShownBytes), words, kMostWords)
         .of("bias")
         .with_text(spelling)
         .beyond(words, kMostWords);

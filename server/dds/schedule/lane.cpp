@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kMostAtOnce = 256;    // items between two looks at the clock
 constexpr std::size_t kPartsOfPortion = 8;  // a look at the clock after about such a part
 constexpr std::chrono::milliseconds kSoon{1000};
+constexpr std::chrono::milliseconds kLateTick{50};  // so late is told that there was no time
 
 /// Items that take about an eighth of a portion, by those computed so far.
 std::size_t next_size(std::size_t items, Cost took, Cost portion) {
@@ -34,6 +35,7 @@ void Lane::start() {
     const auto which = i < limits_.workers ? Turns::Which::kAll : Turns::Which::kShort;
     workers_.emplace_back([this, which](const std::stop_token& stop) { work(stop, which); });
   }
+  workers_.emplace_back([this](const std::stop_token& stop) { watch_times(stop); });
 }
 
 void Lane::stop() {
@@ -70,8 +72,9 @@ std::optional<Turns::Portion> Lane::next(Turns::Which which) {
   if (which == Turns::Which::kShort) {
     express_waits_ = portion.has_value();
   } else {
-    waits_ = portion.has_value();
+    waits_ = portion.has_value() && turns_.has_work();
     workable_ = waits_;
+    if (waits_ && idle_ > 0) arrived_.notify_one();
   }
   if (portion) ++taken_up_;
   return portion;
@@ -92,6 +95,25 @@ void Lane::work(const std::stop_token& stop, Turns::Which which) {
     arrived_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return waits_; });
     --idle_;
   }
+}
+
+void Lane::watch_times(const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "late requests");
+  while (!stop.stop_requested()) {
+    {
+      MutexLock lock(mutex_);
+      next_look_.wait_for(lock, stop, kLateTick, [] { return false; });
+    }
+    shed_late();
+  }
+}
+
+void Lane::shed_late() {
+  const auto next_late = [this] {
+    const MutexLock lock(mutex_);
+    return turns_.next_late(now_());
+  };
+  while (const auto late = next_late()) late->entry->job().shed(late->shed);
 }
 
 bool Lane::step(Turns::Which which) {

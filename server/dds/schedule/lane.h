@@ -37,6 +37,8 @@ class Lane {
   [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
   /// Works on one portion in the calling thread. False: there was nothing to do.
   [[nodiscard]] bool step(Turns::Which which = Turns::Which::kAll);
+  /// Sheds what waits although its time is over, however busy the workers are.
+  void shed_late();
 
   [[nodiscard]] std::size_t requests() const;
   /// For the watchdog: a number while a request could be worked on and an idle worker has not taken it up; else empty.
@@ -45,6 +47,7 @@ class Lane {
 
  private:
   void work(const std::stop_token& stop, Turns::Which which);
+  void watch_times(const std::stop_token& stop);
   [[nodiscard]] std::optional<Turns::Portion> next(Turns::Which which) TRAMMEL_REQUIRES(mutex_);
   void run(const Turns::Portion& portion);
   [[nodiscard]] Turns::Done work_on(const Turns::Portion& portion);
@@ -61,7 +64,8 @@ class Lane {
   Turns turns_ TRAMMEL_GUARDED_BY(mutex_);
   bool stopped_ TRAMMEL_GUARDED_BY(mutex_) = false;
   Condition arrived_, express_arrived_;
-  bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;          // something may be workable
+  Condition next_look_;                                    // nobody notifies it
+  bool waits_ TRAMMEL_GUARDED_BY(mutex_) = false;          // something is workable
   bool express_waits_ TRAMMEL_GUARDED_BY(mutex_) = false;  // by express workers
   std::atomic<bool> workable_{false};                      // as waits_, for the watchdog
   std::atomic<int> idle_{0};                               // workers asleep, the express ones left out

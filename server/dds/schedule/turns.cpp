@@ -122,6 +122,25 @@ std::optional<Turns::Portion> Turns::next(SteadyTime now, Which which) {
   return hand_out(*best, std::move(entry), now);
 }
 
+bool Turns::has_work() const {
+  return std::any_of(clients_.begin(), clients_.end(),
+                     [this](const auto& one) { return workable(one.second, Which::kAll) != nullptr; });
+}
+
+std::optional<Turns::Portion> Turns::next_late(SteadyTime now) {
+  for (auto& [name, client] : clients_) {
+    for (const auto& entry : client.entries) {
+      if (entry->running_ > 0) continue;
+      auto late = too_late(client, *entry, now);
+      if (!late) continue;
+      const std::shared_ptr<Entry> taken = entry;
+      remove(client, *taken);
+      return Portion{taken, Part::kShed, std::move(*late)};
+    }
+  }
+  return std::nullopt;
+}
+
 Turns::Portion Turns::hand_out(Client& client, std::shared_ptr<Entry> entry, SteadyTime now) {
   if (auto late = too_late(client, *entry, now)) {
     entry->given_up_ = true;  // this portion is its last where others are under way

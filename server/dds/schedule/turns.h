@@ -85,6 +85,10 @@ class Turns {
   enum class Which { kAll, kShort };
   /// Empty when there is nothing that may be worked on.
   [[nodiscard]] std::optional<Portion> next(SteadyTime now, Which which = Which::kAll);
+  /// Whether next(kAll) would give a portion.
+  [[nodiscard]] bool has_work() const;
+  /// A request that nobody works on and whose time is over, taken out; empty when there is none.
+  [[nodiscard]] std::optional<Portion> next_late(SteadyTime now);
   /// After Job::begin(): other workers may join.
   void open(Entry& entry, std::size_t items);
   /// Ends a portion of another part than kShed. True: the request is given up and nobody works for it any longer, so

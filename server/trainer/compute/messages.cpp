@@ -72,7 +72,9 @@ std::vector<Frame> of_task(const ComputeTask& task) {
   if (task.in_force) frames.push_back(frame("in_force", {{"version", task.in_force->version}}, task.in_force->text));
   frames.push_back(frame("task", {{"cell", task.cell->name},
                                   {"diagnose", task.kind == JobKind::kDiagnose},
+                                  {"check", task.kind == JobKind::kCheck},
                                   {"batch_ids", task.batch_ids},
+                                  {"earlier_ids", task.earlier_ids},
                                   {"level", task.level},
                                   {"bias", task.bias},
                                   {"apply", task.apply},
@@ -90,8 +92,11 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   if (!cell) return tl::make_unexpected(cell.error());
   ComputeTask task;
   task.cell = std::make_shared<const Cell>(std::move(*cell));
-  task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose : JobKind::kTrain;
+  task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose
+              : head.at("check").get<bool>()  ? JobKind::kCheck
+                                              : JobKind::kTrain;
   task.batch_ids = head.at("batch_ids").get<std::vector<std::string>>();
+  task.earlier_ids = head.at("earlier_ids").get<std::vector<std::string>>();
   task.level = head.at("level");
   task.bias = head.at("bias");
   task.apply = head.at("apply");

@@ -24,10 +24,12 @@ struct BatchText {
 struct ComputeTask {
   std::shared_ptr<const Cell> cell;
   JobKind kind = JobKind::kTrain;
-  std::vector<std::string> batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
-  std::string level, bias;             ///< of a training; empty: as usual
-  bool apply = false;                  ///< of a diagnosis: train a model with the causes found
-  bool hold_against_in_force = false;  ///< look at the batch first, and learn nothing from one that is strange
+  std::vector<std::string> batch_ids;         ///< to learn from or to diagnose, together; none: the one that was sent
+  std::vector<std::string> earlier_ids = {};  ///< sessions of the same arm to learn from as well, oldest first
+  std::string level, bias;                    ///< of a training; empty: as usual
+                                              ///< `level` of a check: its tolerance in mm; empty: as the cell file says
+  bool apply = false;                         ///< of a diagnosis: train a model with the causes found
+  bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
   std::uint64_t seed = 1;
   double validation_share = 0.2;
