@@ -298,7 +298,7 @@ class Correcting {
   void write(const ProgramTarget& target, const std::vector<double>& exact, ReceiptRow& row) {
     row.after = target.numbers;
     for (const Rewrite& rewrite : target.rewrites) {
-      std::string text = rewrite.texts[0];
+      std::string text = rewrite.texts.empty() ? "" : rewrite.texts[0];
       for (std::size_t k = 0; k < rewrite.slots.size(); ++k) {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
@@ -307,7 +307,8 @@ class Correcting {
                                  : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
-        text += number + rewrite.texts[k + 1];
+        text += number;
+        if (!rewrite.texts.empty()) text += rewrite.texts[k + 1];
       }
       edits_[target.file].replace(rewrite.span, std::move(text));
     }

@@ -42,7 +42,7 @@ struct Slot {
 /// Bytes that are replaced by texts and numbers in turn: texts[0] slots[0] texts[1] ... texts[n].
 struct Rewrite {
   Span span;
-  std::vector<std::string> texts;
+  std::vector<std::string> texts;  ///< empty: the bytes are one number
   std::vector<Slot> slots;
 };
 

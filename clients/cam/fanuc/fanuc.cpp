@@ -80,7 +80,7 @@ class File {
       const auto written = value == group.values.end() ? std::nullopt : read_number(value->second.text);
       if (!written) return fmt::format("it does not say {}", name);
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{value->second.begin, value->second.end}, {"", ""}, {{k, written->style}}});
+      target.rewrites.push_back({{value->second.begin, value->second.end}, {}, {{k, written->style}}});
     }
     if (!joints) target.configuration = configuration_of(group.config);
     return "";

@@ -58,8 +58,7 @@ class Job {
       const auto written = read_number(position.numbers[k].text);
       if (!written) return "it holds what is no number";
       target.numbers.push_back(written->value);
-      target.rewrites.push_back(
-          {{position.numbers[k].begin, position.numbers[k].end}, {"", ""}, {{k, written->style}}});
+      target.rewrites.push_back({{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
     }
     target.configuration = configuration_of(position.conf);
     return "";

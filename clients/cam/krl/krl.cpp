@@ -600,8 +600,7 @@ class Reader {
     for (std::size_t k = 0; k < fields.size(); ++k) {
       const Value& number = *value.field(fields[k]);
       const auto written = read_number(std::string_view(text).substr(number.begin, number.end - number.begin));
-      target.rewrites.push_back(
-          {{number.begin, number.end}, {"", ""}, {{k, written ? written->style : kThreeDecimals}}});
+      target.rewrites.push_back({{number.begin, number.end}, {}, {{k, written ? written->style : kThreeDecimals}}});
     }
   }
 

@@ -544,7 +544,7 @@ class Reader {
         NumberStyle style;
         style.decimals = decimals;
         if (!written) target.folded = true;
-        target.rewrites.push_back({{part.begin, part.end}, {"", ""}, {{first + k, written ? written->style : style}}});
+        target.rewrites.push_back({{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
       }
       return;
     }

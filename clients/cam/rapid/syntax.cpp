@@ -54,14 +54,14 @@ class Parser {
   /// A word that begins or ends something wherever it stands: a statement that lacks its end goes no further.
   [[nodiscard]] bool is_reserved() const {
     static const std::set<std::string> kReserved = {
-        "module", "endmodule", "proc",   "endproc", "func", "endfunc",  "trap",    "endtrap", "record",
-        "local",  "task",      "const",  "pers",    "var",  "if",       "endif",   "elseif",  "else",
-        "for",    "endfor",    "while",  "endwhile", "test", "endtest", "case",    "default"};
+        "module", "endmodule", "proc",  "endproc",  "func", "endfunc", "trap",  "endtrap", "record",
+        "local",  "task",      "const", "pers",     "var",  "if",      "endif", "elseif",  "else",
+        "for",    "endfor",    "while", "endwhile", "test", "endtest", "case",  "default"};
     return token().kind == TokenKind::kWord && kReserved.contains(word());
   }
   [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
 
-  [[nodiscard]] std::size_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
+  [[nodiscard]] std::uint32_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
 
   /// Behind the next `;`.
   void skip_statement() {
@@ -70,8 +70,8 @@ class Parser {
   }
 
   void statement() {
-    static const std::set<std::string> kSingle = {"else",  "endif",   "endfor",    "endwhile",  "endtest", "error",
-                                                  "undo",  "default", "endmodule", "backward"};
+    static const std::set<std::string> kSingle = {"else",  "endif", "endfor",  "endwhile",  "endtest",
+                                                  "error", "undo",  "default", "endmodule", "backward"};
     const std::string first = word();
     if (first.empty()) return skip_odd_statement();
     if (first == "module") return module_head();
@@ -256,7 +256,8 @@ class Parser {
       Expression value = expression();
       if (is_sign(";")) module_.assignments.push_back({std::move(target), std::move(value), routine_, line});
       // A value that is not understood changes its target all the same.
-      else module_.assignments.push_back({std::move(target), {}, routine_, line});
+      else
+        module_.assignments.push_back({std::move(target), {}, routine_, line});
       return skip_statement();
     }
     at_ = begin;

@@ -142,7 +142,7 @@ class Tables {
       const auto written = read_number(field.text);
       if (!written) return false;
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{field.begin, field.end}, {"", ""}, {{k, written->style}}});
+      target.rewrites.push_back({{field.begin, field.end}, {}, {{k, written->style}}});
     }
     target.coordinates = columns.coordinates;
     target.name = fmt::format("row {}", row.line);

@@ -253,7 +253,7 @@ class Script {
       const auto written = read_number(value.numbers[k].text);
       if (!written) return "it holds what is no number";
       target.numbers.push_back(written->value);
-      target.rewrites.push_back({{value.numbers[k].begin, value.numbers[k].end}, {"", ""}, {{k, written->style}}});
+      target.rewrites.push_back({{value.numbers[k].begin, value.numbers[k].end}, {}, {{k, written->style}}});
     }
     return "";
   }
