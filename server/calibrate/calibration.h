@@ -23,17 +23,10 @@ struct CalibrationProblem {
   MeasurementBatch batch;  ///< checked against the cell
 };
 
-/// What is known of a parameter before, instead of its source's prior.
-struct ParameterPrior {
-  std::string name;             ///< of the parameter: `C3`
-  double mean = 0, stddev = 0;  ///< SI
-};
-
 struct CalibrateOptions {
   int max_iterations = 100;
-  std::vector<ParameterPrior> priors = {};  ///< names that the model has not do not matter
-  std::vector<bool> held;                   ///< a flag for each parameter that stays as it is; empty: none
-  bool robust = true;  ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
+  std::vector<bool> held;  ///< a flag for each parameter that stays as it is; empty: none
+  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
 };
 
 /// A pose whose residual is far above its sigma.

@@ -72,23 +72,33 @@ struct Learned {
   Eigen::MatrixXd deviations;  ///< robots x P, expected
 };
 
-/// Spreads of parameters with the same unit are alike.
-Eigen::VectorXd shrunk(const Eigen::VectorXd& sums, double robots, const std::vector<std::string>& units) {
+/// A parameter among those of its kind: their spreads are alike, of quantities that cannot be below 0 in shares of
+/// their means.
+struct Kind {
+  std::string unit;
+  bool positive = false;
+};
+
+Eigen::VectorXd shrunk(const Eigen::VectorXd& sums, const Eigen::VectorXd& mean, double robots,
+                       const std::vector<Kind>& of) {
+  Eigen::VectorXd size = Eigen::VectorXd::Ones(sums.size());
+  for (Index k = 0; k < sums.size(); ++k)
+    if (of[static_cast<std::size_t>(k)].positive) size(k) = std::max(mean(k) * mean(k), 1e-6);
   std::map<std::string, std::pair<double, int>> kinds;
   for (Index k = 0; k < sums.size(); ++k) {
-    auto& [sum, count] = kinds[units[static_cast<std::size_t>(k)]];
-    sum += std::log(std::max(sums(k) / robots, 1e-12));
+    auto& [sum, count] = kinds[of[static_cast<std::size_t>(k)].unit];
+    sum += std::log(std::max(sums(k) / robots / size(k), 1e-12));
     ++count;
   }
   Eigen::VectorXd variance(sums.size());
   for (Index k = 0; k < sums.size(); ++k) {
-    const auto& [sum, count] = kinds.at(units[static_cast<std::size_t>(k)]);
-    variance(k) = (sums(k) + kAsIfRobots * std::exp(sum / count)) / (robots + kAsIfRobots);
+    const auto& [sum, count] = kinds.at(of[static_cast<std::size_t>(k)].unit);
+    variance(k) = (sums(k) + kAsIfRobots * size(k) * std::exp(sum / count)) / (robots + kAsIfRobots);
   }
   return variance;
 }
 
-Learned learned_from(const std::vector<Said>& robots, const std::vector<std::string>& units) {
+Learned learned_from(const std::vector<Said>& robots, const std::vector<Kind>& kinds) {
   const Index P = robots.front().weighted.size();
   const auto n = static_cast<Index>(robots.size());
   Learned now{Eigen::VectorXd::Zero(P), Eigen::VectorXd::Constant(P, 1.0), Eigen::MatrixXd::Zero(n, P)};
@@ -107,7 +117,7 @@ Learned learned_from(const std::vector<Said>& robots, const std::vector<std::str
     const Eigen::MatrixXd off = expected.rowwise() - now.mean.transpose();
     const Eigen::MatrixXd square = off.cwiseAbs2() + uncertain;
     now.variance =
-        shrunk((weights.array() * square.array()).colwise().sum().transpose(), static_cast<double>(n), units);
+        shrunk((weights.array() * square.array()).colwise().sum().transpose(), now.mean, static_cast<double>(n), kinds);
     weights = (kTails + 1) / (kTails + square.array().rowwise() / now.variance.transpose().array());
     now.deviations = off;
   }
@@ -170,11 +180,11 @@ Result<FleetPrior> learn_fleet_prior(const Chain& robot, const std::vector<Fleet
   const std::vector<Parameter> known = twins.front()->physics.parameters();
   const std::map<std::string, Index> first = arm_parameters(twins.front()->physics);
   Eigen::VectorXd scale(static_cast<Index>(names.size()));
-  std::vector<std::string> units;
+  std::vector<Kind> kinds;
   for (std::size_t k = 0; k < names.size(); ++k) {
     const Parameter& parameter = known[static_cast<std::size_t>(first.at(names[k]))];
     scale(static_cast<Index>(k)) = parameter.prior_scale;
-    units.push_back(parameter.unit);
+    kinds.push_back({parameter.unit, parameter.lower == 0});
   }
   std::vector<Said> said;
   for (const ModelParts* parts : twins) {
@@ -183,7 +193,7 @@ Result<FleetPrior> learn_fleet_prior(const Chain& robot, const std::vector<Fleet
     for (const std::string& name : names) at.push_back(places.at(name));
     said.push_back(said_by(*parts, at, scale));
   }
-  const Learned learned = learned_from(said, units);
+  const Learned learned = learned_from(said, kinds);
   FleetPrior prior;
   prior.robot = robot.name();
   prior.robots = static_cast<int>(twins.size());

@@ -10,9 +10,8 @@
 
 #include "server/base/units.h"
 #include "server/compensate/known_rows.h"
-#include "server/health/evidence/refitted_rows.h"
+#include "server/health/evidence/check_tests.h"
 #include "server/health/evidence/working_poses.h"
-#include "server/numerics/chi_square.h"
 
 namespace trammel {
 
@@ -20,16 +19,17 @@ namespace {
 
 using Eigen::Index;
 using health::CheckRows;
+using health::CheckTests;
+using health::HealthyChecks;
 using health::Hypothesis;
 using health::RefittedRows;
-using health::SimulatedChecks;
+using health::Sifted;
 
-constexpr int kMostCauses = 3;             // that a check may name
-constexpr double kAlike = 6;               // of scores: odds of e^3
-constexpr double kUnlinear = 0.003;        // of an effect
-constexpr double kDoubtful = 0.02;         // chance from which on nothing is said for certain
-constexpr double kNearlySeen = 10;         // times the limit: a cause that is named where the whole is beyond chance
-constexpr double kBadPoseShare = 1 / 6.0;  // of the poses, at least one: more of them are no single bad poses
+constexpr int kMostCauses = 3;       // that a check may name
+constexpr double kAlike = 6;         // of scores: odds of e^3
+constexpr double kUnlinear = 0.003;  // of an effect
+constexpr double kDoubtful = 0.02;   // chance from which on nothing is said for certain
+constexpr double kNearlySeen = 10;   // times the limit: a cause that is named where the whole is beyond chance
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   Eigen::MatrixXd both(one.rows(), one.cols() + other.cols());
@@ -52,43 +52,48 @@ std::string date_of(std::int64_t unix_s) {
 /// One check, while it is looked through.
 class Examination {
  public:
-  Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working, CheckRows rows)
+  Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working, CheckRows rows,
+              int tail_freedom)
       : options_(options),
         effects_(effects),
         working_(working),
         rows_(std::move(rows)),
         signals_(working.signals(effects, options.seed)),
-        covariance_(rows_.covariance),
-        frames_(rows_.by_base) {
-    if (options.new_tool) frames_ = joined(frames_, rows_.by_cause(Eigen::all, effects.tool_columns()));
-    nuisance_ = frames_;
-    hypotheses_ = health::cause_hypotheses(effects, rows_, signals_);
-    causes_ = hypotheses_.size();
-    for (Hypothesis& pose : health::pose_hypotheses(rows_)) hypotheses_.push_back(std::move(pose));
-  }
+        questions_(questions()),
+        healthy_(rows_, frames(), questions_, tail_freedom, options.seed),
+        covariance_(rows_.covariance) {}
 
   HealthCheck result(const CheckTimes& times) {
     check_.poses = static_cast<int>(rows_.poses());
     check_.tolerance = options_.tolerance;
     check_.not_asked = effects_.not_asked();
-    while (look_once()) {
-    }
-    const RefittedRows healthy(rows_.covariance, frames_);
-    tell_rms(healthy);
-    tell_smallest(healthy);
-    tell_due(healthy, times);
+    sifted_ = healthy_.sifted(rows_.residual);
+    for (const int pose : sifted_.bad) check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(pose)]);
+    check_.p_value = healthy_.chance_of(sifted_.smallest_p);
+    const CheckTests& tests = healthy_.tests(sifted_.bad);
+    look_for_changes(tests);
+    tell_rms(tests.rows());
+    tell_smallest(tests);
+    tell_due(tests.rows(), times);
     tell_verdict();
     return std::move(check_);
   }
 
  private:
-  [[nodiscard]] std::vector<Eigen::MatrixXd> directions_of_causes(const RefittedRows& refitted) const {
-    std::vector<Eigen::MatrixXd> directions;
-    for (std::size_t h = 0; h < causes_; ++h) directions.push_back(refitted.directions(hypotheses_[h].columns));
-    return directions;
+  [[nodiscard]] health::Questions questions() const {
+    health::Questions questions{health::cause_hypotheses(effects_, rows_, signals_), 0};
+    questions.causes = questions.hypotheses.size();
+    for (Hypothesis& pose : health::pose_hypotheses(rows_)) questions.hypotheses.push_back(std::move(pose));
+    return questions;
   }
-  /// Whether something was found, and the rest is to be looked at again.
-  bool look_once();
+  /// Refitted in a healthy robot.
+  [[nodiscard]] Eigen::MatrixXd frames() const {
+    if (!options_.new_tool) return rows_.by_base;
+    return joined(rows_.by_base, rows_.by_cause(Eigen::all, effects_.tool_columns()));
+  }
+  void look_for_changes(const CheckTests& healthy);
+  /// Whether a cause was found, and the rest is to be looked at again.
+  bool look_once(const CheckTests& tests);
   void found(std::size_t hypothesis, const RefittedRows& refitted, double chance, const std::vector<double>& scores);
   void tell_rivals(std::size_t hypothesis, const std::vector<double>& scores, SeenChange& change) const;
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
@@ -96,23 +101,20 @@ class Examination {
   void tell_due(const RefittedRows& refitted, const CheckTimes& times);
   [[nodiscard]] Eigen::VectorXd rows_of(const CauseSignal& signal) const;
   [[nodiscard]] std::vector<double> strengths(std::size_t cause, const RefittedRows& refitted) const;
-  void tell_smallest(const RefittedRows& refitted);
+  void tell_smallest(const CheckTests& tests);
   void tell_verdict();
   [[nodiscard]] std::string seen_in_words() const;
-  [[nodiscard]] int most_bad_poses() const {
-    return std::max(1, static_cast<int>(kBadPoseShare * static_cast<double>(rows_.poses())));
-  }
 
   const HealthOptions& options_;
   const CauseEffects& effects_;
   const WorkingPoses& working_;
   const CheckRows rows_;
   const std::vector<CauseSignal> signals_;
-  Eigen::MatrixXd covariance_;
-  Eigen::MatrixXd frames_;              // refitted in a healthy robot: base, tool, bad poses
-  Eigen::MatrixXd nuisance_;            // and what was found
-  std::vector<Hypothesis> hypotheses_;  // the causes, then the poses
-  std::size_t causes_ = 0;
+  const health::Questions questions_;
+  HealthyChecks healthy_;
+  Sifted sifted_;
+  Eigen::MatrixXd covariance_;  // with what a change that was found may leave over
+  Eigen::MatrixXd nuisance_;    // refitted: frames, bad poses, changes that were found
   HealthCheck check_;
 };
 
@@ -146,42 +148,37 @@ Size size_of_any(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double
   return {working_rms * std::sqrt(square), 2 * working_rms * std::sqrt(by_noise / 2)};
 }
 
-bool Examination::look_once() {
-  const RefittedRows refitted(covariance_, nuisance_);
-  const SimulatedChecks simulated(refitted, directions_of_causes(refitted), options_.seed);
-  const Eigen::VectorXd left = refitted.left(rows_.residual);
-  const double smallest = simulated.smallest(left);
-  const double chance = simulated.chance_of(smallest);
-  if (check_.changed.empty()) check_.p_value = chance;
-  if (refitted.freedom() < 1 || smallest > simulated.limit(options_.false_alarm)) return false;
+void Examination::look_for_changes(const CheckTests& healthy) {
+  nuisance_ = frames();
+  for (const int pose : sifted_.bad)
+    nuisance_ = joined(nuisance_, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+  if (!look_once(healthy)) return;
+  while (static_cast<int>(check_.changed.size()) < kMostCauses &&
+         look_once(CheckTests(covariance_, nuisance_, questions_))) {
+  }
+}
 
-  const double price = std::log(static_cast<double>(rows_.residual.size()));
-  std::vector<double> scores;
-  for (const Hypothesis& one : hypotheses_) {
-    const Eigen::MatrixXd own = refitted.directions(one.columns);
-    scores.push_back((own.transpose() * left).squaredNorm() - price * static_cast<double>(own.cols()));
+bool Examination::look_once(const CheckTests& tests) {
+  const Eigen::VectorXd left = tests.rows().left(rows_.residual);
+  const double smallest = tests.smallest_p(left);
+  const double limit = healthy_.limit(options_.false_alarm);
+  if (smallest >= limit) return false;
+  const double chance = healthy_.chance_of(smallest);
+  const std::vector<double> scores = tests.scores(left);
+  const auto causes_end = scores.begin() + static_cast<std::ptrdiff_t>(questions_.causes);
+  const auto best = static_cast<std::size_t>(std::max_element(scores.begin(), causes_end) - scores.begin());
+  const bool fits = questions_.causes > 0 && scores[best] > 0 && tests.p_value(best, left) < kNearlySeen * limit;
+  if (fits) {
+    found(best, tests.rows(), chance, scores);
+  } else if (check_.changed.empty()) {
+    unknown_found(chance, left, tests.rows().freedom());
   }
-  const auto best = static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
-  const auto best_cause = static_cast<std::size_t>(
-      std::max_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(causes_)) - scores.begin());
-  if (best >= causes_ && static_cast<int>(check_.suspects.size()) < most_bad_poses()) {
-    check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(hypotheses_[best].pose)]);
-    frames_ = joined(frames_, hypotheses_[best].columns);
-    nuisance_ = joined(nuisance_, hypotheses_[best].columns);
-    return true;
-  }
-  const double own_p = chi_square_tail(simulated.explained(best_cause, left), simulated.freedom(best_cause));
-  if (!(own_p < kNearlySeen * simulated.limit(options_.false_alarm)) || scores[best_cause] <= 0) {
-    unknown_found(chance, left, refitted.freedom());
-    return false;
-  }
-  found(best_cause, refitted, chance, scores);
-  return static_cast<int>(check_.changed.size()) < kMostCauses;
+  return fits;
 }
 
 void Examination::found(std::size_t hypothesis, const RefittedRows& refitted, double chance,
                         const std::vector<double>& scores) {
-  const Hypothesis& one = hypotheses_[hypothesis];
+  const Hypothesis& one = questions_.hypotheses[hypothesis];
   const CauseEffects::Entry& entry = effects_.causes()[one.cause];
   const Eigen::VectorXd left = refitted.left(rows_.residual);
   const Eigen::MatrixXd own = refitted.left(one.columns);
@@ -202,8 +199,8 @@ void Examination::tell_rivals(std::size_t hypothesis, const std::vector<double>&
     const bool known = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), same);
     if (!known && !same(change.cause)) change.could_also_be.push_back(other);
   };
-  for (std::size_t h = 0; h < causes_; ++h) {
-    if (scores[h] > scores[hypothesis] - kAlike) add(effects_.causes()[hypotheses_[h].cause].cause);
+  for (std::size_t h = 0; h < questions_.causes; ++h) {
+    if (scores[h] > scores[hypothesis] - kAlike) add(effects_.causes()[questions_.hypotheses[h].cause].cause);
   }
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {
@@ -301,13 +298,12 @@ Eigen::VectorXd Examination::rows_of(const CauseSignal& signal) const {
   return rows;
 }
 
-void Examination::tell_smallest(const RefittedRows& refitted) {
-  const SimulatedChecks simulated(refitted, directions_of_causes(refitted), options_.seed);
-  const double limit = simulated.limit(options_.false_alarm);
-  bool all_seen = refitted.freedom() >= 1 && causes_ > 0;
-  for (std::size_t h = 0; h < causes_; ++h) {
-    const std::size_t cause = hypotheses_[h].cause;
-    const auto rms = smallest_seen(strengths(cause, refitted), simulated.freedom(h), limit, options_.power);
+void Examination::tell_smallest(const CheckTests& tests) {
+  const double limit = healthy_.limit(options_.false_alarm);
+  bool all_seen = tests.rows().freedom() >= 1 && questions_.causes > 0;
+  for (std::size_t h = 0; h < questions_.causes; ++h) {
+    const std::size_t cause = questions_.hypotheses[h].cause;
+    const auto rms = smallest_seen(strengths(cause, tests.rows()), tests.freedom(h), limit, options_.power);
     all_seen = all_seen && rms.has_value();
     check_.smallest.push_back({effects_.causes()[cause].cause, rms});
   }
@@ -388,7 +384,9 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
   const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed), options.new_tool);
   Result<CheckRows> rows = health::check_rows(model, known, effects);
   if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
-  return Examination(options, effects, working, std::move(*rows))
+  const ErrorFigures& shown = model.parts().training.compensated;
+  const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
+  return Examination(options, effects, working, std::move(*rows), tails)
       .result({model.provenance().measured_at, batch.rows().measured_at});
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/job_sources.h"
 #include "server/trainer/pipeline/given_up.h"
 
@@ -146,6 +147,7 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   }
   if (const auto present = registry_.in_force(job.cell))
     task.in_force = ModelText{present->version, serialize(present->model)};
+  task.fleet = fleet_prior_of(job);
   task.seed = options_.seed;
   task.validation_share = options_.validation_share;
   task.accept_ratio = options_.accept_ratio;
@@ -160,6 +162,21 @@ Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch)
   const auto releases = store_.may_release(job.id);
   if (!releases) return releases;
   return !*releases;
+}
+
+/// From the models in force of other cells with robots of its type; empty where the cell does not want it, or where
+/// they are too few.
+std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
+  const Cell& cell = *cells_.at(job.cell);
+  const auto rules = rules_of(cell);
+  if (job.kind != JobKind::kTrain || !rules || !rules->fleet_prior) return std::nullopt;
+  std::vector<FleetMember> twins;
+  for (const auto& [name, other] : cells_) {
+    if (name == job.cell || !same_type(other->robot, cell.robot)) continue;
+    if (const auto served = registry_.in_force(name)) twins.push_back({name, served->model});
+  }
+  auto prior = learn_fleet_prior(cell.robot, twins);
+  return prior ? std::optional(std::move(*prior)) : std::nullopt;
 }
 
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {

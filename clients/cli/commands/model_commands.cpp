@@ -13,6 +13,7 @@
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
 #include "server/report/model_page.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
 #include "server/trainer/pipeline/train.h"
 
@@ -30,6 +31,7 @@ struct TrainArguments {
   std::string cell, output, json;
   std::vector<std::string> batches;
   std::optional<std::string> level, bias;
+  std::vector<std::string> fleet;
   std::uint64_t seed = 1;
   double validation_share = 0;
   bool as_read = false;
@@ -57,6 +59,44 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
       .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
 }
 
+/// What robots of the cell's type have in common, by the models of `paths`; empty where nobody wants to know.
+Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths, const Cell& cell) {
+  const Result<CellRules> rules = rules_of(cell);
+  if (!rules) return tl::make_unexpected(rules.error());
+  if (!rules->fleet_prior && paths.empty()) return std::optional<FleetPrior>();
+  if (paths.empty()) {
+    return failure(ErrorCode::kUsage, "cell {} says prior: fleet, and no robot of its type is named", cell.name)
+        .of("--fleet")
+        .next("name their models, --fleet once for each");
+  }
+  std::vector<FleetMember> members;
+  for (const std::string& path : paths) {
+    Result<CompensatedModel> model = load_model(path);
+    if (!model) return tl::make_unexpected(model.error());
+    members.push_back({path, std::move(*model)});
+  }
+  return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) { return std::optional(std::move(prior)); });
+}
+
+std::string unlike_text(const std::vector<Unlike>& unlike) {
+  std::string text;
+  for (const Unlike& one : unlike) text += "unlike its twins: " + to_string(one) + "\n";
+  return text;
+}
+
+nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const Unlike& one : unlike) {
+    json.push_back({{"parameter", one.parameter},
+                    {"unit", one.unit},
+                    {"value", one.value},
+                    {"twins", one.fleet_mean},
+                    {"twins_u95", 2 * one.fleet_stddev},
+                    {"z", one.z}});
+  }
+  return json;
+}
+
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell_to_train(
       arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
@@ -70,6 +110,9 @@ Status train_model(const TrainArguments& arguments) {
   options.seed = arguments.seed;
   options.trained_at = unix_time();
   options.looked_at = arguments.as_read;
+  Result<std::optional<FleetPrior>> fleet = fleet_prior(arguments.fleet, *cell);
+  if (!fleet) return tl::make_unexpected(fleet.error());
+  options.fleet = std::move(*fleet);
   if (!arguments.from.empty()) {
     Result<CompensatedModel> from = load_model(arguments.from);
     if (!from) return tl::make_unexpected(from.error());
@@ -90,14 +133,17 @@ Status train_model(const TrainArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
   const auto& parts = model->parts();
-  tell(model_text(*model) +
+  const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
+  tell(model_text(*model) + unlike_text(unlike) +
            (parts.validation
                 ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
                 : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
                               parts.training.poses, parts.provenance.figures_batch_id()) +
                       evaluation_table(parts.training)),
        {arguments.output, arguments.json});
-  return write_json(arguments.json, model_json(*model));
+  nlohmann::ordered_json json = model_json(*model);
+  if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
+  return write_json(arguments.json, json);
 }
 
 struct EvaluateArguments {
@@ -165,6 +211,9 @@ void add_train(CLI::App& app, Action& chosen) {
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
       ->needs("--from")
       ->capture_default_str();
+  command->add_option("--fleet", arguments->fleet,
+                      "Model file of a robot of the same type, once for each, at least three: what they have in common "
+                      "is expected of this one, but for what it is unlike them in");
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,

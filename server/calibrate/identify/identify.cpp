@@ -161,8 +161,7 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
 }  // namespace
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
-  ScaledParameters s = scaled_parameters(problem.model, options.held);
-  take_priors(options.priors, s);
+  const ScaledParameters s = scaled_parameters(problem.model, options.held);
   const auto P = s.scale.size();
   CalibrationResult result;
   result.model = problem.model;

@@ -1,7 +1,5 @@
 #include "server/calibrate/identify/scaled_parameters.h"
 
-#include <algorithm>
-
 #include "server/calibrate/frames/frames.h"
 
 namespace trammel {
@@ -36,19 +34,6 @@ ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector
     }
   }
   return s;
-}
-
-void take_priors(const std::vector<ParameterPrior>& priors, ScaledParameters& s) {
-  for (std::size_t k = 0; k < s.parameters.size(); ++k) {
-    const auto named = [&](const ParameterPrior& prior) { return prior.name == s.parameters[k].name; };
-    const auto prior = std::find_if(priors.begin(), priors.end(), named);
-    if (prior == priors.end()) continue;
-    const auto row = static_cast<Eigen::Index>(k);
-    s.parameters[k].prior = prior->mean;
-    s.parameters[k].prior_scale = prior->stddev;
-    s.scale(row) = prior->stddev;
-    s.prior(row) = prior->mean / prior->stddev;
-  }
 }
 
 }  // namespace trammel

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "server/calibrate/calibration.h"
 #include "server/error_sources/physical_model.h"
 
 namespace trammel {
@@ -25,7 +24,5 @@ struct ScaledParameters {
 /// with a chain that was still wrong, and for a base beside `held` parameters, which was just located. `held`: a flag
 /// for each parameter, or empty.
 [[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held);
-/// With these priors for the parameters that they name.
-void take_priors(const std::vector<ParameterPrior>& priors, ScaledParameters& s);
 
 }  // namespace trammel

@@ -163,6 +163,11 @@ Status read_parameters(const Json& content, const std::string& where, ModelParts
                                 .value = number_from(one, "value"),
                                 .stddev = number_from(one, "stddev"),
                                 .identified = truth_from(one.at("identified"))});
+    if (!one.contains("prior")) continue;
+    parts.parameters.back().parameter.prior = number_from(one, "prior");
+    parts.parameters.back().parameter.prior_scale = number_from(one, "prior_stddev");
+    if (!(parts.parameters.back().parameter.prior_scale > 0))
+      return refused("a prior of no width").in(where).of("parameters").with_text(known[i].name);
   }
   return {};
 }

@@ -157,6 +157,13 @@ Json json_of(const ModelProvenance& provenance) {
 void add_calibration(const ModelParts& parts, Json& content) {
   content["covariance"] = matrix_json(parts.covariance);
   content["parameters"] = list_of(parts.parameters);
+  const std::vector<Parameter> drawn = parts.physics.parameters();
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    const Parameter& used = parts.parameters[k].parameter;
+    if (!(used.prior_scale < drawn[k].prior_scale)) continue;  // as its source has it, or wider
+    content["parameters"][k]["prior"] = used.prior;
+    content["parameters"][k]["prior_stddev"] = used.prior_scale;
+  }
   content["unidentifiable"] = list_of(parts.unidentifiable);
   content["rank"] = parts.rank;
   content["condition_number"] = parts.condition_number;

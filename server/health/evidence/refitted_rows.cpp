@@ -3,10 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/units.h"
-#include "server/numerics/chi_square.h"
-#include "server/numerics/seeded_random.h"
-
 namespace trammel::health {
 
 namespace {
@@ -14,13 +10,6 @@ namespace {
 using Eigen::Index;
 
 constexpr double kLeastLeft = 1e-3;  // share of a column: less is rounding, or made up for
-constexpr int kSimulated = 1500;     // healthy checks
-constexpr double kReadOff = 0.02;    // share of them at which the limit is read; smaller chances follow in proportion
-
-double normal(SeededRandom& random) {
-  const double radius = std::sqrt(-2 * std::log(random.uniform(1e-300, 1)));
-  return radius * std::cos(2 * kPi * random.uniform(0, 1));
-}
 
 /// Orthonormal directions of columns whose lengths were `before`.
 Eigen::MatrixXd span_of(Eigen::MatrixXd columns, const Eigen::VectorXd& before) {
@@ -93,29 +82,6 @@ Eigen::MatrixXd RefittedRows::unwhitened_covariance() const {
       Eigen::MatrixXd::Identity(nuisance_.rows(), nuisance_.rows()) - nuisance_ * nuisance_.transpose();
   const Eigen::MatrixXd half = factor_.matrixL() * all;
   return half * half.transpose();
-}
-
-SimulatedChecks::SimulatedChecks(const RefittedRows& rows, std::vector<Eigen::MatrixXd> directions, std::uint64_t seed)
-    : directions_(std::move(directions)), freedom_(rows.freedom()) {
-  if (freedom_ < 1) return;
-  SeededRandom random(seed);
-  const Index count = rows.size();
-  std::vector<double> smallest_of_each;
-  Eigen::VectorXd noise(count);
-  for (int k = 0; k < kSimulated; ++k) {
-    for (Index i = 0; i < count; ++i) noise(i) = normal(random);
-    smallest_of_each.push_back(smallest(rows.refitted(noise)));
-  }
-  const auto at = smallest_of_each.begin() + static_cast<std::ptrdiff_t>(kReadOff * kSimulated);
-  std::nth_element(smallest_of_each.begin(), at, smallest_of_each.end());
-  each_ = *at / kReadOff;
-}
-
-double SimulatedChecks::smallest(const Eigen::VectorXd& left) const {
-  double smallest = chi_square_tail(left.squaredNorm(), freedom_);
-  for (std::size_t h = 0; h < directions_.size(); ++h)
-    smallest = std::min(smallest, chi_square_tail(explained(h, left), freedom(h)));
-  return smallest;
 }
 
 }  // namespace trammel::health

@@ -48,28 +48,4 @@ class RefittedRows {
   Eigen::MatrixXd nuisance_;  // R x f, orthonormal
 };
 
-/// Chances of each hypothesis to explain by chance what it explains, and of all together.
-class SimulatedChecks {
- public:
-  /// `directions`: of each hypothesis.
-  SimulatedChecks(const RefittedRows& rows, std::vector<Eigen::MatrixXd> directions, std::uint64_t seed);
-
-  [[nodiscard]] int freedom(std::size_t hypothesis) const { return static_cast<int>(directions_[hypothesis].cols()); }
-  /// Squared length of the residuals (R, whitened, refitted) along a hypothesis.
-  [[nodiscard]] double explained(std::size_t hypothesis, const Eigen::VectorXd& left) const {
-    return (directions_[hypothesis].transpose() * left).squaredNorm();
-  }
-  /// The smallest p-value of all hypotheses and of the whole.
-  [[nodiscard]] double smallest(const Eigen::VectorXd& left) const;
-  /// The limit of one p-value that the smallest in a healthy check is below with this chance.
-  [[nodiscard]] double limit(double false_alarm) const { return false_alarm * each_; }
-  /// Chance in a healthy check of a smallest p-value below `p`.
-  [[nodiscard]] double chance_of(double p) const { return std::min(1.0, p / each_); }
-
- private:
-  std::vector<Eigen::MatrixXd> directions_;
-  int freedom_ = 0;
-  double each_ = 1;  // one p-value for a chance of all, where both are small
-};
-
 }  // namespace trammel::health

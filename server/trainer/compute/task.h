@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/fleet/fleet_prior.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/verdict.h"
 
@@ -31,6 +32,7 @@ struct ComputeTask {
   bool apply = false;                         ///< of a diagnosis: train a model with the causes found
   bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
+  std::optional<FleetPrior> fleet;  ///< where the cell file says `prior: fleet`, and there are twins
   std::uint64_t seed = 1;
   double validation_share = 0.2;
   double accept_ratio = 1.02;

@@ -192,6 +192,7 @@ TrainOptions Workbench::train_options(const ComputeWatch& watch) const {
     options.level = level_with_additions(*task_.cell, in_force_->model);
   }
   if (!task_.bias.empty()) options.bias = task_.bias;
+  options.fleet = task_.fleet;
   options.seed = task_.seed;
   options.trained_at = task_.now;
   options.looked_at = true;  // by this job, or by whoever asked for a training from batches that he knows
