@@ -231,6 +231,19 @@ Result<std::string> identity_of(SQLite::Database& database, const std::string& o
   return id;
 }
 
+std::optional<StoreMark> mark_of(SQLite::Database& database) {
+  constexpr const char* kCounts =
+      "SELECT (SELECT COALESCE(GROUP_CONCAT(name || ' ' || seq), '') FROM "
+      "(SELECT name, seq FROM sqlite_sequence ORDER BY name)) || ', models ' || (SELECT COUNT(*) FROM models) || "
+      "', unfinished ' || (SELECT COUNT(*) FROM jobs WHERE state IN ('queued', 'running'))";
+  try {
+    return StoreMark{database.execAndGet("SELECT id FROM store_identity WHERE id != ''").getString(),
+                     database.execAndGet(kCounts).getString()};
+  } catch (const SQLite::Exception&) {
+    return std::nullopt;
+  }
+}
+
 bool has_models(SQLite::Database& database) {
   return database.execAndGet("SELECT EXISTS (SELECT 1 FROM models)").getInt() != 0;
 }

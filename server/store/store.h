@@ -96,17 +96,18 @@ struct StoreConnection;
 /// taken where the store does not give them.
 class Store {
  public:
-  /// Creates the file if there is none. Refuses (kConflict) a second writer on the same file. A file on a disk that
-  /// cannot be written is read, and written as soon as that is possible: state(). Of a file that is damaged, emptied or
-  /// of another store the copies are there, and nothing is written to it; without copies it is refused (kInternal), as
-  /// is a file of another program or of a newer schema (kRefused). The file `<file>.lock` beside it holds the writer's
-  /// process id.
+  /// Creates the file if there is none, and no copies of models that were served from it. Refuses (kConflict) a second
+  /// writer on the same file, by whatever name. A file on a disk that cannot be written is read, and written as soon as
+  /// that is possible: state(). Of a file that is damaged, emptied, gone or of another store the copies are there, and
+  /// nothing is written to it; without copies it is refused (kInternal), as is a file of another program or of a newer
+  /// schema (kRefused). The file `<file>.lock` beside it holds the writer's process id.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
   ~Store();
 
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
-  /// Where it could not be written: whether it can now. Opens the file again where needed, once a second at most.
+  /// Where it could not be written, or is not as it was left: whether it can be written now. Opens the file again where
+  /// needed, once a second at most.
   [[nodiscard]] Status try_again();
   /// False: `stop` was requested first.
   [[nodiscard]] bool wait_until_writable(const std::stop_token& stop);
