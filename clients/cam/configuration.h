@@ -23,8 +23,7 @@ class ArmOfProgram {
 
   /// Joints for X_BF. `previous`: of the motion before, which decides what the program leaves open; without one, the
   /// joints nearest to zero.
-  [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said,
-                                     const std::map<int, double>& external,
+  [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
                                      const std::optional<JointVector>& previous) const;
   /// The chain's joints from a dialect's axes (deg) and external axes (mm); empty where the rail's value is missing.
   [[nodiscard]] std::optional<JointVector> from_axes(const std::vector<double>& axes,
@@ -37,8 +36,8 @@ class ArmOfProgram {
 
  private:
   struct Rail {
-    Chain arm;      ///< the turning axes
-    Pose X_BR;      ///< its base on the rail
+    Chain arm;  ///< the turning axes
+    Pose X_BR;  ///< its base on the rail
   };
   /// The arm on its rail, where the rail comes first.
   [[nodiscard]] std::optional<Rail> arm_on(double rail) const;
@@ -50,8 +49,8 @@ class ArmOfProgram {
 
   Chain robot_;
   std::vector<int> turning_, rails_;
-  bool wrist_;             ///< the turning axes are an elbow arm with a spherical wrist
-  bool bends_down_ = true; ///< positive joint 5 bends the tool downward
+  bool wrist_;              ///< the turning axes are an elbow arm with a spherical wrist
+  bool bends_down_ = true;  ///< positive joint 5 bends the tool downward
 };
 
 }  // namespace trammel::cam

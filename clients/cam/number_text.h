@@ -9,13 +9,13 @@ namespace trammel::cam {
 
 /// How a number is written, so that another value can be written the same way.
 struct NumberStyle {
-  int decimals = 0;             ///< digits behind the point (of the mantissa)
-  bool plus = false;            ///< positive numbers carry a sign
-  bool bare_point = false;      ///< no zero before the point: `.5`
-  bool ends_in_point = false;   ///< `5.`
-  char exponent = 0;            ///< `e` or `E`; 0: none
-  bool exponent_plus = false;   ///< `E+02`
-  int exponent_digits = 0;      ///< at least
+  int decimals = 0;            ///< digits behind the point (of the mantissa)
+  bool plus = false;           ///< positive numbers carry a sign
+  bool bare_point = false;     ///< no zero before the point: `.5`
+  bool ends_in_point = false;  ///< `5.`
+  char exponent = 0;           ///< `e` or `E`; 0: none
+  bool exponent_plus = false;  ///< `E+02`
+  int exponent_digits = 0;     ///< at least
 };
 
 /// The style and value of a number; empty when the text is no finite decimal number.

@@ -38,10 +38,10 @@ struct Data {
 
 /// A robtarget.
 struct TargetValue {
-  std::vector<double> numbers;      ///< x y z mm, w x y z
-  std::array<double, 4> conf{};     ///< cf1 cf4 cf6 cfx
-  std::array<double, 6> external{}; ///< 9E9: none
-  int decimals = 0;                 ///< of its positions as written
+  std::vector<double> numbers;       ///< x y z mm, w x y z
+  std::array<double, 4> conf{};      ///< cf1 cf4 cf6 cfx
+  std::array<double, 6> external{};  ///< 9E9: none
+  int decimals = 0;                  ///< of its positions as written
   int rotation_decimals = 0;
 };
 
@@ -65,7 +65,7 @@ class Interpreter {
   [[nodiscard]] std::optional<Found> find(const std::string& name, const Scope& scope) const;
   /// The routine of that name which is called from a module: its module and number.
   [[nodiscard]] std::optional<std::pair<std::size_t, int>> find_routine(const std::string& name,
-                                                                         std::size_t module) const;
+                                                                        std::size_t module) const;
   /// Every way to come into a routine, at most some thousand: one where it has no parameters.
   [[nodiscard]] const std::vector<const Scope*>& scopes_of(std::size_t module, int routine);
 
