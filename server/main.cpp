@@ -2,7 +2,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/sink.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -12,11 +12,11 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/base/line_output.h"
@@ -96,12 +96,12 @@ class PlainMessage final : public spdlog::custom_flag_formatter {
 };
 
 /// Lines of the log to where nobody may read any more: the service does not wait for that.
-class LogSink final : public spdlog::sinks::base_sink<std::mutex> {
+class LogSink final : public spdlog::sinks::sink {
  public:
   explicit LogSink(int descriptor) : output_(descriptor), is_terminal_(::isatty(descriptor) == 1) {}
 
- protected:
-  void sink_it_(const spdlog::details::log_msg& message) override {
+  void log(const spdlog::details::log_msg& message) override {
+    const MutexLock lock(mutex_);
     message.color_range_start = message.color_range_end = 0;
     spdlog::memory_buf_t formatted;
     formatter_->format(message, formatted);
@@ -112,7 +112,14 @@ class LogSink final : public spdlog::sinks::base_sink<std::mutex> {
     }
     output_.write(line);
   }
-  void flush_() override {}
+  void flush() override {}
+  void set_pattern(const std::string& pattern) override {
+    set_formatter(std::make_unique<spdlog::pattern_formatter>(pattern));
+  }
+  void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
+    const MutexLock lock(mutex_);
+    formatter_ = std::move(formatter);
+  }
 
  private:
   static const char* color_of(spdlog::level::level_enum level) {
@@ -123,6 +130,9 @@ class LogSink final : public spdlog::sinks::base_sink<std::mutex> {
 
   LineOutput output_;
   const bool is_terminal_;
+  Mutex mutex_;
+  std::unique_ptr<spdlog::formatter> formatter_ TRAMMEL_GUARDED_BY(mutex_) =
+      std::make_unique<spdlog::pattern_formatter>();
 };
 
 Status start_log(const LogOptions& options) {

@@ -522,6 +522,7 @@ TEST_F(StoreTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
   for (int round = 1; round <= 8; ++round) {
     std::filesystem::remove(path_);
     std::filesystem::remove(path_ + "-wal");
+    std::filesystem::remove_all(path_ + ".models");  // else it is no new beginning
     int pipe[2];
     ASSERT_EQ(::pipe(pipe), 0);
     const pid_t writer = ::fork();
