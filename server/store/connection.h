@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "server/base/mutex.h"
@@ -78,8 +79,8 @@ struct StoreConnection {
 
  private:
   template <typename Work>
-  auto transacted(const Work& work, bool* changed) TRAMMEL_REQUIRES(mutex)
-      -> decltype(work(std::declval<SQLite::Database&>())) {
+  std::invoke_result_t<const Work&, SQLite::Database&> transacted(const Work& work, bool* changed)
+      TRAMMEL_REQUIRES(mutex) {
     try {
       SQLite::Transaction transaction(*database, SQLite::TransactionBehavior::IMMEDIATE);
       const int changes = database->getTotalChanges();
