@@ -396,7 +396,8 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
 }
 
 Status Trainer::activate(const std::string& cell, int version, const ChangeRequest& request, bool force) {
-  if (!force) {
+  const bool as_expected = !request.expected || *request.expected == registry_.version_in_force(cell);
+  if (!force && as_expected) {
     const auto made = store_.outcome_of(request.id);
     if (!made) return tl::make_unexpected(made.error());
     const Status wanted = *made ? Status() : check_not_worse(cell, version);
@@ -427,7 +428,8 @@ Status Trainer::check_not_worse(const std::string& cell_name, int version) const
   const GateVerdict verdict = verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
                                          {Bar::kBetter, options_.accept_ratio});
   const GateFigures& figures = verdict.figures;
-  const bool as_good = figures.before && figures.after && *figures.after <= options_.accept_ratio * *figures.before;
+  const bool unjudged = !figures.before || !figures.after;  // a person decides, and has
+  const bool as_good = unjudged || *figures.after <= options_.accept_ratio * *figures.before;
   if (verdict.put_in_force || verdict.undecided || as_good) return {};
   return refused("cell {}: version {} was imported and is worse than version {}: {}", cell_name, version,
                  present->version, verdict.why)

@@ -285,7 +285,7 @@ std::size_t BadRequests::submissions() {
     r.batch_id("");
   });
   expect("an id that is taken", wire::RESULT_CONFLICT, [&](Request& r) {
-    r.csv(csv);
+    r.csv(csv + "\n");
     r.batch_id("lt-07");
   });
   expect("an id that is no UTF-8", wire::RESULT_REFUSED, [&](Request& r) {

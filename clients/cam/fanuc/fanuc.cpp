@@ -319,9 +319,11 @@ class File {
   }
 
   void finish() {
-    for (const auto& [begin, position] : positions_) {
+    for (const auto& known : positions_) {
+      const auto& [begin, position] = known;
+      const std::string& name = position.name;
       const bool listed = std::any_of(program_.left.begin(), program_.left.end(), [&](const LeftAlone& left) {
-        return left.file == index_ && left.name == position.name;
+        return left.file == index_ && left.name == name;
       });
       if (!used_.contains(begin) && !listed)
         program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});

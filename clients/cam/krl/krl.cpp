@@ -614,9 +614,10 @@ class Reader {
       whole.texts.push_back(k + 1 < kPose.size() ? fmt::format(",{} ", kPose[k + 1]) : "");
     }
     if (last != nullptr && last->kind == Value::Kind::kAggregate) {
-      for (const auto& [name, value] : last->fields) {
+      for (std::size_t k = 0; k < last->field_names.size(); ++k) {
+        const std::string& name = last->field_names[k];
         if (name == "S" || name == "T" || (name.size() == 2 && name[0] == 'E'))
-          whole.texts.back() += fmt::format(",{} {}", name, value.number);
+          whole.texts.back() += fmt::format(",{} {}", name, last->field_values[k].number);
       }
     }
     whole.texts.back() += "}";
@@ -655,17 +656,19 @@ class Reader {
 
   /// Positions of data lists that nothing moves to.
   void list_unused() {
-    for (const auto& [key, variable] : variables_) {
+    for (const auto& one : variables_) {
+      const auto& [key, variable] = one;
+      const std::string& name = key.second;
       const bool is_position = variable.values.size() == 1 && variable.values[0].operands.size() == 1 &&
                                variable.values[0].operands[0].field("X") != nullptr &&
                                variable.values[0].operands[0].field("S") != nullptr;
       if (!is_position) continue;
       const Assigned& at = variable.values[0];
       const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
-                                      [&](const LeftAlone& left) { return upper(left.name) == key.second; });
+                                      [&](const LeftAlone& left) { return upper(left.name) == name; });
       if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
       program_.left.push_back(
-          {key.second, at.file, lines_[at.file][at.line].number, "", "no motion in these files goes to it"});
+          {name, at.file, lines_[at.file][at.line].number, "", "no motion in these files goes to it"});
     }
   }
 

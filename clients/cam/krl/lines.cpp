@@ -1,5 +1,6 @@
 #include "clients/cam/krl/lines.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "clients/cam/number_text.h"
@@ -151,7 +152,8 @@ class Reader {
         inner.kind = Value::Kind::kOther;
         while (at_ < tokens_.size() && !is(",") && !is("}")) ++at_;
       }
-      made.fields.emplace_back(std::move(field), std::move(inner));
+      made.field_names.push_back(std::move(field));
+      made.field_values.push_back(std::move(inner));
     }
     if (!take("}")) made.kind = Value::Kind::kOther;
   }
@@ -163,10 +165,8 @@ class Reader {
 }  // namespace
 
 const Value* Value::field(std::string_view wanted) const {
-  for (const auto& [key, value] : fields) {
-    if (key == wanted) return &value;
-  }
-  return nullptr;
+  const auto found = std::find(field_names.begin(), field_names.end(), wanted);
+  return found == field_names.end() ? nullptr : &field_values[static_cast<std::size_t>(found - field_names.begin())];
 }
 
 std::vector<Line> lines_of(std::string_view text) {

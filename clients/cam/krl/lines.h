@@ -27,6 +27,8 @@ struct Line {
 
 [[nodiscard]] std::vector<Line> lines_of(std::string_view text);
 
+struct Field;
+
 /// What stands for a value: `{X 1,Y 2}`, `XP1[3]`, a number, or something else.
 struct Value {
   enum class Kind { kNumber, kBits, kAggregate, kName, kOther };
@@ -34,7 +36,8 @@ struct Value {
   std::size_t begin = 0, end = 0;
   double number = 0;
   std::string name;  ///< in upper case, with its index: `XP[3]`; an index that is no number is `*`
-  std::vector<std::pair<std::string, Value>> fields;  ///< of an aggregate
+  std::vector<std::string> field_names;  ///< of an aggregate
+  std::vector<Value> field_values;       ///< as field_names
 
   [[nodiscard]] const Value* field(std::string_view name) const;
 };
