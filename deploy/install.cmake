@@ -10,7 +10,7 @@ install(FILES deploy/trammeld.service DESTINATION lib/systemd/system)
 # The rooms of each component; `common` comes with both. Rooms above the trainer are the daemon's own.
 set(common_rooms headers base)
 set(session_rooms idl_types idl clients_session)
-set(offline_rooms numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose store registry report
+set(offline_rooms numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
   trainer offline)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trammel)

@@ -15,7 +15,11 @@
 #include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <memory>
 #include <mutex>
+#include <sstream>
+
+#include "server/base/line_output.h"
 
 namespace trammel::wire {
 namespace {
@@ -30,6 +34,23 @@ Duration_t to_duration(std::chrono::milliseconds time) {
   return {static_cast<std::int32_t>(time.count() / 1000), static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
 }
 
+/// The library's errors to standard error, which nobody may read any more: the library does not wait for that.
+class LibraryErrors final : public dds::LogConsumer {
+ public:
+  void Consume(const dds::Log::Entry& entry) override {
+    std::ostringstream line;
+    print_timestamp(line, entry, false);
+    print_header(line, entry, false);
+    print_message(line, entry, false);
+    print_context(line, entry, false);
+    print_new_line(line, false);
+    output_.write(line.str());
+  }
+
+ private:
+  LineOutput output_{STDERR_FILENO};
+};
+
 void set_up_process() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -37,6 +58,8 @@ void set_up_process() {
     unsetenv("ROS_DISCOVERY_SERVER");
     unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
     dds::Log::SetVerbosity(dds::Log::Kind::Error);
+    dds::Log::ClearConsumers();
+    dds::Log::RegisterConsumer(std::make_unique<LibraryErrors>());
     // Where a test has server and clients in one process, they too talk over UDP.
     eprosima::fastrtps::LibrarySettingsAttributes settings;
     settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;

@@ -1,19 +1,25 @@
 // trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
+#include <fcntl.h>
 #include <signal.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/basic_file_sink.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/sinks/sink.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "server/base/line_output.h"
 #include "server/base/memory.h"
 #include "server/base/mutex.h"
 #include "server/base/plain_text.h"
@@ -56,7 +62,8 @@ int exit_code(const Error& error) {
 
 /// Prints one line for each error.
 int refuse(const Error& error) {
-  for (const Error& one : apart(error)) fmt::print(stderr, "trammeld: {}\n", sentence(one));
+  LineOutput said(STDERR_FILENO);
+  for (const Error& one : apart(error)) said.write(fmt::format("trammeld: {}\n", sentence(one)));
   return exit_code(error);
 }
 
@@ -88,13 +95,55 @@ class PlainMessage final : public spdlog::custom_flag_formatter {
   }
 };
 
-Status start_log(const LogOptions& options) {
-  try {
-    spdlog::set_default_logger(options.file.empty() ? spdlog::stderr_color_mt("trammeld")
-                                                    : spdlog::basic_logger_mt("trammeld", options.file));
-  } catch (const spdlog::spdlog_ex& error) {
-    return refused("{}", error.what()).under("log: file");
+/// Lines of the log to where nobody may read any more: the service does not wait for that.
+class LogSink final : public spdlog::sinks::sink {
+ public:
+  explicit LogSink(int descriptor) : output_(descriptor), is_terminal_(::isatty(descriptor) == 1) {}
+
+  void log(const spdlog::details::log_msg& message) override {
+    const MutexLock lock(mutex_);
+    message.color_range_start = message.color_range_end = 0;
+    spdlog::memory_buf_t formatted;
+    formatter_->format(message, formatted);
+    std::string line = fmt::to_string(formatted);
+    if (is_terminal_ && message.color_range_end > message.color_range_start) {
+      line.insert(message.color_range_end, "\033[m");
+      line.insert(message.color_range_start, color_of(message.level));
+    }
+    output_.write(line);
   }
+  void flush() override {}
+  void set_pattern(const std::string& pattern) override {
+    set_formatter(std::make_unique<spdlog::pattern_formatter>(pattern));
+  }
+  void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
+    const MutexLock lock(mutex_);
+    formatter_ = std::move(formatter);
+  }
+
+ private:
+  static const char* color_of(spdlog::level::level_enum level) {
+    if (level >= spdlog::level::err) return "\033[31m\033[1m";
+    if (level == spdlog::level::warn) return "\033[33m\033[1m";
+    return level == spdlog::level::info ? "\033[32m" : "\033[36m";
+  }
+
+  LineOutput output_;
+  const bool is_terminal_;
+  Mutex mutex_;
+  std::unique_ptr<spdlog::formatter> formatter_ TRAMMEL_GUARDED_BY(mutex_) =
+      std::make_unique<spdlog::pattern_formatter>();
+};
+
+Status start_log(const LogOptions& options) {
+  int descriptor = STDERR_FILENO;
+  if (!options.file.empty()) {
+    descriptor = ::open(options.file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0644);
+    if (descriptor < 0)
+      return refused("cannot be opened: {}", std::strerror(errno)).in(options.file).under("log: file");
+  }
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("trammeld", std::make_shared<LogSink>(descriptor)));
+  spdlog::set_error_handler([](const std::string&) {});  // it would wait for standard error
   spdlog::set_level(spdlog::level::from_str(options.level));
   spdlog::flush_on(spdlog::level::info);
   auto line = std::make_unique<spdlog::pattern_formatter>();
@@ -198,6 +247,16 @@ class StopSignals {
   std::jthread thread_;
 };
 
+/// What would end the process though it can go on: a pipe that nobody reads any more, a file that may grow no further.
+/// Both are errors of the call that met them. The processes that compute get the signals as they were.
+void ignore_what_calls_report() {
+  for (const int number : {SIGPIPE, SIGXFSZ}) {
+    struct sigaction ignored {};
+    ignored.sa_handler = SIG_IGN;
+    ::sigaction(number, &ignored, nullptr);
+  }
+}
+
 /// Serves until a signal ends it.
 Status serve(const ServerConfig& config) {
   StopSignals signals;  // before any thread starts
@@ -285,6 +344,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : trammel::kExitUsage;
   }
+  trammel::ignore_what_calls_report();
   trammel::give_large_blocks_back();
   return trammel::run(arguments);
 }

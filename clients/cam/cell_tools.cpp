@@ -84,13 +84,21 @@ class Choosing {
 
  private:
   void refuse(const ProgramTool& tool, const std::string& what) {
-    Failure made = refused("{}", what).of("tool " + shown(tool.name));
-    if (!tool.file.empty()) made = std::move(made).in(tool.file).at_row(tool.line);
-    refusals_.push_back(made.value());
+    Error error = refused("{}", what).of("tool " + shown(tool.name)).value();
+    if (!tool.file.empty()) {
+      error.file = tool.file;
+      error.row = tool.line;
+    }
+    refusals_.push_back(std::move(error));
   }
 
   ToolChoice choice(const ProgramTool& tool) {
     ToolChoice choice;
+    // A table says nothing of its tool: it is the cell's, where it has one.
+    if (tool.name.empty() && asked_.empty() && cell_.tools.size() == 1) {
+      choice.tool = cell_.tools.begin()->first;
+      return choice;
+    }
     const auto by_name = asked_.empty() ? named(cell_, tool.name) : cell_.tools.find(asked_);
     if (by_name != cell_.tools.end()) {
       choice.tool = by_name->first;

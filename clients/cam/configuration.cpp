@@ -47,6 +47,7 @@ void choose_turns(const Chain& arm, const Configuration& said, const std::option
     const Joint& joint = arm.joint(j);
     const auto index = static_cast<std::size_t>(j);
     const bool has_near = index < said.near.size() && said.near[index].has_value();
+    const bool has_turn = index < said.turns.size() && said.turns[index].has_value();
     const bool has_sign = index < said.signs.size() && said.signs[index].has_value();
     double best = q(j);
     double least = kNoBranch;
@@ -55,6 +56,7 @@ void choose_turns(const Chain& arm, const Configuration& said, const std::option
       if (value < joint.lower - 1e-9 || value > joint.upper + 1e-9) continue;
       double cost = std::abs(value - (previous ? (*previous)(j) : 0.0)) * 1e-3;
       if (has_near && std::abs(value - *said.near[index]) > kPi / 4 + 0.02) cost += 1;
+      if (has_turn && static_cast<int>(std::lround(value / (2 * kPi))) != *said.turns[index]) cost += 1;
       if (has_sign && (value < 0) != (*said.signs[index] < 0) && std::abs(value) > 1e-6) cost += 1;
       if (cost < least) {
         least = cost;

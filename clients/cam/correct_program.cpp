@@ -51,6 +51,20 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
   return q;
 }
 
+std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes) {
+  if (coordinates == Coordinates::kJointRadians) {
+    for (double& axis : axes) axis = to_deg(axis);
+  }
+  return axes;
+}
+/// Of degrees.
+std::vector<double> axes_of(Coordinates coordinates, std::vector<double> axes) {
+  if (coordinates == Coordinates::kJointRadians) {
+    for (double& axis : axes) axis = from_deg(axis);
+  }
+  return axes;
+}
+
 /// Targets of one tool and payload of the cell, asked for together.
 struct Group {
   std::string tool, payload;
@@ -145,8 +159,8 @@ class Correcting {
       return;
     }
     client::TargetMm& asked = asked_[t];
-    if (target.coordinates == Coordinates::kJoints) {
-      const auto q = arm_.from_axes(target.numbers, target.external);
+    if (is_joints(target.coordinates)) {
+      const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
       if (!q) {
         why_not_[t] = "the program does not say where the rail is";
         return;
@@ -192,7 +206,11 @@ class Correcting {
     row.folded = target.folded;
     row.status = "refused";
     row.message = why_not_[t];
-    if (target.coordinates != Coordinates::kJoints)
+    if (is_joints(target.coordinates) && joints_of_.contains(t)) {
+      const Pose X_FT = cell_.tools.at(choices_[target.tool].tool);
+      row.p_B = (arm_.robot().flange_pose(joints_of_[t]) * X_FT).translation();
+    }
+    if (!is_joints(target.coordinates))
       row.p_B = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers).translation();
   }
 
@@ -251,8 +269,8 @@ class Correcting {
       if (arm_.robot().joint(j).type == JointType::kRevolute) row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
     }
     const std::vector<double> exact =
-        target.coordinates == Coordinates::kJoints
-            ? arm_.to_axes(q)
+        is_joints(target.coordinates)
+            ? axes_of(target.coordinates, arm_.to_axes(q))
             : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
     write(target, exact, row);
     row.rounding_mm = rounding(target, exact, row.after, q, X_TF);
@@ -266,6 +284,8 @@ class Correcting {
     switch (target.coordinates) {
       case Coordinates::kJoints:
         return to_deg(from_mm(mm) / kReach);
+      case Coordinates::kJointRadians:
+        return from_mm(mm) / kReach;
       case Coordinates::kRotationVector:
         return value < 3 ? from_mm(mm) : kRotationRounding;
       case Coordinates::kQuaternion:
@@ -278,7 +298,7 @@ class Correcting {
   void write(const ProgramTarget& target, const std::vector<double>& exact, ReceiptRow& row) {
     row.after = target.numbers;
     for (const Rewrite& rewrite : target.rewrites) {
-      std::string text = rewrite.texts[0];
+      std::string text = rewrite.texts.empty() ? "" : rewrite.texts[0];
       for (std::size_t k = 0; k < rewrite.slots.size(); ++k) {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
@@ -287,7 +307,8 @@ class Correcting {
                                  : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
-        text += number + rewrite.texts[k + 1];
+        text += number;
+        if (!rewrite.texts.empty()) text += rewrite.texts[k + 1];
       }
       edits_[target.file].replace(rewrite.span, std::move(text));
     }
@@ -297,13 +318,12 @@ class Correcting {
   /// mm, of the tool.
   [[nodiscard]] double rounding(const ProgramTarget& target, const std::vector<double>& exact,
                                 const std::vector<double>& written, const JointVector& q, const Pose& X_TF) const {
-    if (target.coordinates != Coordinates::kJoints) {
+    if (!is_joints(target.coordinates)) {
       return to_mm(
           (pose_of(target.coordinates, written).translation() - pose_of(target.coordinates, exact).translation())
               .norm());
     }
-    std::map<int, double> external = target.external;
-    const auto rounded = arm_.from_axes(written, external);
+    const auto rounded = arm_.from_axes(in_degrees(target.coordinates, written), target.external);
     if (!rounded) return 0;
     const Pose X_FT = X_TF.inverse();
     return to_mm(
@@ -313,6 +333,9 @@ class Correcting {
 
   CorrectedProgram finish() {
     result_.moves = program_.moves.size();
+    for (std::size_t m = program_.moves.size(); m-- > 0;) {
+      for (const std::size_t t : program_.moves[m].targets) rows_[t].order = m;
+    }
     for (const ProgramMove& move : program_.moves) {
       const bool corrected = !move.targets.empty() && std::all_of(move.targets.begin(), move.targets.end(),
                                                                   [&](std::size_t t) { return rows_[t].corrected(); });

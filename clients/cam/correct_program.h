@@ -45,6 +45,7 @@ struct ReceiptRow {
   int iterations = 0;
   bool folded = false;
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, the wanted position
+  std::size_t order = 0;                       ///< of its first motion in the program
 
   [[nodiscard]] bool corrected() const { return !after.empty(); }
 };

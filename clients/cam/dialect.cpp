@@ -5,7 +5,12 @@
 
 #include <algorithm>
 
+#include "clients/cam/fanuc/fanuc.h"
+#include "clients/cam/inform/inform.h"
+#include "clients/cam/krl/krl.h"
 #include "clients/cam/rapid/rapid.h"
+#include "clients/cam/tables/tables.h"
+#include "clients/cam/urscript/urscript.h"
 
 namespace trammel::cam {
 
@@ -21,6 +26,12 @@ struct Entry {
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> kEntries = {
       {Dialect::kRapid, "rapid", {".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"}, read_rapid},
+      {Dialect::kFanuc, "fanuc", {".ls"}, read_fanuc},
+      {Dialect::kKrl, "krl", {".src", ".dat", ".sub"}, read_krl},
+      {Dialect::kInform, "inform", {".jbi"}, read_inform},
+      {Dialect::kUrScript, "urscript", {".script"}, read_urscript},
+      {Dialect::kCamRob, "camrob", {}, read_camrob},
+      {Dialect::kRoboDk, "robodk", {}, read_robodk},
   };
   return kEntries;
 }

@@ -61,7 +61,9 @@ Vector3 nearest_rotation_vector(const Matrix3& R, const Vector3& like) {
 
 }  // namespace
 
-std::size_t position_count(Coordinates coordinates) { return coordinates == Coordinates::kJoints ? 0 : 3; }
+bool is_joints(Coordinates coordinates) {
+  return coordinates == Coordinates::kJoints || coordinates == Coordinates::kJointRadians;
+}
 
 int line_of(const std::string& text, std::size_t at) {
   const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size()));
@@ -87,6 +89,7 @@ Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {
     case Coordinates::kRotationVector:
       return make_pose(rotation_exp(vector_of(numbers, 3)), p);
     case Coordinates::kJoints:
+    case Coordinates::kJointRadians:
       break;
   }
   return Pose::Identity();
@@ -119,6 +122,7 @@ std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const 
       return numbers;
     }
     case Coordinates::kJoints:
+    case Coordinates::kJointRadians:
       break;
   }
   return like;

@@ -29,9 +29,10 @@ enum class Coordinates {
   kAnglesZyx,       ///< x y z mm, deg about Z, the new Y, the new X (KUKA A B C)
   kAnglesXyz,       ///< x y z mm, deg about X, Y, Z as they stand (FANUC W P R, Yaskawa Rx Ry Rz)
   kRotationVector,  ///< x y z m, rotation vector rad (Universal Robots)
-  kJoints           ///< as the dialect counts them: deg, mm of a rail
+  kJoints,          ///< axes of the arm, deg
+  kJointRadians     ///< the same, rad
 };
-[[nodiscard]] std::size_t position_count(Coordinates coordinates);  ///< 3; of joints 0
+[[nodiscard]] bool is_joints(Coordinates coordinates);
 
 /// A number that is written anew.
 struct Slot {
@@ -41,7 +42,7 @@ struct Slot {
 /// Bytes that are replaced by texts and numbers in turn: texts[0] slots[0] texts[1] ... texts[n].
 struct Rewrite {
   Span span;
-  std::vector<std::string> texts;
+  std::vector<std::string> texts;  ///< empty: the bytes are one number
   std::vector<Slot> slots;
 };
 
@@ -50,6 +51,7 @@ struct Rewrite {
 struct Configuration {
   std::optional<int> conf;                  ///< 0..7 as inverse_kinematics.h numbers it
   std::vector<std::optional<double>> near;  ///< rad, a value of each joint to be near to; empty: not said
+  std::vector<std::optional<int>> turns;    ///< of each joint: 0 within ±180 deg, 1 a turn above, -1 below
   std::vector<std::optional<int>> signs;    ///< of each joint: -1 negative, +1 not; empty: not said
   std::optional<bool> behind_axis_1;        ///< wrist centre behind axis 1
   std::optional<bool> elbow_up;             ///< the higher of the two elbows
@@ -57,7 +59,8 @@ struct Configuration {
   std::optional<bool> bends_down;           ///< with joint 4 near zero the wrist would bend the tool downward
 
   [[nodiscard]] bool said() const {
-    return conf || !near.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 || bends_down;
+    return conf || !near.empty() || !turns.empty() || !signs.empty() || behind_axis_1 || elbow_up || larger_joint_3 ||
+           bends_down;
   }
 };
 
@@ -141,8 +144,9 @@ struct Program {
 };
 
 struct ReadOptions {
-  bool split = false;        ///< a target that is used with two tools or frames becomes two
-  bool keep_joints = false;  ///< joint targets stay as they are
+  bool split = false;                       ///< a target that is used with two tools or frames becomes two
+  bool keep_joints = false;                 ///< joint targets stay as they are
+  std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
 };
 
 /// The number of the line of a byte, from 1.

@@ -70,9 +70,12 @@ int run_command_line(int argc, const char* const* argv) {
   add_structure_commands(app, chosen);
   add_model_commands(app, chosen);
   add_apply_commands(app, chosen);
+  add_check_command(app, chosen);
+  add_fleet_command(app, chosen);
   add_diagnose_command(app, chosen);
   add_study_command(app, chosen);
   add_service_commands(app, chosen);
+  add_audit_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -70,6 +70,7 @@ struct Session::Participant {
   std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
   std::unique_ptr<Caller<wire::Train>> train;
   std::unique_ptr<Caller<wire::Diagnose>> diagnose;
+  std::unique_ptr<Caller<wire::CheckHealth>> check_health;
   std::unique_ptr<Caller<wire::ReadModels>> read_models;
   std::unique_ptr<Caller<wire::ManageModels>> manage_models;
   std::unique_ptr<Caller<wire::ReleaseBatches>> release_batches;
@@ -118,6 +119,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.action(action);
     request.change(to_wire(change));
+    request.reason(change.reason);
     return call<wire::ManageModels>(*manage_models, request, {cell, {}, true});
   }
 
@@ -126,6 +128,7 @@ struct Session::Participant {
     request.about().cell(cell);
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
+    request.reason(change.reason);
     const auto reply = call<wire::ReleaseBatches>(*release_batches, request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
@@ -140,12 +143,13 @@ struct Session::Participant {
   }
 
   /// From every server.
-  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what) {
+  [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what,
+                                                                    const wire::ReadModelsRequest& asked = {}) {
     const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
     if (known.empty()) return tl::make_unexpected(no_server());
     std::vector<wire::ReadModelsReply> replies;
     for (const KnownServer& server : known) {
-      auto reply = read(cell, server.id(), what);
+      auto reply = read(cell, server.id(), what, asked);
       if (!reply) return tl::make_unexpected(reply.error());
       replies.push_back(std::move(*reply));
     }
@@ -229,9 +233,9 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
      ...);
     return opened;
   };
-  const Status opened =
-      open_all(inside->predict_error, inside->correct_target, inside->submit_measurements, inside->train,
-               inside->diagnose, inside->read_models, inside->manage_models, inside->release_batches);
+  const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
+                                 inside->train, inside->diagnose, inside->check_health, inside->read_models,
+                                 inside->manage_models, inside->release_batches);
   if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
@@ -335,6 +339,21 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   return reply->job();
 }
 
+Result<std::int64_t> Session::check_health(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                           double tolerance_mm, const ChangeOptions& change) {
+  if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  wire::CheckHealthRequest request;
+  request.about().cell(cell);
+  request.change_id(change_id(change));
+  request.batch_id(batch_id);
+  request.csv(csv);
+  request.tolerance_mm(tolerance_mm);
+  const auto reply =
+      participant_->call<wire::CheckHealth>(*participant_->check_health, std::move(request), Route{cell, {}, true});
+  if (!reply) return tl::make_unexpected(reply.error());
+  return reply->job();
+}
+
 Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
@@ -360,6 +379,12 @@ Status Session::release(const std::string& cell, const std::string& batch_id, co
   return participant_->release(cell, {batch_id}, change, {}).map([](std::int64_t) {});
 }
 
+Status Session::discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
+  wire::ReleaseBatchesRequest request;
+  request.action(wire::RELEASE_DISCARD);
+  return participant_->release(cell, {batch_id}, change, std::move(request)).map([](std::int64_t) {});
+}
+
 Result<std::int64_t> Session::release_and_train(const std::string& cell, const std::vector<std::string>& batch_ids,
                                                 const std::string& level, const std::string& bias,
                                                 const ChangeOptions& change) {
@@ -380,6 +405,26 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
   return jobs;
 }
 
+Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(since_unix_s);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_AUDIT, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<AuditText> texts;
+  for (const wire::ReadModelsReply& reply : *replies)
+    texts.push_back({reply.header().server().to_string(), reply.text()});
+  return texts;
+}
+
+Result<std::vector<std::string>> Session::fleet() {
+  const auto replies = participant_->read_all("", wire::READ_FLEET);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::string> texts;
+  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  return texts;
+}
+
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
   const auto reply = participant_->read(cell, {}, wire::READ_MODELS);
   if (!reply) return tl::make_unexpected(reply.error());
@@ -391,6 +436,7 @@ Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
 Result<int> Session::activate(const std::string& cell, int version, const ChangeOptions& change) {
   wire::ManageModelsRequest request;
   request.version(version);
+  request.force(change.force);
   const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();

@@ -55,10 +55,17 @@ class Session {
   /// is trained, and put in force if better. Returns the job; when that is done, diagnosis() returns the findings.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply, const ChangeOptions& change = {});
+  /// Queues a health check of a stored batch or of `csv` against the model in force; `tolerance_mm`: NaN as the cell
+  /// file says. Returns the job; when that is done, diagnosis() returns what `trammel check --json` prints.
+  [[nodiscard]] Result<std::int64_t> check_health(const std::string& cell, const std::string& batch_id,
+                                                  const std::string& csv, double tolerance_mm,
+                                                  const ChangeOptions& change = {});
   [[nodiscard]] Result<DiagnosisAnswer> diagnosis(const std::string& cell, std::int64_t job, bool page);
   /// From every server, for one cell or (empty) for all.
   [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
   /// As train(), from batches in quarantine. They are released only if the training is accepted.
   [[nodiscard]] Result<std::int64_t> release_and_train(const std::string& cell,
                                                        const std::vector<std::string>& batch_ids,
@@ -67,6 +74,12 @@ class Session {
   /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
   /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
+  /// From every server: who changed what, of one cell or (empty) of all, since then (Unix time, s), the newest `most`
+  /// (0: all).
+  [[nodiscard]] Result<std::vector<AuditText>> audit(const std::string& cell, std::int64_t since_unix_s,
+                                                     std::size_t most);
+  /// From every server: its cells, their health, what is unusual about each, as `trammel fleet --json` prints it.
+  [[nodiscard]] Result<std::vector<std::string>> fleet();
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});

@@ -105,13 +105,20 @@ struct JobStatus {
 /// What a change takes for granted.
 struct ChangeOptions {
   std::optional<int> expected_version = {};  ///< in force, 0: none; with another one nothing changes (kConflict)
-  std::string id = {};  ///< unique for ever: the change happens once under it; empty: the session makes one
+  std::string id = {};      ///< unique for ever: the change happens once under it; empty: the session makes one
+  bool force = false;       ///< of an activation: also of an imported version that is worse than the one in force
+  std::string reason = {};  ///< for the audit trail, of changes of what is in force and of quarantine
+};
+
+/// The audit trail of a server as it sends it: JSON.
+struct AuditText {
+  std::string server, json;
 };
 
 /// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
 struct DatedJob {
   JobStatus status;
-  std::string server, kind;  ///< kind: `train diagnose`
+  std::string server, kind;  ///< kind: `train diagnose check`
   std::vector<std::string> batches;
   std::int64_t created_unix_s = 0;
   std::optional<std::int64_t> started_unix_s, finished_unix_s;

@@ -100,9 +100,10 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   return std::make_shared<Fitted>(state, coupled, std::move(outputs));
 }
 
-Result<BiasModel> BiasModel::restore(const BiasState& state, bool rough) {
-  const VarianceForm form = rough ? VarianceForm::kRough : VarianceForm::kRegionalOnly;
-  return Fitted::from(state, form).map([](std::shared_ptr<Fitted> fitted) { return BiasModel(std::move(fitted)); });
+Result<BiasModel> BiasModel::restore(const BiasState& state) {
+  return Fitted::from(state, VarianceForm::kServed).map([](std::shared_ptr<Fitted> fitted) {
+    return BiasModel(std::move(fitted));
+  });
 }
 
 Result<BiasModel> BiasModel::fit(const BiasProblem& problem, const BiasOptions& options) {
@@ -149,7 +150,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   state.block_hyperparameters = found->found.blocks;
 
   // By the same way as a stored model, so that a restored one cannot differ.
-  const auto fitted = Fitted::from(state, VarianceForm::kRegional);
+  const auto fitted = Fitted::from(state, VarianceForm::kLearned);
   if (!fitted) return tl::make_unexpected(fitted.error());
   (*fitted)->report.starts_at_best = found->starts_at_best;
   (*fitted)->report.evaluations = found->evaluations;
@@ -273,8 +274,6 @@ std::optional<MatrixXd> BiasModel::left_out_error_B(const MatrixXd& residual_B,
                                                     const std::vector<Index>& observations) const {
   return fitted_->outputs->left_out_error(residual_B.rowwise() - fitted_->state.offset.transpose(), observations);
 }
-
-void BiasModel::prepare(const std::function<bool()>& go_on) const { fitted_->outputs->prepare(go_on); }
 
 const BiasState& BiasModel::state() const { return fitted_->state; }
 

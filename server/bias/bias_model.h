@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -28,8 +27,7 @@ class BiasModel {
   [[nodiscard]] static Result<BiasModel> fit(const BiasProblem& problem, const BiasOptions& options);
   /// The model of a state. It predicts bit for bit as before on processors that run the same build of numerics.h; the
   /// last bits differ between AVX2 and AVX-512. Refuses what fit() refuses, and hyperparameters of the wrong shape.
-  /// `rough`: standard deviations up to 6 % too large are good enough (VarianceForm::kRough), not up to 2 %.
-  [[nodiscard]] static Result<BiasModel> restore(const BiasState& state, bool rough = false);
+  [[nodiscard]] static Result<BiasModel> restore(const BiasState& state);
 
   /// With more observations, the hyperparameters as they are. Takes N² operations for each where the kernel has no
   /// blocks and the median sigma stays the same, else N³. Equal to restoring the longer state, to rounding. Refuses
@@ -69,10 +67,6 @@ class BiasModel {
   /// more than 5000 poses.
   [[nodiscard]] std::optional<Eigen::MatrixXd> left_out_error_B(const Eigen::MatrixXd& residual_B,
                                                                 const std::vector<Eigen::Index>& observations) const;
-
-  /// Variances are worked out region by region of joint space, when the first target falls into a region. This works
-  /// all of them out, while `go_on` says so: a second or more for a thousand poses.
-  void prepare(const std::function<bool()>& go_on) const;
 
   [[nodiscard]] const BiasState& state() const;
   [[nodiscard]] const BiasFitReport& report() const;

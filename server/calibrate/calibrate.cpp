@@ -6,6 +6,8 @@
 #include "server/calibrate/identify/check_needs.h"
 #include "server/calibrate/identify/identify.h"
 #include "server/calibrate/identify/order_search.h"
+#include "server/calibrate/sessions/locate_sessions.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -41,6 +43,14 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   if (problem.batch.measurements.empty())
     return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
   CalibrationProblem complete = problem;
+  std::vector<SessionSetting> sessions;
+  if (has_sessions(problem.batch)) {
+    Result<std::vector<SessionSetting>> located = locate_sessions(problem.model, problem.batch);
+    if (!located) return tl::make_unexpected(located.error());
+    sessions = std::move(*located);
+    const Tracker& tracker = problem.model.cell->tracker;
+    complete.batch = moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
+  }
   if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
     if (Status found = find_frames(complete.model, complete.batch, options); !found) {
       return Failure(found.error()).in("batch " + problem.batch.id);
@@ -49,7 +59,11 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   if (Status fit = check_needs(complete); !fit) return tl::make_unexpected(fit.error());
   localise_base(complete.model, complete.batch);
   if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
-  return identify(complete, options);
+  return identify(complete, options).map([&](CalibrationResult found) {
+    for (std::size_t s = 0; s < sessions.size(); ++s)
+      found.sessions[s].X_WS = found.sessions[s].X_WS * sessions[s].X_WS;
+    return found;
+  });
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/calibrate/identify/identifiability.h"
+#include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/physical_model.h"
 #include "server/measurement/measurement.h"
 
@@ -59,7 +60,10 @@ struct CalibrationResult {
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first
-  std::vector<double> cost_record;    ///< half the weighted sum of squares, of all iterations in their order
+  /// Of a batch of several sessions: what belongs to each, the newest last. aligned() moves its measurements into the
+  /// world of the model. Empty: one session.
+  std::vector<SessionSetting> sessions;
+  std::vector<double> cost_record;  ///< half the weighted sum of squares, of all iterations in their order
   bool converged = false;
   int iterations = 0;
   std::string message;  ///< of the solver

@@ -1,6 +1,7 @@
 #include "server/calibrate/orientation_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
+#include "server/measurement/sessions.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel {
@@ -18,10 +20,11 @@ using Quaternion = Eigen::Quaterniond;
 using Quaternions = std::vector<Quaternion>;
 
 // Angles, rms of all poses or of one pose.
-constexpr double kMostOff = from_deg(5);        // no nominal arm, and no mounted tool, is farther off
+constexpr double kMostOff = from_deg(10);       // no nominal arm, and no mounted tool, is farther off
 constexpr double kWorthAsking = from_deg(0.2);  // below it one way of reading cannot be told from another
 constexpr double kMostCounted = from_deg(30);   // more counts as much: wrong is wrong, and few rows must not decide
 constexpr double kMuchBetter = 0.25;            // of the rms as given: another way of reading that was surely meant
+constexpr double kGon = 0.9;                    // deg
 constexpr double kFarRow = 5;                   // times the median of all poses: a row of another pose
 // Positions.
 constexpr double kTellingSpread = 20;      // spread over residual: the base's direction is then known to 3 degrees
@@ -187,6 +190,57 @@ Reading reading(std::string name, const Oriented& group, const Quaternion& q_WB,
 
 Quaternion as_it_is(const Quaternion& q) { return q; }
 
+/// Of the four columns one with the other sign, or two exchanged; or of a left-handed frame.
+void add_columns(const Oriented& group, const Quaternion& q_WB, std::vector<Reading>& all) {
+  const std::array<const char*, 4> columns = {"qx", "qy", "qz", "qw"};  // as Eigen counts
+  const auto add = [&](const std::string& name, const auto& change) {
+    all.push_back(reading(name, group, q_WB, [&](const Quaternion& q) {
+      Eigen::Vector4d numbers = q.coeffs();
+      change(numbers);
+      return Quaternion(numbers);
+    }));
+  };
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    add(fmt::format("with the other sign of {}", columns[k]), [&](Eigen::Vector4d& q) { q(at) *= -1; });
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    for (std::size_t j = i + 1; j < columns.size(); ++j) {
+      add(fmt::format("with {} and {} exchanged", columns[i], columns[j]),
+          [&](Eigen::Vector4d& q) { std::swap(q(static_cast<Eigen::Index>(i)), q(static_cast<Eigen::Index>(j))); });
+    }
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    add(fmt::format("as of a left-handed frame (mirrored {} axis)", columns[k][1]), [&](Eigen::Vector4d& q) {
+      for (std::size_t other = 0; other < 3; ++other) q(static_cast<Eigen::Index>(other)) *= other == k ? 1 : -1;
+    });
+  }
+}
+
+/// The last joint in another unit, or counted together with one before it: a point on its axis does not show that.
+void add_last_joint(const Oriented& group, const Quaternion& q_WB, const Chain& robot, std::vector<Reading>& all) {
+  const int last = robot.size() - 1;
+  if (robot.joint(last).type != JointType::kRevolute) return;
+  const auto add = [&](std::string name, const auto& change) {
+    Oriented changed = group;
+    for (std::size_t i = 0; i < group.rows.size(); ++i) {
+      JointVector q = group.rows[i]->context.q;
+      change(q);
+      changed.X_BF[i] = robot.flange_pose(q);
+    }
+    all.push_back(reading(std::move(name), changed, q_WB, as_it_is));
+    all.back().by_order = false;
+  };
+  const std::string column = fmt::format("q{}_deg", last + 1);
+  add(fmt::format("with {} in radians", column), [&](JointVector& q) { q(last) *= 180 / kPi; });
+  add(fmt::format("with {} in gon", column), [&](JointVector& q) { q(last) *= kGon; });
+  for (int by = std::max(0, last - 2); by < last; ++by) {
+    if (robot.joint(by).type != JointType::kRevolute) continue;
+    add(fmt::format("with q{}_deg subtracted from {}", by + 1, column), [&](JointVector& q) { q(last) -= q(by); });
+    add(fmt::format("with q{}_deg added to {}", by + 1, column), [&](JointVector& q) { q(last) += q(by); });
+  }
+}
+
 /// As given first, then all others.
 std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, const Chain& robot) {
   const auto inverse = [](const Quaternion& q) { return q.conjugate(); };
@@ -199,6 +253,7 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
       reading("as wxyz under an xyzw header and the inverse", group, q_WB,
               [](const Quaternion& q) { return from_wxyz(q).conjugate(); }),
   };
+  add_columns(group, q_WB, all);
   const auto add = [&](Reading one) {
     one.by_order = false;
     all.push_back(std::move(one));
@@ -213,13 +268,14 @@ std::vector<Reading> readings(const Oriented& group, const Quaternion& q_WB, con
       q(j) = -q(j);
       reversed.X_BF[i] = robot.flange_pose(q);
     }
-    add(reading(fmt::format("with joint {} reversed", j + 1), reversed, q_WB, as_it_is));
+    add(reading(fmt::format("with the other sign of q{}_deg", j + 1), reversed, q_WB, as_it_is));
   }
   for (const bool next : {true, false}) {
     Oriented shifted = group;
     std::rotate(shifted.X_BF.begin(), next ? shifted.X_BF.begin() + 1 : shifted.X_BF.end() - 1, shifted.X_BF.end());
     add(reading(next ? "as those of the next row" : "as those of the row before", shifted, q_WB, as_it_is));
   }
+  add_last_joint(group, q_WB, robot, all);
   return all;
 }
 
@@ -263,7 +319,8 @@ class Question {
   std::optional<Error> doubt() const {
     if (follow()) return std::nullopt;
     const bool better = of_best_.fit < kMuchBetter * given_.fit && by_order();
-    if (two_orders_ > 0 && !better) return of_two_orders();
+    const bool one_fits_all = of_best_.fit < kMuchBetter * given_.fit && of_best_.fit < of_both_.fit;
+    if (two_orders_ > 0 && !better && !one_fits_all) return of_two_orders();
     const std::vector<std::size_t> far = far_rows();
     if (given_.scatter <= kMostOff && given_.offset <= kMostOff && far.empty() && !better) return std::nullopt;
     if (given_.scatter <= kMostOff && far.empty() && given_.offset > kMostOff && !reads_better()) return of_tool();
@@ -409,8 +466,9 @@ bool stands_at(const Pose& X_WB, const std::optional<Pose>& X_FT, const Oriented
   return median(off) <= kNoModelError;
 }
 
-std::optional<Error> doubt_of(Oriented group, const Cell& cell) {
+std::optional<Error> doubt_of(Oriented group, const Cell& cell, const std::optional<Pose>& X_WB) {
   const std::optional<Pose>& X_FT = cell.tools.at(group.tool);
+  if (X_WB) return Question(group, Quaternion(X_WB->linear()), cell).doubt();
   const Located located = by_positions(group, X_FT);
   if (!located.belong) return std::nullopt;  // the joints themselves are in question
   std::vector<Quaternion> turned;
@@ -435,9 +493,12 @@ std::optional<Error> doubt_of(Oriented group, const Cell& cell) {
 
 }  // namespace
 
-std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell) {
-  for (const Oriented& group : by_tool(batch, cell.robot)) {
-    if (auto doubt = doubt_of(group, cell)) return doubt;
+std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell,
+                                       const std::optional<Pose>& X_WB) {
+  for (const MeasurementBatch& session : by_session(batch)) {  // each was measured in a world of its own
+    for (const Oriented& group : by_tool(session, cell.robot)) {
+      if (auto doubt = doubt_of(group, cell, X_WB)) return doubt;
+    }
   }
   return std::nullopt;
 }

@@ -23,7 +23,9 @@ namespace trammel {
 /// reading that would fit (`text`, `as xyzw`), the first row where not all of them are, and the question that whoever
 /// measured them can answer (`next`); nothing where they follow the joints, where fewer than 3 poses of a tool have
 /// one, and where the positions do not belong to the joints either.
-[[nodiscard]] std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell);
+/// `X_WB`: where the base stands, if that is known better than these positions say.
+[[nodiscard]] std::optional<Error> orientation_doubt(const MeasurementBatch& batch, const Cell& cell,
+                                                     const std::optional<Pose>& X_WB = {});
 
 /// Refuses a batch with an orientation_doubt().
 [[nodiscard]] Status check_orientations(const MeasurementBatch& batch, const Cell& cell);

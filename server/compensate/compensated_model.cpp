@@ -115,7 +115,7 @@ Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_posi
   if (rotation.kernel != of_position.kernel || rotation.q != of_position.q)
     return refused("model: the bias of the orientation is not of the same poses and kernel as that of the position");
   for (const BiasFeatures& features : of_position.features) rotation.features.push_back(turned(features));
-  return BiasModel::restore(rotation, true);
+  return BiasModel::restore(rotation);
 }
 
 }  // namespace
@@ -157,11 +157,6 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
   parts.provenance.id = parts.provenance.hash.substr(0, kIdLength);
   inside->parts = std::move(parts);
   return CompensatedModel(std::move(inside));
-}
-
-void CompensatedModel::prepare(const std::function<bool()>& go_on) const {
-  if (inside_->bias) inside_->bias->prepare(go_on);
-  if (inside_->rotation_bias) inside_->rotation_bias->prepare(go_on);
 }
 
 BiasPhysics CompensatedModel::learned_physics() const { return physics_of_bias(parts()); }

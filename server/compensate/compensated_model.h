@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,8 +52,6 @@ class CompensatedModel {
                                         const std::string& payload) const;
   /// The same at many poses, faster for a bias with blocks.
   [[nodiscard]] std::vector<ErrorPrediction> predict_all(const std::vector<PoseContext>& poses) const;
-  /// As BiasModel::prepare(): so that the first targets do not wait.
-  void prepare(const std::function<bool()>& go_on) const;
   /// The physics with which the bias was learned.
   [[nodiscard]] BiasPhysics learned_physics() const;
   /// The learned bias, if any, and the features of a pose for it.
@@ -124,6 +121,15 @@ class CompensatedModel {
   [[nodiscard]] std::vector<Learned> learned(const std::vector<PoseContext>& poses) const;
   /// Turned from B of the training into B of today.
   [[nodiscard]] std::vector<Learned> turn(std::vector<Learned> all) const;
+  /// What the biases move the tool by, in B.
+  struct LearnedMotion {
+    Vector3 shift = Vector3::Zero();
+    Matrix3 turn = Matrix3::Identity();
+  };
+  [[nodiscard]] LearnedMotion learned_motion(const PoseContext& completed, double bias_weight) const;
+  /// X_BT of the physics alone.
+  [[nodiscard]] Pose calibrated_pose_B(const PoseContext& completed) const;
+  [[nodiscard]] static Pose moved(const Pose& X_BT, const LearnedMotion& by);
   /// X_BT as predict() has it, without the variances.
   [[nodiscard]] Pose pose_B(const PoseContext& asked, double bias_weight) const;
   /// Covariance of the position, in B, from what a source needs and nobody gave: the side from which a joint is

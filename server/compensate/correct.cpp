@@ -131,7 +131,12 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   const auto settled = [&] {
     return now.missing.head<3>().norm() < options.tolerance && now.missing.tail<3>().norm() < kRotationTolerance;
   };
-  // The iteration asks for the mean only: the variance takes a hundred times as long.
+  // What was learned hardly changes over the way of a correction, and takes longer to compute than the physics. So it
+  // is taken from where it was asked for last, and asked for again once the physics has settled.
+  context = completed(std::move(context));
+  const Pose X_BT_calibrated = calibrated_pose_B(context);
+  LearnedMotion learned{X_BT_predicted.translation() - X_BT_calibrated.translation(),
+                        X_BT_predicted.linear() * X_BT_calibrated.linear().transpose()};
   while (!settled() && now.iterations < options.max_iterations) {
     ++now.iterations;
     now.X_BT_commanded.translation() += now.missing.head<3>();
@@ -139,7 +144,11 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
     now.joints = inverse_kinematics(cell().robot, now.X_BT_commanded * X_TF, context.q);
     if (now.joints.status != InverseStatus::kOk) return now;
     context.q = now.joints.q;
-    now.missing = pose_difference(X_BT_wanted, pose_B(context, bias_weight));
+    const Pose X_BT = calibrated_pose_B(context);
+    now.missing = pose_difference(X_BT_wanted, moved(X_BT, learned));
+    if (!settled() && now.iterations < options.max_iterations) continue;
+    learned = learned_motion(context, bias_weight);
+    now.missing = pose_difference(X_BT_wanted, moved(X_BT, learned));
   }
   now.settled = settled();
   return now;

@@ -121,10 +121,55 @@ void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& no
   }
 }
 
+/// `from q3 -0.200 ± 0.004 mrad`: the numbers of a change.
+std::string size_of(const CompensatedModel::Parts& parts, const Change& change) {
+  std::vector<std::string> numbers;
+  std::size_t next = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
+      if (source->name() != change.source) continue;
+      const IdentifiedParameter& p = parts.parameters[next];
+      const bool angle = p.parameter.unit == "rad";
+      const double scale = p.parameter.scale * (angle ? 1e3 : 1);
+      numbers.push_back(fmt::format("{} {:.4f} ± {:.4f} {}", p.parameter.name, scale * p.value, 2 * scale * p.stddev,
+                                    angle ? "mrad" : p.parameter.unit));
+    }
+  }
+  return fmt::format("{}", fmt::join(numbers, ", "));
+}
+
+void add_changes(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  for (const Change& change : parts.changes) {
+    const SessionSetting& since = parts.sessions[change.session];
+    std::string note = fmt::format("since session {} (pose {}): {} ({}; U, k=2)", since.id, since.first_pose,
+                                   cause_in_words(change.source), size_of(parts, change));
+    std::vector<std::string> others;
+    for (const std::string& other : change.could_also_be) others.push_back(cause_in_words(other));
+    if (!others.empty()) note += fmt::format("; ambiguous: it could also be {}", fmt::join(others, " or "));
+    notes.push_back(note);
+  }
+}
+
+void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  for (const LeftOutSession& session : parts.sessions_left_out)
+    notes.push_back(fmt::format("nothing was learned from session {}: {}", session.id, session.why));
+  for (const SessionSetting& session : parts.sessions) {
+    if (session.own_noise == 0 && session.own_noise_rotation == 0) continue;
+    notes.push_back(
+        fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: it counts "
+                    "for less",
+                    session.id, to_mm(session.own_noise), to_deg(session.own_noise_rotation)));
+  }
+}
+
 }  // namespace
+
+std::string cause_in_words(const std::string& source) { return in_words(source.substr(0, source.find('@'))); }
 
 std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
+  add_changes(model.parts(), notes);
+  add_sessions(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_moved_tools(model, notes);
   return notes;

@@ -11,6 +11,7 @@
 #include "server/bias/bias_data.h"
 #include "server/bias/choose_bias.h"
 #include "server/calibrate/calibration.h"
+#include "server/calibrate/changes.h"
 #include "server/compensate/evaluation.h"
 
 namespace trammel {
@@ -45,6 +46,12 @@ struct ModelProvenance {
   }
 };
 
+/// A session that nothing was learned from.
+struct LeftOutSession {
+  std::string id;
+  std::string why;
+};
+
 /// All that a model is made of, and all that its file holds.
 struct ModelParts {
   PhysicalModel physics;
@@ -56,7 +63,11 @@ struct ModelParts {
   double observability_index = 0;  ///< see CalibrationResult, as the next two
   std::vector<SuspectPose> suspects;
   std::vector<double> cost_record;
-  double discrepancy = 0;                  ///< m per axis, see CalibrationResult
+  /// Of several sessions: what belongs to each, the newest last, in whose world the base stands; empty: there was one.
+  std::vector<SessionSetting> sessions;
+  std::vector<LeftOutSession> sessions_left_out;
+  std::vector<Change> changes;  ///< of the arm between these sessions; their sources are among those of the physics
+  double discrepancy = 0;       ///< m per axis, see CalibrationResult
   std::optional<BiasChoice> bias_choice;   ///< where the bias was `auto`: what was tried and what it is worth
   std::optional<BiasState> bias;           ///< without features, which follow from the physics and bias_contexts
   std::optional<BiasState> rotation_bias;  ///< of the same poses: residuals are rotation vectors in B, rad

@@ -112,18 +112,33 @@ Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& f
 
 }  // namespace
 
-Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) const {
-  const PoseContext context = completed(asked);
-  Pose X_BT = parts().physics.X_WB.inverse() * parts().physics.pose_W(context);
-  if (!inside_->bias) return X_BT;
+CompensatedModel::LearnedMotion CompensatedModel::learned_motion(const PoseContext& context, double bias_weight) const {
+  LearnedMotion motion;
+  if (!inside_->bias) return motion;
   const std::optional<BiasModel>& rotation = inside_->rotation_bias;
   const BiasFeatures of_position = inside_->bias->needs_features() ? features(context) : BiasFeatures{};
   const Matrix3 turn = inside_->bias_turn.value_or(Matrix3::Identity());
-  X_BT.translation() += turn * taken(*inside_->bias, context.q, of_position, bias_weight);
-  if (!rotation) return X_BT;
+  motion.shift = turn * taken(*inside_->bias, context.q, of_position, bias_weight);
+  if (!rotation) return motion;
   const BiasFeatures of_rotation = rotation->needs_features() ? turned(of_position) : of_position;
-  X_BT.linear() = (rotation_exp(turn * taken(*rotation, context.q, of_rotation, bias_weight)) * X_BT.linear()).eval();
-  return X_BT;
+  motion.turn = rotation_exp(turn * taken(*rotation, context.q, of_rotation, bias_weight));
+  return motion;
+}
+
+Pose CompensatedModel::calibrated_pose_B(const PoseContext& context) const {
+  return parts().physics.X_WB.inverse() * parts().physics.pose_W(context);
+}
+
+Pose CompensatedModel::moved(const Pose& X_BT, const LearnedMotion& by) {
+  Pose moved = X_BT;
+  moved.translation() += by.shift;
+  moved.linear() = by.turn * X_BT.linear();
+  return moved;
+}
+
+Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) const {
+  const PoseContext context = completed(asked);
+  return moved(calibrated_pose_B(context), learned_motion(context, bias_weight));
 }
 
 Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,

@@ -97,7 +97,8 @@ void read_dds(const YamlMap& map, DdsOptions& dds) {
 }
 
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
-  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s"});
+  map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s",
+            "keep_models", "keep_batches", "keep_answers"});
   map.attempt([&] { trainer.queue_capacity = integer_within(map, "queue_capacity", trainer.queue_capacity, 1, 1000); });
   map.attempt([&] { trainer.max_poses = integer_within(map, "max_poses", trainer.max_poses, 10, 20000); });
   map.attempt(
@@ -107,6 +108,10 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
     trainer.seed = static_cast<std::uint64_t>(
         integer_within(map, "seed", static_cast<int>(trainer.seed), 0, std::numeric_limits<int>::max()));
   });
+  KeepRule& keep = trainer.keep;
+  map.attempt([&] { keep.models = integer_within(map, "keep_models", keep.models, 0, 1000000); });
+  map.attempt([&] { keep.batches = integer_within(map, "keep_batches", keep.batches, 0, 1000000); });
+  map.attempt([&] { keep.answers = integer_within(map, "keep_answers", keep.answers, 0, 1000000); });
   ComputeOptions& compute = trainer.compute;
   map.attempt([&] {
     const int memory = integer_within(map, "memory_mb", compute.memory_mb, 0, 1 << 24);

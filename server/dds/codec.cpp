@@ -232,9 +232,25 @@ wire::Job to_wire(const JobProgress& progress) {
   return job;
 }
 
+namespace {
+
+wire::JobKind to_wire(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return wire::JOB_TRAINING_OF_BATCHES;
+    case JobKind::kDiagnose:
+      return wire::JOB_DIAGNOSIS;
+    case JobKind::kCheck:
+      return wire::JOB_CHECK;
+  }
+  return wire::JOB_TRAINING_OF_BATCHES;
+}
+
+}  // namespace
+
 wire::Job to_wire(const Trainer::DatedJob& dated) {
   wire::Job job = to_wire(dated.progress);
-  job.kind(dated.asked.kind == JobKind::kDiagnose ? wire::JOB_DIAGNOSIS : wire::JOB_TRAINING_OF_BATCHES);
+  job.kind(to_wire(dated.asked.kind));
   job.batch_ids(dated.asked.batch_ids);
   job.created_unix_s(dated.asked.created_at);
   job.started_unix_s(dated.asked.started_at.value_or(kNoTime));
@@ -335,8 +351,17 @@ void put_error(const wire::Fault& fault, wire::ReplyHeader& header) {
   header.problems().front().code(fault.code);
 }
 
-ChangeId change_id(const std::string& id, const std::string& asked) {
-  return id.empty() ? ChangeId{} : ChangeId{id, asked};
+ChangeId change_id(const std::string& id, const std::string& asked, const wire::RequestHeader& header) {
+  return {id, asked, requester(header)};
+}
+
+std::string requester(const wire::RequestHeader& header) {
+  constexpr std::size_t kOfParticipant = 12;  // octets of a GUID
+  std::string text = "client ";
+  const auto& guid = header.request_id().writer_guid();
+  for (std::size_t i = 0; i < kOfParticipant; ++i) text += fmt::format("{:02x}", guid[i]);
+  const std::string trace = header.trace_id().to_string();
+  return trace.empty() ? text : text + " " + trace;
 }
 
 std::string in_few_words(const std::string& verb, const std::string& cell, const std::vector<std::string>& rest) {

@@ -1,3 +1,6 @@
+#include <cmath>
+#include <optional>
+
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 
@@ -8,7 +11,8 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = trainer_.diagnose(
       cell, request.batch_id(), request.csv(), false,
-      change_id(request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()})));
+      change_id(request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
+                request.header()));
   if (!job) return tl::make_unexpected(job.error());
   wire::DiagnoseReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
@@ -16,11 +20,26 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   return reply;
 }
 
-Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest&) {
-  return unsupported<wire::CheckHealthReply>("CheckHealth");
+Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest& request) {
+  const std::string& cell = request.about().cell();
+  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  std::optional<double> tolerance;
+  if (!std::isnan(request.tolerance_mm())) tolerance = request.tolerance_mm();
+  if (tolerance && !(*tolerance > 0 && std::isfinite(*tolerance))) {
+    return failure(ErrorCode::kUsage, "a tolerance of {} mm", *tolerance).of("tolerance_mm").beyond(*tolerance, 0);
+  }
+  const auto job =
+      trainer_.check(cell, request.batch_id(), request.csv(), tolerance,
+                     change_id(request.change_id().to_string(),
+                               in_few_words("check", cell, {request.batch_id(), request.csv()}), request.header()));
+  if (!job) return tl::make_unexpected(job.error());
+  wire::CheckHealthReply reply;
+  if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
+  reply.job(*job);
+  return reply;
 }
 
 bool happens_once(const wire::DiagnoseRequest&) { return true; }
-bool happens_once(const wire::CheckHealthRequest&) { return false; }
+bool happens_once(const wire::CheckHealthRequest&) { return true; }
 
 }  // namespace trammel

@@ -73,14 +73,9 @@ class Handlers {
   [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
   /// The version activated, gone back to or imported; 0: none.
   [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
-  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job);
+  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job, const std::string& who);
   /// The job, or 0.
   [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
-  /// Refuses (kConflict) where another version is in force.
-  [[nodiscard]] Status check_expected(const std::string& cell, const std::optional<int>& expected) const;
-  /// The same, unless the change has been made under this id.
-  [[nodiscard]] Status check_expected_once(const std::string& cell, const std::optional<int>& expected,
-                                           const ChangeId& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,
                                                    const wire::ReadModelsRequest& request) const;
   [[nodiscard]] Result<wire::ReadModelsReply> job_of(std::int64_t job) const;
@@ -89,7 +84,10 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ReadModelsReply> quarantine_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> audit_of(const std::string& cell, std::int64_t since,
+                                                       std::size_t most) const;
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
 
   Trainer& trainer_;
   Store& store_;

@@ -4,7 +4,8 @@
 namespace trammel {
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
-  if (request.force()) return unsupported<wire::ManageModelsReply>("force");
+  if (request.force() && request.action() != wire::MANAGE_ACTIVATE)
+    return unsupported<wire::ManageModelsReply>("force");
   if (request.change().expected_epoch() != 0) return unsupported<wire::ManageModelsReply>("expected_epoch");
   if (request.action() == wire::MANAGE_BACKUP) return unsupported<wire::ManageModelsReply>("action");
   const std::string& cell = request.about().cell();
@@ -21,47 +22,38 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
   const auto expected = expected_version(request.change());
   if (!expected) return tl::make_unexpected(expected.error());
   const auto under = [&](const std::string& asked) {
-    return ChangeRequest{change_id(request.change().id().to_string(), asked), *expected};
+    ChangeId id = change_id(request.change().id().to_string(), asked, request.header());
+    id.reason = request.reason();
+    return ChangeRequest{std::move(id), *expected};
   };
   switch (request.action()) {
     case wire::MANAGE_ROLLBACK:
       return trainer_.rollback(cell, under("roll back " + cell));
     case wire::MANAGE_IMPORT: {
       const std::string& text = request.model_text();
-      const ChangeId id = under(in_few_words("import", cell, {text})).id;
-      if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
-        return tl::make_unexpected(as_expected.error());
+      ChangeId id = under(in_few_words("import", cell, {text})).id;
+      id.expected_version = *expected;
       return trainer_.import_model(cell, text, id);
     }
     case wire::MANAGE_CANCEL_JOB:
-      return cancel(cell, request.job()).map([] { return 0; });
+      return cancel(cell, request.job(), requester(request.header())).map([] { return 0; });
     default:
-      return trainer_.activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())))
+      return trainer_
+          .activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())),
+                    request.force())
           .map([&] { return int{request.version()}; });
   }
 }
 
-Status Handlers::cancel(const std::string& cell, std::int64_t job) {
+Status Handlers::cancel(const std::string& cell, std::int64_t job, const std::string& who) {
   const auto asked = trainer_.progress(job);
   if (!asked) return tl::make_unexpected(asked.error());
   if (asked->cell != cell)
     return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
-  return trainer_.cancel(job);
-}
-
-Status Handlers::check_expected(const std::string& cell, const std::optional<int>& expected) const {
-  if (!expected) return {};
-  const auto served = registry_.in_force(cell);
-  const int version = served ? served->version : 0;
-  if (version == *expected) return {};
-  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version, *expected)
-      .of("expected")
-      .beyond(*expected, version)
-      .next("look again, and decide anew");
+  return trainer_.cancel(job, who);
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
-  if (request.action() == wire::RELEASE_DISCARD) return unsupported<wire::ReleaseBatchesReply>("action");
   if (request.change().expected_epoch() != 0) return unsupported<wire::ReleaseBatchesReply>("expected_epoch");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
@@ -77,26 +69,24 @@ Result<std::int64_t> Handlers::released(const std::string& cell, const wire::Rel
   if (!expected) return tl::make_unexpected(expected.error());
   const auto& batches = request.batch_ids();
   const bool trains = request.action() == wire::RELEASE_AND_TRAIN;
+  const bool discards = request.action() == wire::RELEASE_DISCARD;
   if (!trains && batches.size() != 1) {
-    return failure(ErrorCode::kUsage, "{} batches to release, 1 is needed", batches.size())
+    return failure(ErrorCode::kUsage, "{} batches to release or to discard, 1 is needed", batches.size())
         .of("batch_ids")
         .beyond(batches.size(), 1);
   }
-  const ChangeId id =
+  ChangeId id =
       change_id(request.change().id().to_string(),
-                in_few_words(trains ? "release and train" : "release", cell,
-                             {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}));
-  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
-    return tl::make_unexpected(as_expected.error());
+                in_few_words(trains     ? "release and train"
+                             : discards ? "discard"
+                                        : "release",
+                             cell, {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
+                request.header());
+  id.reason = request.reason();
+  id.expected_version = *expected;
+  if (discards) return trainer_.discard(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   if (!trains) return trainer_.release(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kReleased, id);
-}
-
-Status Handlers::check_expected_once(const std::string& cell, const std::optional<int>& expected,
-                                     const ChangeId& id) const {
-  const auto made = store_.outcome_of(id);
-  if (!made) return tl::make_unexpected(made.error());
-  return *made ? Status() : check_expected(cell, expected);
 }
 
 bool happens_once(const wire::ManageModelsRequest&) { return true; }

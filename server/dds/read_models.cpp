@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 #include <string>
 
@@ -5,6 +6,8 @@
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/report/fleet_json.h"
+#include "server/store/audit_json.h"
 
 namespace trammel {
 namespace {
@@ -28,9 +31,12 @@ Status check_fits(const std::string& what, std::size_t bytes) {
 
 Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const std::string& cell = request.about().cell();
-  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE;
+  const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
+                      request.what() == wire::READ_AUDIT;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
-  if (request.what() > wire::READ_FINDINGS) return unsupported<ReadModelsReply>("what");
+  if (request.what() == wire::READ_FLEET) return fleet();
+  if (request.what() > wire::READ_FINDINGS && request.what() != wire::READ_AUDIT)
+    return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
     if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   }
@@ -52,6 +58,8 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
       return quarantine_of(cell);
     case wire::READ_FINDINGS:
       return findings_of(cell, request.job(), request.page());
+    case wire::READ_AUDIT:
+      return audit_of(cell, request.since_unix_s(), request.most());
     default:
       return unsupported<ReadModelsReply>("what");
   }
@@ -117,6 +125,16 @@ Result<ReadModelsReply> Handlers::quarantine_of(const std::string& cell) const {
   return reply;
 }
 
+Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since, std::size_t most) const {
+  const auto trail = store_.audit({cell, std::max<std::int64_t>(since, 0), most});
+  if (!trail) return tl::make_unexpected(trail.error());
+  ReadModelsReply reply;
+  reply.text(audit_json(*trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (const Status fits = check_fits("the audit trail", reply.text().size()); !fits)
+    return Failure(fits.error()).next("ask for fewer rows");
+  return reply;
+}
+
 Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int64_t job, bool page) const {
   const auto asked = trainer_.progress(job);
   if (!asked) return tl::make_unexpected(asked.error());
@@ -130,6 +148,29 @@ Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int6
   if (const Status fits = check_fits(fmt::format("what job {} found", job), bytes); !fits)
     return Failure(fits.error()).next("ask without the page");
   reply.text(std::move(found->findings));
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::fleet() const {
+  std::map<std::string, std::string> checks;  // the last of each cell
+  const auto jobs = trainer_.jobs("");
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  for (const Trainer::DatedJob& job : *jobs) {
+    if (job.asked.kind != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
+    if (const auto found = trainer_.diagnosis(job.asked.id)) checks[job.asked.cell] = found->findings;
+  }
+  std::vector<FleetEntry> cells;
+  for (const auto& [name, cell] : trainer_.cells()) {
+    FleetEntry entry{name, 0, std::nullopt, checks[name]};
+    if (const auto served = registry_.in_force(name)) {
+      entry.version = served->version;
+      entry.model = served->model;
+    }
+    cells.push_back(std::move(entry));
+  }
+  ReadModelsReply reply;
+  reply.text(fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (const Status fits = check_fits("the fleet", reply.text().size()); !fits) return tl::make_unexpected(fits.error());
   return reply;
 }
 

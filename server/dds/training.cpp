@@ -32,7 +32,8 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
   const auto job =
       trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
                       request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
-                                                              : request.change_id().to_string());
+                                                              : request.change_id().to_string(),
+                      requester(request.header()));
   if (!job) return tl::make_unexpected(job.error());
   wire::SubmitMeasurementsReply reply;
   reply.job(*job);
@@ -59,12 +60,12 @@ Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
   if (const Status sensible = check_training(request); !sensible) return tl::make_unexpected(sensible.error());
   const auto expected = expected_version(request.change());
   if (!expected) return tl::make_unexpected(expected.error());
-  const ChangeId id = change_id(
+  ChangeId id = change_id(
       request.change().id().to_string(),
       in_few_words(diagnosed ? "diagnose and train" : "train", cell,
-                   {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}));
-  if (const Status as_expected = check_expected_once(cell, *expected, id); !as_expected)
-    return tl::make_unexpected(as_expected.error());
+                   {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}),
+      request.header());
+  id.expected_version = *expected;
   if (!diagnosed)
     return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);
   return trainer_.diagnose(cell, batches.empty() ? "" : batches.front(), request.csv(), true, id);

@@ -1,15 +1,19 @@
 #include "server/diagnose/diagnose.h"
 
+#include <algorithm>
 #include <functional>
 
+#include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/calibrate/batch_check.h"
+#include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
-#include "server/calibrate/orientation_check.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel::cause_search {
 
@@ -18,16 +22,42 @@ namespace {
 constexpr std::size_t kFewestPoses =
     12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
 
-Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch) {
-  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
-    return tl::make_unexpected(oriented.error());
+/// Of a batch of several sessions: where the instrument of each stood, by the arm as the cell's sources have it.
+Result<std::vector<SessionSetting>> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch) {
+  if (!has_sessions(batch.rows())) return std::vector<SessionSetting>();
+  const MeasurementBatch merged = merge_repeats(batch.training(), cell->tracker.sigma).batch;
+  return calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), merged, {})
+      .map([](CalibrationResult found) { return std::move(found.sessions); });
+}
+
+/// What stands for an instrument that was set up anew.
+const CauseRecord& set_up_anew() {
+  const std::vector<const CauseRecord*> all = all_causes();
+  const auto found = std::find_if(all.begin(), all.end(), [](const CauseRecord* cause) {
+    return cause->lasting == causes::Lasting::kFromAPose && cause->scope == causes::Scope::kSession;
+  });
+  TRAMMEL_CHECK(found != all.end());
+  return **found;
+}
+
+/// The cell's sources, and from each session on a tracker that was set up anew: nothing that this explains is evidence.
+std::vector<std::string> sources_of(const Cell& cell, const std::vector<SessionSetting>& sessions) {
+  std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
+  for (std::size_t s = 1; s < sessions.size(); ++s)
+    sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, sessions[s].first + 1));
+  return sources;
+}
+
+Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
+                              const std::vector<SessionSetting>& sessions) {
+  if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();
   const CheckedBatch ordered = batch.in_order_of_time();
-  MeasurementBatch all = ordered.rows();
-  MergedRepeats merged = merge_repeats(ordered.training(), cell.tracker.sigma);
-  prepared.validation = ordered.held_out();
+  MeasurementBatch all = aligned(ordered.rows(), sessions, cell.tracker);
+  MergedRepeats merged = merge_repeats(aligned(ordered.training(), sessions, cell.tracker), cell.tracker.sigma);
+  prepared.validation = aligned(ordered.held_out(), sessions, cell.tracker);
   prepared.surrogates = put_in_surrogates(all);
   take_over_surrogates(prepared.surrogates, all, merged.batch);
   take_over_surrogates(prepared.surrogates, all, prepared.validation);
@@ -66,15 +96,26 @@ Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
 }
 
 Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const PreparedBatch& prepared,
-                              const DiagnoseOptions& options) {
+                              const std::vector<SessionSetting>& sessions, const DiagnoseOptions& options) {
   const Status wanted = report_progress(options, "calibrating", 0);
   if (!wanted) return tl::make_unexpected(wanted.error());
-  Result<SearchResult> result =
-      search_causes(cell, with_unknown_tool(cell->model.error_sources, *cell), prepared.train, options);
+  Result<SearchResult> result = search_causes(cell, sources_of(*cell, sessions), prepared.train, options);
   if (!result) return result;
   const Status go_on = report_progress(options, "measuring the gain", 0.65);
   if (!go_on) return tl::make_unexpected(go_on.error());
   return result;
+}
+
+/// In which session each finding began that begins at a pose.
+void tell_since(const MeasurementBatch& batch, Diagnosis& diagnosis) {
+  if (!has_sessions(batch)) return;
+  for (Finding& finding : diagnosis.findings) {
+    const auto pose = std::find_if(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+      return !finding.cause.pose_id.empty() && m.pose_id == finding.cause.pose_id;
+    });
+    if (pose != batch.measurements.end())
+      finding.since_session = batch.sessions[static_cast<std::size_t>(pose->session)];
+  }
 }
 
 /// What was done to which files.
@@ -86,9 +127,11 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
 
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
-  const Result<PreparedBatch> prepared = prepare(*cell, batch);
+  const Result<std::vector<SessionSetting>> sessions = placed(cell, batch);
+  if (!sessions) return tl::make_unexpected(sessions.error());
+  const Result<PreparedBatch> prepared = prepare(*cell, batch, *sessions);
   if (!prepared) return tl::make_unexpected(prepared.error());
-  Result<SearchResult> result = searched(cell, *prepared, options);
+  Result<SearchResult> result = searched(cell, *prepared, *sessions, options);
   if (!result) return tl::make_unexpected(result.error());
   const Explained explained(*cell, std::move(*result));
   const SearchResult& found = explained.found;
@@ -99,6 +142,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, *prepared, diagnosis);
   tell_findings(explained, *prepared, diagnosis.batch, diagnosis);
+  tell_since(batch.rows(), diagnosis);
   tell_noise(explained, *prepared, diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
   tell_held_out(explained, *prepared, diagnosis);

@@ -61,6 +61,7 @@ struct Finding {
   /// Of what begins at a pose: those that the data cannot tell from it (95 %), it among them, in the order of
   /// measuring.
   std::vector<PossibleBeginning> may_begin_at = {};
+  std::string since_session = {};     ///< of a batch of several sessions: the one in which it began
   double effect_rms = 0;              ///< m, Euclidean, over the poses: what it does that nothing else in the model can
   ErrorFigures held_out_before = {};  ///< without this cause, the others found in place
   ErrorFigures held_out_after = {};   ///< with it

@@ -29,9 +29,11 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/calibrate/orientation_check.h"
+#include "server/calibrate/batch_check.h"
 #include "server/compensate/known_rows.h"
+#include "server/compensate/world.h"
 #include "server/diagnose/triage/batch_alternatives.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -211,8 +213,8 @@ std::string_view to_string(TriageVerdict verdict) {
 Triage triage(const CompensatedModel& model, const CheckedBatch& batch) { return triage(model, batch, model.cell()); }
 
 Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const Cell& cell) {
-  const MeasurementBatch batch = known_rows(model, checked.rows());
-  if (const auto doubt = orientation_doubt(batch, cell)) {
+  MeasurementBatch batch = known_rows(model, checked.rows());
+  if (const auto doubt = reading_doubt(batch, cell)) {
     Triage poisoned;
     poisoned.verdict = TriageVerdict::kPoisoned;
     poisoned.learn = false;
@@ -224,6 +226,9 @@ Triage triage(const CompensatedModel& model, const CheckedBatch& checked, const 
     too_few.sentence =
         fmt::format("{} poses are too few to be held against the model in force", batch.measurements.size());
     return too_few;
+  }
+  if (has_sessions(batch)) {
+    if (Result<InWorld> world = in_world_of(model, batch)) batch = std::move(world->batch);
   }
   const Comparison comparison(model, batch);
   const Alternatives alternatives(comparison);

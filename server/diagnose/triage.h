@@ -37,8 +37,8 @@ struct Triage {
 /// Holds the rows of `batch` that `model` knows() against it and tells apart: a tracker or base that stands
 /// elsewhere, another tool, another payload, a joint that lost its zero, single bad poses, an arm that has changed,
 /// each from the beginning of the batch or from one of its poses on. Orientations are judged like positions where the
-/// model was trained on some; those that do not follow the joints at all (orientation_doubt()) are poison whatever the
-/// positions say. With fewer than 8 poses nothing else is said: clean.
+/// model was trained on some. Numbers that were read wrongly (reading_doubt()) are poison, and the reading that would
+/// fit is named. With fewer than 8 poses nothing else is said: clean.
 [[nodiscard]] Triage triage(const CompensatedModel& model, const CheckedBatch& batch);
 
 /// The same where tools and base are to be those of `cell`, which may say others than the model's.

@@ -1,12 +1,15 @@
 #include "server/measurement/checked_batch.h"
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <utility>
 
 #include "server/base/check.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
+#include "server/measurement/reading_doubt.h"
+#include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
 #include "server/measurement/spread_check.h"
 #include "server/measurement/velocity.h"
@@ -17,13 +20,11 @@ namespace {
 
 std::string name_of(const MeasurementBatch& batch) { return batch.where.empty() ? "batch " + batch.id : batch.where; }
 
-/// Shifts the times so that the first recorded one is 0.
+/// Shifts the times so that the first recorded one of each session is 0.
 void rebase_times(std::vector<Measurement>& measurements) {
-  const auto timed = std::find_if(measurements.begin(), measurements.end(),
-                                  [](const Measurement& m) { return m.context.time.has_value(); });
-  const double origin = timed == measurements.end() ? 0 : *timed->context.time;
+  std::map<int, double> origin;
   for (Measurement& m : measurements) {
-    if (m.context.time) *m.context.time -= origin;
+    if (m.context.time) *m.context.time -= origin.emplace(m.session, *m.context.time).first->second;
   }
 }
 
@@ -41,20 +42,46 @@ Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string&
   return {};
 }
 
-bool earlier(const Measurement& a, const Measurement& b) { return *a.context.time < *b.context.time; }
+bool earlier(const Measurement& a, const Measurement& b) {
+  return std::pair(a.session, *a.context.time) < std::pair(b.session, *b.context.time);
+}
+
+/// Of each session by itself: its positions are in a frame of its own.
+Status check_spreads(const MeasurementBatch& batch, const Cell& cell, const std::string& where) {
+  if (!has_sessions(batch)) return check_spread(batch, cell, where);
+  for (const MeasurementBatch& session : by_session(batch)) {
+    const Status fine = check_spread(session, cell, fmt::format("{}, session {}", where, session.id));
+    if (!fine) return fine;
+  }
+  return {};
+}
 
 void mark(MeasurementBatch& batch, MeasurementSet set) {
   for (Measurement& m : batch.measurements) m.set = set;
 }
 
-/// Appends the measurements of `next` after those of `all`.
+/// Names of the sessions of `next` among those of other batches.
+std::vector<std::string> session_names(const MeasurementBatch& next) {
+  if (!has_sessions(next)) {
+    const std::string& said = next.measurements.front().session_id;
+    return {said.empty() || said == next.id ? next.id : next.id + "/" + said};
+  }
+  std::vector<std::string> names;
+  for (const std::string& session : next.sessions) names.push_back(next.id + "/" + session);
+  return names;
+}
+
+/// Appends the measurements of `next` after those of `all`, as sessions of their own.
 void append(MeasurementBatch& all, const MeasurementBatch& next) {
+  const auto first = static_cast<int>(all.sessions.size());
   for (Measurement m : next.measurements) {
     m.pose_id = next.id + "/" + m.pose_id;
     m.context.index = static_cast<int>(all.measurements.size());
+    m.session += first;
     m.extra.clear();
     all.measurements.push_back(std::move(m));
   }
+  for (std::string& name : session_names(next)) all.sessions.push_back(std::move(name));
   all.joint_types = next.joint_types;
   all.measured_at = std::max(all.measured_at, next.measured_at);
   all.id += (all.id.empty() ? "" : "+") + next.id;
@@ -118,17 +145,25 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
     return tl::make_unexpected(columns.error());
   }
+  divide_into_sessions(batch);
   rebase_times(batch.measurements);
-  if (const Status poses = check_poses(batch, cell, where); !poses) return tl::make_unexpected(poses.error());
-  if (const Status spread = check_spread(batch, cell, where); !spread) return tl::make_unexpected(spread.error());
+  if (const Status poses = check_poses(batch, cell, where); !poses)
+    return tl::make_unexpected(with_likely_reading(poses.error(), batch, cell));
+  if (const Status spread = check_spreads(batch, cell, where); !spread)
+    return tl::make_unexpected(with_likely_reading(spread.error(), batch, cell));
   fill_velocity(batch);
   std::vector<bool> is_held_out = hold_out(batch);
   return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));
 }
 
-Result<CheckedBatch> joined(const std::vector<CheckedBatch>& batches, const Cell& cell) {
+CheckedBatch joined(std::vector<CheckedBatch> batches) {
   TRAMMEL_CHECK(!batches.empty());
   if (batches.size() == 1) return batches.front();
+  const auto clock = [](const CheckedBatch& batch) { return batch.rows().clock; };
+  if (std::all_of(batches.begin(), batches.end(), [&](const CheckedBatch& one) { return clock(one).has_value(); })) {
+    std::stable_sort(batches.begin(), batches.end(),
+                     [&](const CheckedBatch& a, const CheckedBatch& b) { return *clock(a) < *clock(b); });
+  }
   MeasurementBatch all;
   std::vector<bool> is_held_out;
   for (const CheckedBatch& batch : batches) {
@@ -136,10 +171,6 @@ Result<CheckedBatch> joined(const std::vector<CheckedBatch>& batches, const Cell
     const std::vector<bool>& flags = batch.content_->is_held_out;
     is_held_out.insert(is_held_out.end(), flags.begin(), flags.end());
   }
-  if (const Status spread = check_spread(all, cell, name_of(all)); !spread) {
-    return tl::make_unexpected(spread.error());
-  }
-  fill_velocity(all);
   std::string hash = batch_hash(all);
   return CheckedBatch(std::move(all), std::move(is_held_out), std::move(hash));
 }

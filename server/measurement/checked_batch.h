@@ -19,8 +19,9 @@ using HoldOut = std::function<std::vector<bool>(const MeasurementBatch& batch)>;
 /// A batch that was checked against a cell and split into training and held-out rows. All training and validation code
 /// takes this type, so each batch is checked and split once. Only check_against_cell() makes one.
 ///
-/// Tools and payloads are resolved, times count from the first one that was recorded, and poses of a continuous path
-/// have velocities (fill_velocity()). Immutable; copies share their content.
+/// Tools and payloads are resolved, rows of a session stand together (divide_into_sessions()), times count from the
+/// first one that was recorded in it, and poses of a continuous path have velocities (fill_velocity()). Immutable;
+/// copies share their content.
 class CheckedBatch {
  public:
   [[nodiscard]] const std::string& id() const { return rows().id; }
@@ -50,7 +51,7 @@ class CheckedBatch {
   };
   CheckedBatch(MeasurementBatch rows, std::vector<bool> is_held_out, std::string hash);
   friend Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell, const HoldOut& hold_out);
-  friend Result<CheckedBatch> joined(const std::vector<CheckedBatch>& batches, const Cell& cell);
+  friend CheckedBatch joined(std::vector<CheckedBatch> batches);
 
   std::shared_ptr<const Content> content_;
 };
@@ -61,9 +62,10 @@ class CheckedBatch {
 [[nodiscard]] Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell,
                                                       const HoldOut& hold_out = drawn(0, 0));
 
-/// Joins batches of one cell into one, in their order. The ids are joined by plus signs, pose ids become `batch/pose`,
-/// extra columns are dropped. Held-out rows stay held out. A single batch is returned unchanged. Refuses batches whose
-/// positions together spread far more or far less than the robot's own motion.
-[[nodiscard]] Result<CheckedBatch> joined(const std::vector<CheckedBatch>& batches, const Cell& cell);
+/// Joins batches of one cell into one, in the order of time where the instruments' clocks say it, else in their order.
+/// Each batch is a session, or as many as it has, because the tracker may have been set up anew. The ids are joined by
+/// plus signs, pose ids become `batch/pose`, extra columns are dropped. Held-out rows stay held out. A single batch is
+/// returned unchanged.
+[[nodiscard]] CheckedBatch joined(std::vector<CheckedBatch> batches);
 
 }  // namespace trammel

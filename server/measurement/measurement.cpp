@@ -21,6 +21,7 @@ MeasurementBatch dated(MeasurementBatch batch, std::int64_t taken_in) {
     if (time < kOldestUnixTime || time > static_cast<double>(taken_in) + kClockAhead) continue;
     newest = std::max(newest.value_or(time), time);
   }
+  if (newest) batch.clock = static_cast<std::int64_t>(*newest);
   batch.measured_at = newest ? static_cast<std::int64_t>(*newest) : taken_in;
   return batch;
 }

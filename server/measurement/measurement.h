@@ -17,10 +17,13 @@ enum class MeasurementSet { kUnassigned, kTrain, kValidation };
 struct Measurement {
   std::string pose_id;
   PoseContext context;
-  Vector3 p_W = Vector3::Zero();  ///< tool point as measured, m
-  std::optional<Matrix3> R_WT;    ///< tool orientation as measured, active W <- T
-  std::optional<double> sigma;    ///< m, of one axis of this point
+  Vector3 p_W = Vector3::Zero();         ///< tool point as measured, m
+  std::optional<Matrix3> R_WT;           ///< tool orientation as measured, active W <- T
+  std::optional<double> sigma;           ///< m, of one axis of this point
+  std::optional<double> sigma_rotation;  ///< rad, of one axis of this orientation, where it is not the tracker's
   MeasurementSet set = MeasurementSet::kUnassigned;
+  std::string session_id;          ///< as recorded: one set-up of the instrument; empty: the batch is one
+  int session = 0;                 ///< its place in MeasurementBatch::sessions
   int row = 0;                     ///< line in its file, for messages
   std::vector<std::string> extra;  ///< values of the batch's extra columns
 };
@@ -34,6 +37,10 @@ struct MeasurementBatch {
   std::vector<std::string> extra_columns;  ///< header names of columns that Trammel does not know, kept
   std::string source_text;                 ///< the CSV as it came
   std::optional<std::int64_t> measured_at = {};  ///< Unix time, s, of the newest measurement; empty = unknown
+  std::optional<std::int64_t> clock = {};        ///< the same where the instrument's clock says it, else empty
+  /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch is one. A session
+  /// has a frame W of its own, because the tracker was set up anew.
+  std::vector<std::string> sessions = {};
 };
 
 /// The batch with measured_at set: the latest `time_s` if that column is Unix time, else `taken_in`. `taken_in` is when

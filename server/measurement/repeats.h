@@ -23,8 +23,8 @@ struct MergedRepeats {
 };
 
 /// Merges repeats into one measurement per pose. Repeats have the same commanded joints (each within 1e-6 rad or m),
-/// tool, payload, approach direction and set; measurements with a velocity are never repeats. The average replaces the
-/// first measurement and keeps its pose id, row, index and extra fields: position weighted by 1/sigma²
+/// tool, payload, approach direction, session and set; measurements with a velocity are never repeats. The average
+/// replaces the first measurement and keeps its pose id, row, index and extra fields: position weighted by 1/sigma²
 /// (`default_sigma`, m, one axis, where a row states none), orientation the rotation with the least squared angles,
 /// time and temperature the means of those recorded. If the batch has repeats, the sigma of each row becomes that of
 /// its (averaged) position, `sigma_factor` / sqrt(sum 1/sigma²). So `sigma_factor` also applies to poses measured once.

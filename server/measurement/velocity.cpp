@@ -42,18 +42,32 @@ JointVector slope(const PoseContext& a, const PoseContext& b, const PoseContext&
   return first + second * (2 * time - *a.time - *b.time);
 }
 
-}  // namespace
-
-bool fill_velocity(MeasurementBatch& batch) {
-  std::vector<Measurement>& path = batch.measurements;
-  for (Measurement& m : path) m.context.velocity.reset();
+/// Of the rows [first, end), which are of one session.
+bool fill_velocity_of(MeasurementBatch& batch, std::size_t first, std::size_t end) {
+  const auto at = [&](std::size_t i) { return batch.measurements.begin() + static_cast<std::ptrdiff_t>(i); };
+  const std::vector<Measurement> path(at(first), at(end));
   if (!is_continuous_path(path)) return false;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const std::size_t middle = std::clamp<std::size_t>(i, 1, path.size() - 2);
-    path[i].context.velocity =
+    batch.measurements[first + i].context.velocity =
         slope(path[middle - 1].context, path[middle].context, path[middle + 1].context, *path[i].context.time);
   }
   return true;
+}
+
+}  // namespace
+
+bool fill_velocity(MeasurementBatch& batch) {
+  bool any = false;
+  for (Measurement& m : batch.measurements) m.context.velocity.reset();
+  for (std::size_t first = 0; first < batch.measurements.size();) {
+    std::size_t end = first;
+    while (end < batch.measurements.size() && batch.measurements[end].session == batch.measurements[first].session)
+      ++end;
+    any = fill_velocity_of(batch, first, end) || any;
+    first = end;
+  }
+  return any;
 }
 
 }  // namespace trammel

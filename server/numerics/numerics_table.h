@@ -59,12 +59,9 @@ struct Numerics {
   /// (k[i * kTargetBlock + j]) when count > 1, one plain column when count == 1.
   void (*square_norms)(std::ptrdiff_t n, const double* packed, std::ptrdiff_t count, const double* k, double* out);
 
-  /// Length in floats of the packed form of a matrix with so many rows and columns.
-  std::ptrdiff_t (*panel_size)(std::ptrdiff_t rows, std::ptrdiff_t cols);
-  /// Rounds `a` (rows x cols, needs no padding) to single precision and packs it.
-  void (*pack_panels)(std::ptrdiff_t rows, std::ptrdiff_t cols, const double* a, std::ptrdiff_t ld, float* packed);
-  /// out = P k of a packed P and a column of doubles, summed in double precision; writes padded_rows(rows).
-  void (*panel_product)(std::ptrdiff_t rows, std::ptrdiff_t cols, const float* packed, const double* k, double* out);
+  /// The same of a packed triangle that was rounded to single precision, number by number; sums are in double.
+  void (*square_norms_single)(std::ptrdiff_t n, const float* packed, std::ptrdiff_t count, const double* k,
+                              double* out);
 
   /// k(i, j) of feature tables a (rows x dims + 1, ld `lda`) and b (cols x dims + 1); the last feature is |z|²/2.
   /// Writes whole vectors: up to padded_rows(rows) of each column.

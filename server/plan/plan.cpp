@@ -46,6 +46,8 @@ Eigen::MatrixXd latin_hypercube(const JointRanges& ranges, int count, std::uint6
 namespace {
 
 constexpr int kCandidates = 4000;          // to choose from: the time of a plan grows with them
+constexpr int kCheckCandidates = 800;      // likewise, of a check: each is held against every cause
+constexpr int kWorkingPoses = 200;         // at which an effect is measured
 constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is hardly one
 // How many times larger than wanted a hypercube is drawn at most.
 constexpr int kLargestFactor = 512;       // of poses: fewer than 1 in 1000 fits then
@@ -268,6 +270,30 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
   return plan;
 }
 
+/// Chooses among `candidates`, which also stand for the poses that the cell works at.
+Result<Plan> planned_check(const Planning& planning, const PlanOptions& options, const Drawn& candidates) {
+  const Result<CausePair> pair = pair_of(planning, options);
+  if (!pair) return tl::make_unexpected(pair.error());
+  const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
+  const CauseEffects effects(pair->model, contexts);
+  const auto working = std::min(contexts.size(), static_cast<std::size_t>(kWorkingPoses));
+  const WorkingPoses work(effects, {contexts.begin(), contexts.begin() + static_cast<std::ptrdiff_t>(working)}, false);
+  CheckTest test;
+  test.sigma = planning.cell->tracker.sigma;
+  test.sigma_rotation = planning.cell->tracker.sigma_rotation;
+  test.orientation = options.orientation;
+  Result<CheckDesign> design =
+      check_design(effects, work.signals(effects, options.seed), contexts, options.count, test);
+  if (!design) return tl::make_unexpected(design.error());
+  std::vector<PoseContext> chosen;
+  for (const std::size_t i : design->chosen) chosen.push_back(contexts[i]);
+  Plan plan;
+  plan.draw = candidates.count;
+  plan.smallest = std::move(design->smallest);
+  plan.poses = planned(planning, std::move(chosen));
+  return plan;
+}
+
 }  // namespace
 
 Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options) {
@@ -308,6 +334,9 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
 
 Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
   if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
+  if (options.criterion == PlanCriterion::kCheck && options.bidirectional) {
+    return failure(ErrorCode::kUsage, "a check is planned from one side").of("--bidirectional");
+  }
   const auto tools = resolved(*cell, options.tools, resolve_tool);
   if (!tools) return tl::make_unexpected(tools.error());
   const auto payloads = resolved(*cell, options.payloads, resolve_payload);
@@ -323,11 +352,13 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
   const Result<Drawn> latin_hypercube = drawn(options.count, kLargestFactor);
   if (!latin_hypercube) return tl::make_unexpected(latin_hypercube.error());
   if (options.criterion == PlanCriterion::kLatinHypercube) {
-    return Plan{planned(planning, contexts_of(planning, latin_hypercube->q)), latin_hypercube->count, 0, 0, {}};
+    return Plan{planned(planning, contexts_of(planning, latin_hypercube->q)), latin_hypercube->count, 0, 0, {}, {}};
   }
-  const Result<Drawn> candidates =
-      drawn(std::max(kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor);
+  const bool check = options.criterion == PlanCriterion::kCheck;
+  const Result<Drawn> candidates = drawn(
+      std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor);
   if (!candidates) return tl::make_unexpected(candidates.error());
+  if (check) return planned_check(planning, options, *candidates);
   return designed(planning, options, *candidates, *latin_hypercube);
 }
 

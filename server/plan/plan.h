@@ -9,6 +9,7 @@
 
 #include "server/base/result.h"
 #include "server/measurement/files/joint_list.h"
+#include "server/plan/check_design.h"
 #include "server/plan/separation.h"
 #include "server/robot/cell.h"
 #include "server/robot/pose_context.h"
@@ -29,7 +30,8 @@ using JointRanges = std::vector<std::pair<double, double>>;  // rad, lower and u
 enum class PlanCriterion {
   kLatinHypercube,  ///< evenly over the joint ranges
   kObservability,   ///< D-optimal for the parameters of the cell's error sources
-  kSeparation       ///< D_s-optimal to tell one cause from another
+  kSeparation,      ///< D_s-optimal to tell one cause from another
+  kCheck            ///< to see whether a single cause has changed: check_design()
 };
 
 struct PlanOptions {
@@ -81,6 +83,8 @@ struct Plan {
     std::string needs;                  ///< what would separate them; empty where nothing is hopeless
   };
   std::optional<Separation> separation;
+  /// For kCheck: how small a change of each cause this plan shows with 95 % chance, beside the tracker's noise.
+  std::vector<SmallestEffect> smallest;
 };
 
 /// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach: from the recorded side
@@ -90,7 +94,7 @@ struct Plan {
 
 /// A plan as the options say, each pose with the pose of its approach (by default from above, as in source section
 /// 3.2.4.2). Poses of one tool and payload come together, the most telling first. Refuses what plan_poses() refuses,
-/// and unknown causes, tools and payloads.
+/// unknown causes, tools and payloads, and a check with poses approached from both sides.
 [[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options);
 
 }  // namespace trammel

@@ -20,8 +20,8 @@ std::size_t bytes_of(const CompensatedModel& model) {
   const auto poses = static_cast<std::size_t>(model.bias()->state().q.rows());
   const std::size_t outputs = model.parts().rotation_bias ? 6 : 3;
   const std::size_t triangle = poses * std::min(poses, kMostOfAnExpert) / 2 * sizeof(double);
-  // All points, and what the regions make of them (regional_variance.h): measured 0.5 to 3 times as much.
-  return kRest + poses * kOfAPose + 2 * outputs * triangle;
+  const std::size_t triangles = outputs * (model.bias()->needs_features() ? 2 : 1);
+  return kRest + poses * kOfAPose + triangles * triangle;
 }
 
 const int* ModelRegistry::place_of(const std::string& cell) const {
@@ -33,7 +33,6 @@ ServedModelPtr ModelRegistry::held(const Key& key) const {
   const auto found = held_.find(key);
   if (found == held_.end()) return nullptr;
   found->second.used = ++uses_;
-  found->second.asked = true;
   return found->second.model;
 }
 
@@ -230,42 +229,17 @@ void ModelRegistry::load_for(const std::stop_token& stop, std::chrono::milliseco
   const auto go_on = [&] { return !stop.stop_requested() && std::chrono::steady_clock::now() < until; };
   while (go_on()) {
     std::optional<Key> key;
-    ServedModelPtr unprepared;
     {
       MutexLock lock(mutex_);
       is_loading_ = true;
       changed_.wait_until(lock, stop, until, [&]() TRAMMEL_REQUIRES(mutex_) {
         key = next_to_load();
-        unprepared = next_to_prepare();
-        return key.has_value() || unprepared;
+        return key.has_value();
       });
     }
     // What comes of it stands in the registry; whoever asks finds it there.
-    if (key) {
-      static_cast<void>(load(*key));
-    } else if (unprepared) {
-      prepare(unprepared, go_on);
-    }
+    if (key) static_cast<void>(load(*key));
   }
-}
-
-ServedModelPtr ModelRegistry::next_to_prepare() const {
-  for (const auto& [key, place] : held_) {
-    if (place.asked && !place.prepared) return place.model;
-  }
-  return nullptr;
-}
-
-void ModelRegistry::prepare(const ServedModelPtr& model, const std::function<bool()>& go_on) {
-  const auto in_time = [&] {
-    const MutexLock lock(mutex_);
-    return go_on() && wanted_.empty();
-  };
-  model->model.prepare(in_time);
-  const bool through = in_time();
-  const MutexLock lock(mutex_);
-  const auto found = held_.find({model->cell, model->version});
-  if (through && found != held_.end() && found->second.model == model) found->second.prepared = true;
 }
 
 void ModelRegistry::stop_loading() {

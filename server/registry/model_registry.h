@@ -77,8 +77,8 @@ class ModelRegistry {
   /// Set before it is used by others; the last one set is emptied before what it calls goes.
   void set_source(ModelSource source);
   /// Loads what ready() was asked for; where nothing is, models in force that were never loaded, as long as there is
-  /// room; where nothing is to be loaded, prepares those in memory that were asked for. Returns after `tick` at the
-  /// latest, or when `stop` is requested. While one thread calls this again and again, ready() does not wait.
+  /// room. Returns after `tick` at the latest, or when `stop` is requested. While one thread calls this again and
+  /// again, ready() does not wait.
   void load_for(const std::stop_token& stop, std::chrono::milliseconds tick);
   /// No thread calls load_for() any longer.
   void stop_loading();
@@ -91,8 +91,6 @@ class ModelRegistry {
     ServedModelPtr model;
     std::size_t bytes = 0;
     std::uint64_t used = 0;
-    bool asked = false;     // since it is in memory
-    bool prepared = false;  // CompensatedModel::prepare() is through
   };
   /// Of a model in memory; counts as a use.
   [[nodiscard]] ServedModelPtr held(const Key& key) const TRAMMEL_REQUIRES(mutex_);
@@ -105,10 +103,6 @@ class ModelRegistry {
   [[nodiscard]] Result<ServedModelPtr> from_source(const Key& key, bool in_force) const;
   void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
-  /// Null: none.
-  [[nodiscard]] ServedModelPtr next_to_prepare() const TRAMMEL_REQUIRES(mutex_);
-  /// As long as `go_on` says so and no model is to be loaded.
-  void prepare(const ServedModelPtr& model, const std::function<bool()>& go_on) TRAMMEL_EXCLUDES(mutex_);
 
   const std::size_t budget_;
   const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ = std::make_shared<Reclaimer<ServedModel>>();

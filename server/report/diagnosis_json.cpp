@@ -53,6 +53,8 @@ ordered_json finding_json(const Finding& finding) {
     json["parameters"][estimate.name] = {{"value", estimate.value}, {"u95", estimate.u95}, {"unit", estimate.unit}};
   }
   if (!finding.may_begin_at.empty()) json["may_begin_at"] = beginning_json(finding.may_begin_at);
+  if (!finding.since_session.empty())
+    json["since"] = {{"session_id", finding.since_session}, {"pose_id", finding.cause.pose_id}};
   json["effect_rms_mm"] = to_mm(finding.effect_rms);
   json["held_out"] = {{"before", figures_json(finding.held_out_before)},
                       {"after", figures_json(finding.held_out_after)}};

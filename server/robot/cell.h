@@ -26,6 +26,15 @@ struct ModelSpec {
   std::string bias = "se";
 };
 
+/// Which of a cell's batches a training by the service takes: those that it was trained from before, and its own.
+struct SessionRule {
+  enum class Kind { kAll, kLast, kDays };
+  Kind kind = Kind::kAll;
+  int count = 0;  ///< of the last batches, its own among them; or days before its own
+
+  friend bool operator==(const SessionRule&, const SessionRule&) = default;
+};
+
 /// Closed box in B, m.
 struct Workspace {
   Vector3 lower, upper;
@@ -42,6 +51,7 @@ struct Cell {
   ModelSpec model;
   std::vector<std::pair<double, double>> joint_ranges;  ///< rad, of this cell; empty = the robot's limits
   std::optional<Workspace> workspace;
+  SessionRule sessions;
   std::string cell_yaml;  ///< the texts it was read from, kept so that a stored model is self-contained
   std::string robot_yaml;
 };

@@ -9,6 +9,7 @@
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
 #include "server/robot/cell_row.h"
+#include "server/robot/cell_rules.h"
 
 namespace trammel {
 
@@ -163,6 +164,25 @@ void read_model(const YamlMap& map, Cell& cell) {
   model.attempt([&] { cell.model.bias = model.text("bias", cell.model.bias); });
 }
 
+SessionRule read_sessions(const YamlMap& map) {
+  std::string word;
+  try {
+    word = map.text("sessions");
+  } catch (const YamlRefusal&) {
+    const YamlMap rule = map.map("sessions");
+    rule.only({"last", "days"});
+    if (rule.has("last") == rule.has("days")) map.refuse("sessions", "expected all, {last: N} or {days: N}");
+    const bool last = rule.has("last");
+    const char* key = last ? "last" : "days";
+    const int count = rule.integer(key, 0);
+    if (count < 1) rule.refuse(key, refused("must be 1 or more").beyond(count, 1));
+    return {last ? SessionRule::Kind::kLast : SessionRule::Kind::kDays, count};
+  }
+  if (word != "all")
+    map.refuse("sessions", refused("'{}', expected all, {{last: N}} or {{days: N}}", word).with_text(word));
+  return {};
+}
+
 void read_surroundings(const YamlMap& map, Cell& cell) {
   map.attempt([&] {
     if (!map.is_null("base")) cell.X_WB = read_pose(map.map("base"));
@@ -177,6 +197,9 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
     if (map.has("tracker")) cell.tracker = read_tracker(map.map("tracker"));
   });
   map.attempt([&] {
+    if (map.has("sessions")) cell.sessions = read_sessions(map);
+  });
+  map.attempt([&] {
     if (!map.has("workspace_mm")) return;
     const YamlMap box = map.map("workspace_mm");
     box.only({"lower", "upper"});
@@ -184,9 +207,27 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
   });
 }
 
+CellRules read_rules(const YamlMap& map) {
+  CellRules rules;
+  map.attempt([&] {
+    if (map.is_null("tolerance_mm")) return;
+    const double tolerance = map.number("tolerance_mm");
+    if (!(tolerance > 0)) map.refuse("tolerance_mm", refused("expected more than 0").beyond(tolerance, 0));
+    rules.tolerance = tolerance * from_mm(1);
+  });
+  map.attempt([&] {
+    if (!map.has("prior")) return;
+    const std::string prior = map.text("prior");
+    if (prior != "fleet" && prior != "none")
+      map.refuse("prior", refused("'{}', expected fleet or none", prior).with_text(prior));
+    rules.fleet_prior = prior == "fleet";
+  });
+  return rules;
+}
+
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm"});
+            "workspace_mm", "sessions", "tolerance_mm", "prior"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -203,6 +244,7 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { read_tools(map, cell); });
   map.attempt([&] { read_payloads(map, cell); });
   map.attempt([&] { read_model(map, cell); });
+  static_cast<void>(read_rules(map));
   return cell;
 }
 
@@ -293,6 +335,11 @@ std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
     return map.has("model") ? map.map("model").row_of(key) : std::nullopt;
   });
   return row ? *row : std::nullopt;
+}
+
+Result<CellRules> rules_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return CellRules{};
+  return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_rules(map); });
 }
 
 Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {

@@ -1,6 +1,7 @@
 // Kinematics of the nominal chain: the arm without any error source.
 #include "server/robot/arm_state.h"
 #include "server/robot/chain.h"
+#include "server/robot/flange_motion.h"
 
 namespace trammel {
 
@@ -20,13 +21,12 @@ Pose Chain::flange_pose(const JointVector& q) const { return ArmKinematics(bare_
 Eigen::MatrixXd Chain::jacobian(const JointVector& q, const Vector3& p_F) const {
   ArmState state = bare_arm(*this, q);
   state.X_FT.translation() = p_F;
-  const StateMatrix<6> all = ArmKinematics(state).pose_jacobian();
-  const StateRows rows(size());
-  Eigen::MatrixXd per_joint(6, size());
-  for (int i = 0; i < size(); ++i) {
-    per_joint.col(i) = all.col(joint(i).type == JointType::kRevolute ? rows.theta(i) : rows.d(i));
-  }
-  return per_joint * transmission_;
+  return ArmKinematics(state).deflection_jacobian() * transmission_;
+}
+
+FlangeMotion flange_motion(const Chain& chain, const JointVector& q) {
+  const ArmKinematics kinematics(bare_arm(chain, q));
+  return {kinematics.tool_pose_W(), kinematics.deflection_jacobian() * chain.transmission()};
 }
 
 }  // namespace trammel

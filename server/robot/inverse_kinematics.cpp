@@ -5,6 +5,7 @@
 
 #include "server/base/check.h"
 #include "server/base/units.h"
+#include "server/robot/flange_motion.h"
 
 namespace trammel {
 
@@ -25,30 +26,38 @@ struct Descent {
   int iterations = 0;
 };
 
+/// A row and a column for each joint.
+using JointMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxJoints>;
+
 Descent descend(const Chain& chain, const Pose& X_BF, const JointVector& start, bool within_limits) {
   const auto keep = [&](const JointVector& q) { return within_limits ? clamped(chain, q) : q; };
+  const JointMatrix identity = JointMatrix::Identity(chain.size(), chain.size());
   Descent now{keep(start), 0, 0};
-  Vector6 e = pose_difference(X_BF, chain.flange_pose(now.q));
+  FlangeMotion motion = flange_motion(chain, now.q);
+  Vector6 e = pose_difference(X_BF, motion.X_BF);
   now.error = e.norm();
   double damping = 1e-3;
   while (now.iterations < kMaxIterations && now.error > kConverged) {
     ++now.iterations;
-    Eigen::MatrixXd J = chain.jacobian(now.q);
+    auto J = motion.jacobian;
     // A joint at its limit that the step would push beyond it is held.
     for (int pass = 0; within_limits && pass < 2; ++pass) {
-      const Eigen::VectorXd push = J.transpose() * e;
+      const JointArray push = J.transpose() * e;
       for (int i = 0; i < chain.size(); ++i) {
         if ((now.q(i) <= chain.joint(i).lower && push(i) < 0) || (now.q(i) >= chain.joint(i).upper && push(i) > 0)) {
           J.col(i).setZero();
         }
       }
     }
-    const Eigen::MatrixXd normal = J.transpose() * J + damping * Eigen::MatrixXd::Identity(chain.size(), chain.size());
-    const JointVector q = keep(now.q + normal.ldlt().solve(J.transpose() * e));
-    const Vector6 e_new = pose_difference(X_BF, chain.flange_pose(q));
+    const JointMatrix normal = J.transpose() * J + damping * identity;
+    const JointArray gradient = J.transpose() * e;
+    const JointVector q = keep(now.q + normal.ldlt().solve(gradient));
+    FlangeMotion next = flange_motion(chain, q);
+    const Vector6 e_new = pose_difference(X_BF, next.X_BF);
     if (e_new.norm() < now.error) {
       const bool stalled = (q - now.q).norm() < 1e-14;
       now.q = q;
+      motion = next;
       e = e_new;
       now.error = e.norm();
       damping = std::max(damping * 0.1, 1e-14);
@@ -61,16 +70,25 @@ Descent descend(const Chain& chain, const Pose& X_BF, const JointVector& start, 
   return now;
 }
 
-double smallest_singular_value(const Chain& chain, const JointVector& q) {
-  const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXd>(chain.jacobian(q)).singularValues();
-  return values(values.size() - 1);
+/// Whether the smallest singular value of the Jacobian is below kSingularValue: then J Jᵀ (or Jᵀ J, the smaller one)
+/// less its square is not positive definite.
+bool is_singular(const Chain& chain, const JointVector& q) {
+  const auto J = flange_motion(chain, q).jacobian;
+  JointMatrix square;
+  if (J.rows() <= J.cols()) {
+    square = J * J.transpose();
+  } else {
+    square = J.transpose() * J;
+  }
+  square.diagonal().array() -= kSingularValue * kSingularValue;
+  return square.llt().info() != Eigen::Success;
 }
 
 InverseResult judged(const Chain& chain, const JointVector& q, int iterations) {
   InverseResult result{InverseStatus::kOk, q, iterations};
   if (chain.joint_outside_limits(q)) {
     result.status = InverseStatus::kJointLimit;
-  } else if (smallest_singular_value(chain, q) < kSingularValue) {
+  } else if (is_singular(chain, q)) {
     result.status = InverseStatus::kSingular;
   }
   return result;

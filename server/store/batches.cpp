@@ -1,9 +1,11 @@
 #include <utility>
 
 #include "server/base/hash.h"
+#include "server/store/audit_rows.h"
 #include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
+#include "server/store/pruned.h"
 #include "server/store/store.h"
 
 // Batches: their text as received, and which of them are in quarantine.
@@ -12,19 +14,24 @@ namespace trammel {
 namespace {
 
 constexpr const char* kRecordColumns =
-    "SELECT id, hash, request_id, accepted_at, poses, job, quarantine FROM batches WHERE cell = ? ";
+    "SELECT id, hash, request_id, accepted_at, poses, job, quarantine, EXISTS (SELECT 1 FROM pruned WHERE "
+    "pruned.kind = 'batch' AND pruned.cell = batches.cell AND pruned.id = batches.id), EXISTS (SELECT 1 FROM discarded "
+    "WHERE discarded.cell = batches.cell AND discarded.batch = batches.id) FROM batches WHERE cell = ? ";
 
 /// The batch in a row of kRecordColumns, without its text.
 StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
-  return {cell,
-          row.getColumn(0).getString(),
-          "",
-          row.getColumn(1).getString(),
-          row.getColumn(2).getString(),
-          row.getColumn(3).getInt64(),
-          row.getColumn(4).getInt(),
-          row.getColumn(5).getInt64(),
-          row.getColumn(6).getString()};
+  StoredBatch batch{cell,
+                    row.getColumn(0).getString(),
+                    "",
+                    row.getColumn(1).getString(),
+                    row.getColumn(2).getString(),
+                    row.getColumn(3).getInt64(),
+                    row.getColumn(4).getInt(),
+                    row.getColumn(5).getInt64(),
+                    row.getColumn(6).getString()};
+  batch.pruned = row.getColumn(7).getInt() != 0;
+  batch.discarded = row.getColumn(8).getInt() != 0;
+  return batch;
 }
 
 Result<StoredBatch> read_record(SQLite::Database& database, const std::string& cell, const std::string& id) {
@@ -36,16 +43,23 @@ Result<StoredBatch> read_record(SQLite::Database& database, const std::string& c
 
 }  // namespace
 
+Failure discarded_failure(const std::string& cell, const std::string& id) {
+  return failure(ErrorCode::kConflict, "batch {} of cell {} was discarded", id, cell)
+      .of("batch")
+      .with_text(id)
+      .next("submit it again under another id if it is good");
+}
+
 Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
   return connection_->in_transaction([&](SQLite::Database& database) -> Result<StoredJob> {
-    auto present =
-        prepare(database, "SELECT request_id, hash, job FROM batches WHERE cell = ? AND id = ?", batch.cell, batch.id);
+    auto present = prepare(database, "SELECT hash, job FROM batches WHERE cell = ? AND id = ?", batch.cell, batch.id);
     if (present.executeStep()) {
-      const bool same_content = present.getColumn(1).getString() == batch.hash;
-      const std::int64_t made = present.getColumn(2).getInt64();
-      if (same_content && present.getColumn(0).getString() == batch.request_id) return read_job(database, made);
-      return failure(ErrorCode::kConflict, "cell {} already has a batch {} with {} content (job {})", batch.cell,
-                     batch.id, same_content ? "the same" : "other", made)
+      const bool same_content = present.getColumn(0).getString() == batch.hash;
+      const std::int64_t made = present.getColumn(1).getInt64();
+      // A repeat, or a client that lost its receipt.
+      if (same_content) return read_job(database, made);
+      return failure(ErrorCode::kConflict, "cell {} already has a batch {} with other content (job {})", batch.cell,
+                     batch.id, made)
           .of("batch")
           .with_text(batch.id);
     }
@@ -55,6 +69,10 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
            "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
            batch.cell, batch.id, batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses, id);
     insert_job_batches(database, id, batch.cell, {batch.id});
+    record_audit(database,
+                 {batch.cell, "batch", "batch " + batch.id, "",
+                  fmt::format("{} poses, sha256 {}, job {}", batch.poses, batch.hash, id)},
+                 {batch.request_id, "", batch.who});
     return read_job(database, id);
   });
 }
@@ -62,11 +80,35 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
 Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
                              const ChangeId& change_id) {
   const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
-    return once(database, change_id, [&]() -> Result<ChangeOutcome> {
-      const int changes =
-          change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
-      if (changes == 1) return ChangeOutcome{};
-      return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
+      const auto batch = read_record(database, cell, id);
+      if (!batch) return tl::make_unexpected(batch.error());
+      if (batch->discarded) return discarded_failure(cell, id);
+      if (batch->quarantine == reason) return ChangeOutcome{};
+      change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
+      record_audit(database,
+                   {cell, reason.empty() ? "release" : "quarantine", "batch " + id,
+                    batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine,
+                    reason.empty() ? "free" : "in quarantine: " + reason},
+                   change_id);
+      return ChangeOutcome{};
+    });
+  });
+  return changed.map([](const ChangeOutcome&) {});
+}
+
+Status Store::discard(const std::string& cell, const std::string& id, const ChangeId& change_id) {
+  const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
+    return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
+      const auto batch = read_record(database, cell, id);
+      if (!batch) return tl::make_unexpected(batch.error());
+      if (batch->discarded) return ChangeOutcome{};
+      const std::string was = batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine;
+      const std::string now = "discarded" + (change_id.reason.empty() ? "" : ": " + change_id.reason);
+      change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", now, cell, id);
+      change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", cell, id);
+      record_audit(database, {cell, "discard", "batch " + id, was, now}, change_id);
+      return ChangeOutcome{};
     });
   });
   return changed.map([](const ChangeOutcome&) {});
@@ -76,6 +118,7 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
   auto batch = connection_->exclusively([&](SQLite::Database& database) -> Result<StoredBatch> {
     auto record = read_record(database, cell, id);
     if (!record) return record;
+    if (record->pruned) return pruned_failure(fmt::format("batch {} of cell {}", id, cell)).of("batch").with_text(id);
     auto row = prepare(database, "SELECT csv FROM batches WHERE cell = ? AND id = ?", cell, id);
     if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
     record->csv = row.getColumn(0).getString();

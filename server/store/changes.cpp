@@ -22,6 +22,18 @@ Result<std::optional<ChangeOutcome>> find_change(SQLite::Database& database, con
   return ChangeOutcome{row.getColumn(1).getInt(), row.getColumn(2).getInt64(), row.getColumn(3).getInt64()};
 }
 
+Status check_expected_version(SQLite::Database& database, const std::string& cell, const ChangeId& change_id) {
+  if (!change_id.expected_version) return {};
+  auto row = prepare(database, "SELECT version FROM activations WHERE cell = ? ORDER BY number DESC LIMIT 1", cell);
+  const int version = row.executeStep() ? row.getColumn(0).getInt() : 0;
+  const int expected = *change_id.expected_version;
+  if (version == expected) return {};
+  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version, expected)
+      .of("expected")
+      .beyond(expected, version)
+      .next("look again, and decide anew");
+}
+
 void record_change(SQLite::Database& database, const ChangeId& change_id, const ChangeOutcome& outcome) {
   change(database, "INSERT INTO changes (id, asked, version, job, made_at) VALUES (?, ?, ?, ?, ?)", change_id.id,
          change_id.asked, outcome.version, outcome.job, unix_now());

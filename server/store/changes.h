@@ -12,15 +12,23 @@ namespace trammel {
 /// Records what was made, in the transaction that is open.
 void record_change(SQLite::Database& database, const ChangeId& change_id, const ChangeOutcome& outcome);
 
+/// Refuses (kConflict) where another version of the cell is in force than the change expects.
+[[nodiscard]] Status check_expected_version(SQLite::Database& database, const std::string& cell,
+                                            const ChangeId& change_id);
+
 /// Runs `work`, which returns a Result<ChangeOutcome>, unless that was done before under this id; then what came of it.
 template <typename Work>
-[[nodiscard]] Result<ChangeOutcome> once(SQLite::Database& database, const ChangeId& change_id, const Work& work) {
-  if (change_id.id.empty()) return work();
-  auto made = find_change(database, change_id);
-  if (!made) return tl::make_unexpected(made.error());
-  if (*made) return **made;
+[[nodiscard]] Result<ChangeOutcome> once(SQLite::Database& database, const std::string& cell, const ChangeId& change_id,
+                                         const Work& work) {
+  if (!change_id.id.empty()) {
+    auto made = find_change(database, change_id);
+    if (!made) return tl::make_unexpected(made.error());
+    if (*made) return **made;
+  }
+  if (auto expected = check_expected_version(database, cell, change_id); !expected)
+    return tl::make_unexpected(expected.error());
   Result<ChangeOutcome> outcome = work();
-  if (outcome) record_change(database, change_id, *outcome);
+  if (outcome && !change_id.id.empty()) record_change(database, change_id, *outcome);
   return outcome;
 }
 

@@ -15,6 +15,8 @@ namespace trammel {
 [[nodiscard]] std::int64_t insert_job(SQLite::Database& database, const StoredJob& job);
 void insert_job_batches(SQLite::Database& database, std::int64_t job, const std::string& cell,
                         const std::vector<std::string>& batch_ids);
+/// kConflict.
+[[nodiscard]] Failure discarded_failure(const std::string& cell, const std::string& id);
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.

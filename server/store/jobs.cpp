@@ -3,9 +3,11 @@
 #include <utility>
 
 #include "server/base/unix_time.h"
+#include "server/store/audit_rows.h"
 #include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
+#include "server/store/pruned.h"
 #include "server/store/store.h"
 
 // Jobs and the findings of diagnoses.
@@ -68,6 +70,22 @@ JobOutcome outcome_of(SQLite::Statement& row) {
   return outcome;
 }
 
+std::string to_text(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return "train";
+    case JobKind::kDiagnose:
+      return "diagnose";
+    case JobKind::kCheck:
+      return "check";
+  }
+  return "train";
+}
+
+JobKind job_kind_of(const std::string& text) {
+  return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
+}
+
 StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   StoredJob job;
   job.id = row.getColumn(0).getInt64();
@@ -79,7 +97,7 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   job.created_at = row.getColumn(6).getInt64();
   job.model_version = row.getColumn(7).getInt();
   job.attempts = row.getColumn(8).getInt();
-  job.kind = row.getColumn(9).getString() == "diagnose" ? JobKind::kDiagnose : JobKind::kTrain;
+  job.kind = job_kind_of(row.getColumn(9).getString());
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
@@ -135,8 +153,7 @@ void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& 
 std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
   change(database,
          "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
-         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at,
-         job.kind == JobKind::kDiagnose ? "diagnose" : "train");
+         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, to_text(job.kind));
   return database.getLastInsertRowid();
 }
 
@@ -181,17 +198,36 @@ Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& j
     if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
       return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
     }
+    if (prepare(database, "SELECT 1 FROM discarded WHERE cell = ? AND batch = ?", job.cell, id).executeStep())
+      return discarded_failure(job.cell, id);
   }
   const std::int64_t id = insert_job(database, job);
   insert_job_batches(database, id, job.cell, job.batch_ids);
   return read_job(database, id);
 }
 
+/// The end of a job that made no model.
+void record_job_end(SQLite::Database& database, std::int64_t id, const std::string& verdict, const std::string& message,
+                    const ChangeId& by) {
+  auto row = prepare(database, "SELECT cell FROM jobs WHERE id = ?", id);
+  const std::string cell = row.executeStep() ? row.getColumn(0).getString() : "";
+  record_audit(database, {cell, "job", fmt::format("job {}", id), "open", verdict, message}, by);
+}
+
 /// Queues the job that `insert` makes, or returns the one that was queued under this id before.
 template <typename Insert>
-Result<StoredJob> queue_once(SQLite::Database& database, const ChangeId& change_id, const Insert& insert) {
-  const auto queued = once(database, change_id, [&] {
-    return insert().map([](const StoredJob& made) { return ChangeOutcome{0, made.id}; });
+Result<StoredJob> queue_once(SQLite::Database& database, const StoredJob& job, const ChangeId& change_id,
+                             const Insert& insert) {
+  const auto queued = once(database, job.cell, change_id, [&] {
+    return insert().map([&](const StoredJob& made) {
+      record_audit(database,
+                   {made.cell, made.kind == JobKind::kDiagnose ? "diagnosis asked" : "training asked",
+                    fmt::format("job {}", made.id), "",
+                    fmt::format("of {}{}{}", made.batch_ids.empty() ? "a batch sent with it" : "",
+                                fmt::join(made.batch_ids, ", "), made.level.empty() ? "" : ", level " + made.level)},
+                   change_id);
+      return ChangeOutcome{0, made.id};
+    });
   });
   if (!queued) return tl::make_unexpected(queued.error());
   return read_job(database, queued->job);
@@ -201,7 +237,7 @@ Result<StoredJob> queue_once(SQLite::Database& database, const ChangeId& change_
 
 Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+    return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
       Result<StoredJob> queued = insert_job_over(database, job);
       if (!queued || !release) return queued;
       for (const std::string& id : job.batch_ids)
@@ -220,10 +256,20 @@ Result<bool> Store::may_release(std::int64_t job) const {
   });
 }
 
+Result<bool> Store::was_made_by_job(const std::string& cell, int version) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM jobs WHERE cell = ? AND model_version = ?)");
+    query.bind(1, cell);
+    query.bind(2, version);
+    query.executeStep();
+    return query.getColumn(0).getInt() != 0;
+  });
+}
+
 Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
                                        const ChangeId& change_id) {
   return connection_->in_transaction([&](SQLite::Database& database) {
-    return queue_once(database, change_id, [&]() -> Result<StoredJob> {
+    return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
       Result<StoredJob> queued = insert_job_over(database, job);
       if (queued) {
         change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
@@ -239,6 +285,9 @@ Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
     auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
     if (!row.executeStep())
       return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
+    if (const auto asked = read_job(database, job);
+        asked && is_pruned(database, "answer of job", asked->cell, std::to_string(job)))
+      return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
     return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
                            row.getColumn(3).getString()};
   });
@@ -308,20 +357,27 @@ Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   });
 }
 
-Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
+Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome,
+                             const std::string& who) {
   return connection_->in_transaction([&](SQLite::Database& database) {
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = ? "
                               "WHERE id = ? AND state IN ('queued', 'running')",
                               message, id),
                        id)
-        .map([&] { record_end(database, id, outcome); });
+        .map([&] {
+          record_end(database, id, outcome);
+          record_job_end(database, id, to_text(outcome.verdict), message, {"", "", who});
+        });
   });
 }
 
 Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
-  return connection_->in_transaction(
-      [&](SQLite::Database& database) { return end_job(database, id, "", 0, message, outcome); });
+  return connection_->in_transaction([&](SQLite::Database& database) {
+    return end_job(database, id, "", 0, message, outcome).map([&] {
+      record_job_end(database, id, to_text(outcome.verdict), message, {});
+    });
+  });
 }
 
 }  // namespace trammel

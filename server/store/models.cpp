@@ -4,9 +4,11 @@
 #include "server/base/text_file.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/store/audit_rows.h"
 #include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
+#include "server/store/pruned.h"
 #include "server/store/store.h"
 
 // Models, and the history of which was in force.
@@ -67,18 +69,35 @@ void insert_activation(SQLite::Database& database, const std::string& cell, int 
 }
 
 /// Releases from quarantine the batches that the job of this version may release.
-void release_batches_of(SQLite::Database& database, const std::string& cell, int version) {
-  change(database,
-         "UPDATE batches SET quarantine = '' WHERE cell = ? AND id IN (SELECT batch FROM job_releases JOIN jobs "
-         "ON jobs.id = job_releases.job WHERE jobs.cell = ? AND jobs.model_version = ?)",
-         cell, cell, version);
+void release_batches_of(SQLite::Database& database, const std::string& cell, int version, const ChangeId& by) {
+  auto rows = prepare(database,
+                      "SELECT id, quarantine FROM batches WHERE cell = ?1 AND quarantine <> '' AND id IN "
+                      "(SELECT batch FROM job_releases JOIN jobs ON jobs.id = job_releases.job "
+                      "WHERE jobs.cell = ?1 AND jobs.model_version = ?2) "
+                      "AND id NOT IN (SELECT batch FROM discarded WHERE cell = ?1)",
+                      cell, version);
+  std::vector<std::pair<std::string, std::string>> kept_out;
+  while (rows.executeStep()) kept_out.emplace_back(rows.getColumn(0).getString(), rows.getColumn(1).getString());
+  for (const auto& [id, why] : kept_out) {
+    change(database, "UPDATE batches SET quarantine = '' WHERE cell = ? AND id = ?", cell, id);
+    record_audit(database,
+                 {cell, "release", "batch " + id, "in quarantine: " + why, "free",
+                  fmt::format("version {} was made from it", version)},
+                 by);
+  }
 }
 
-/// Puts `version` in force. The new activation remembers the present one.
-void activate_on_top(SQLite::Database& database, const std::string& cell, int version) {
+std::string spoken(const std::optional<Activation>& activation) {
+  return activation ? fmt::format("version {}", activation->version) : "none";
+}
+
+/// Puts `version` in force. The new activation remembers the present one. `what`: as the audit trail calls it.
+void activate_on_top(SQLite::Database& database, const std::string& cell, int version, const char* what,
+                     const std::string& why, const ChangeId& by) {
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
+  record_audit(database, {cell, what, "in force", spoken(present), fmt::format("version {}", version), why}, by);
 }
 
 void insert_model_times(SQLite::Database& database, const std::string& cell, int version,
@@ -129,16 +148,21 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
   const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     const int version = next_version(database, cell);
     insert_model(database, cell, version, model, content);
+    record_audit(
+        database,
+        {cell, job == 0 ? "import" : "model", fmt::format("version {}", version), "",
+         fmt::format("sha256 {}{}", model.provenance().hash, job == 0 ? "" : fmt::format(", of job {}", job)), message},
+        change_id);
     if (job != 0) {
       if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
-    if (put_in_force || release) release_batches_of(database, cell, version);
-    if (put_in_force) activate_on_top(database, cell, version);
+    if (put_in_force || release) release_batches_of(database, cell, version, change_id);
+    if (put_in_force) activate_on_top(database, cell, version, "put in force", message, change_id);
     return ChangeOutcome{version};
   };
   const auto stored = connection_->in_transaction(
-      [&](SQLite::Database& database) { return once(database, change_id, [&] { return insert(database); }); });
+      [&](SQLite::Database& database) { return once(database, cell, change_id, [&] { return insert(database); }); });
   if (stored && put_in_force) copy_after_change(cell);
   return version_of(stored);
 }
@@ -150,12 +174,15 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
           .of("version")
           .with_value(version);
     }
-    release_batches_of(database, cell, version);
-    activate_on_top(database, cell, version);
+    if (is_pruned(database, "version", cell, std::to_string(version)))
+      return pruned_failure(fmt::format("version {} of cell {}", version, cell)).of("version").with_value(version);
+    release_batches_of(database, cell, version, change_id);
+    activate_on_top(database, cell, version, "activate", "", change_id);
     return ChangeOutcome{version};
   };
-  const auto activated = connection_->in_transaction(
-      [&](SQLite::Database& database) { return once(database, change_id, [&] { return activate_in(database); }); });
+  const auto activated = connection_->in_transaction([&](SQLite::Database& database) {
+    return once(database, cell, change_id, [&] { return activate_in(database); });
+  });
   if (activated) copy_after_change(cell);
   return activated.map([](const ChangeOutcome&) {});
 }
@@ -180,11 +207,14 @@ Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& 
           .beyond(steps, steps < 1 ? 1 : before->size());
     }
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
+    const auto present = present_activation(database, cell);
     insert_activation(database, cell, wanted.version, wanted.back);
+    record_audit(database, {cell, "rollback", "in force", spoken(present), fmt::format("version {}", wanted.version)},
+                 change_id);
     return ChangeOutcome{wanted.version};
   };
   const auto restored = connection_->in_transaction(
-      [&](SQLite::Database& database) { return once(database, change_id, [&] { return go_back(database); }); });
+      [&](SQLite::Database& database) { return once(database, cell, change_id, [&] { return go_back(database); }); });
   if (restored) copy_after_change(cell);
   return version_of(restored);
 }
@@ -225,6 +255,8 @@ Result<std::string> Store::model_text(const std::string& cell, int version) cons
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
           .of("version")
           .with_value(version);
+    if (is_pruned(database, "version", cell, std::to_string(version)))
+      return pruned_failure(fmt::format("version {} of cell {}", version, cell)).of("version").with_value(version);
     return row.getColumn(0).getString();
   });
 }
@@ -327,6 +359,8 @@ Status Store::take_back_from_copy(const std::string& cell) {
     const auto present = present_activation(database, cell);
     insert_activation(database, cell, newest.version, present ? std::optional(present->number) : std::nullopt,
                       newest.activation);
+    record_audit(database, {cell, "take back", "in force", spoken(present), fmt::format("version {}", newest.version),
+                            "from its copy: the store had lost it"});
     return {};
   });
   if (taken)

@@ -36,17 +36,18 @@ Attempt attempt(const std::string& path, const Open& open) {
   }
 }
 
-bool is_empty(const std::string& path) {
+/// A file that is gone, empty or no file at all is damaged where models were served from it, and else a new beginning.
+Status check_there(const std::string& path, const ServedCopies& copies) {
   std::error_code error;
-  return fs::exists(path, error) && fs::file_size(path, error) == 0;
-}
-
-/// A file that is empty where models were served from it is damaged; one that is not there is a new beginning.
-Status check_not_emptied(const std::string& path, const ServedCopies& copies) {
-  if (!is_empty(path) || copies.stores().empty()) return {};
-  return failure(ErrorCode::kInternal, "empty, but models were served from it: their copies are in {}", copies.root())
+  const bool exists = fs::exists(path, error);
+  if (exists && !fs::is_regular_file(path, error)) return refused("no store: not a file").in(path);
+  const bool empty = exists && fs::file_size(path, error) == 0;
+  if ((exists && !empty) || copies.stores().empty()) return {};
+  return failure(ErrorCode::kInternal, "{}, but models were served from it: their copies are in {}",
+                 exists ? "empty" : "not there", copies.root())
       .in(path)
-      .next("put the store back from a backup, or move both away to begin anew");
+      .next(exists ? "put the store back from a backup, or move both away to begin anew"
+                   : "put the store back, or move the copies away to begin anew");
 }
 
 /// Gives the copies the store's id. Refuses a store that is not the one whose models were served here.
@@ -67,7 +68,7 @@ Status check_identity(SQLite::Database& database, const std::string& path, Serve
 
 Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
   return attempt(path, [&](std::unique_ptr<SQLite::Database>& file) -> Status {
-    if (auto fine = check_not_emptied(path, copies); !fine) return fine;
+    if (auto fine = check_there(path, copies); !fine) return fine;
     file = std::make_unique<SQLite::Database>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
     if (auto ready = prepare_file(*file, path); !ready) return ready;
     return check_identity(*file, path, copies);
@@ -120,6 +121,30 @@ Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copi
   if (stores.empty() || is_newer) return tl::make_unexpected(*writing.why_not);
   static_cast<void>(copies.belong_to(stores.front(), false));
   return OpenedDatabase{nullptr, std::move(writing.why_not)};
+}
+
+Status check_state(const std::string& path, const std::optional<StoreMark>& mark) {
+  const auto wrong = [&path](const std::string& what) {
+    return failure(ErrorCode::kBusy, "{}", what)
+        .in(path)
+        .next("put back the file that was there, or start the service again to go on with what is there now");
+  };
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return wrong("was replaced by what is no file");
+  const Attempt look = attempt(path, [&](std::unique_ptr<SQLite::Database>& file) -> Status {
+    file = std::make_unique<SQLite::Database>(immutable(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    if (auto ours = check_readable(*file, path); !ours) return ours;
+    const auto is = mark_of(*file);
+    if (!mark) return {};
+    if (!is) return wrong("was replaced or written over by another program, and cannot be read");
+    if (is->identity != mark->identity) return wrong("was replaced by another store while it is served from");
+    if (is->counts != mark->counts)
+      return wrong("was replaced or written over by another state of it, without what was acknowledged since");
+    return {};
+  });
+  if (look.file) return {};
+  if (look.why_not->code == ErrorCode::kBusy && !look.of_the_disk) return tl::make_unexpected(*look.why_not);
+  return wrong("was replaced or written over by another program: " + look.why_not->message);
 }
 
 bool is_of_the_disk(const SQLite::Exception& error) {

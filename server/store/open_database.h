@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/base/result.h"
+#include "server/store/schema.h"
 #include "server/store/served_copies.h"
 
 namespace trammel {
@@ -22,6 +23,10 @@ struct OpenedDatabase {
 /// Opens the file for writing; where the disk does not let it, for reading; where that fails too and there are copies
 /// of the models that it had in force, not at all. Refuses what Store::open() refuses.
 [[nodiscard]] Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copies);
+
+/// Whether the file, which this process does not have open, is a store in the state of `mark` (empty: in any state).
+/// Looks at the file alone, not at a journal beside it, and leaves both as they are.
+[[nodiscard]] Status check_state(const std::string& path, const std::optional<StoreMark>& mark);
 
 /// Whether the error says that the disk does not let it be written now: full, read-only, broken.
 [[nodiscard]] bool is_of_the_disk(const SQLite::Exception& error);

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/store/audit_rows.h"
 #include "server/store/file_header.h"
 #include "server/store/statements.h"
 
@@ -89,7 +90,7 @@ CREATE TABLE diagnoses (
 /// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
 /// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
 /// released if its model is put in force. And the changes that clients asked for under an id, with what came of them;
-/// and the store's identity.
+/// what of the rest has lost its text; which batches nothing takes any more; and the store's identity.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -131,6 +132,18 @@ CREATE TABLE IF NOT EXISTS changes (
   job     INTEGER NOT NULL,
   made_at INTEGER NOT NULL
 );
+CREATE TABLE IF NOT EXISTS pruned (
+  kind TEXT NOT NULL,
+  cell TEXT NOT NULL,
+  id   TEXT NOT NULL,
+  PRIMARY KEY (kind, cell, id)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS discarded (
+  cell  TEXT NOT NULL,
+  batch TEXT NOT NULL,
+  PRIMARY KEY (cell, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
+) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS store_identity (id TEXT NOT NULL);
 )sql";
 
@@ -194,13 +207,14 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
   }
   database.exec(kTimes);
   fill_in_times(database);
+  prepare_audit(database, schema == 0, schema);
   transaction.commit();
   return {};
 }
 
 Status check_readable(SQLite::Database& database, const std::string& path) {
   if (auto owner = check_owner(database, path); !owner) return owner;
-  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion && database.tableExists("changes"))
+  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion && database.tableExists("audit_end"))
     return {};
   return refused("of an older schema, and cannot be written").in(path);
 }
@@ -215,6 +229,19 @@ Result<std::string> identity_of(SQLite::Database& database, const std::string& o
                              : database.execAndGet("SELECT lower(hex(randomblob(16)))").getString();
   change(database, "INSERT INTO store_identity (id) VALUES (?)", id);
   return id;
+}
+
+std::optional<StoreMark> mark_of(SQLite::Database& database) {
+  constexpr const char* kCounts =
+      "SELECT (SELECT COALESCE(GROUP_CONCAT(name || ' ' || seq), '') FROM "
+      "(SELECT name, seq FROM sqlite_sequence ORDER BY name)) || ', models ' || (SELECT COUNT(*) FROM models) || "
+      "', unfinished ' || (SELECT COUNT(*) FROM jobs WHERE state IN ('queued', 'running'))";
+  try {
+    return StoreMark{database.execAndGet("SELECT id FROM store_identity WHERE id != ''").getString(),
+                     database.execAndGet(kCounts).getString()};
+  } catch (const SQLite::Exception&) {
+    return std::nullopt;
+  }
 }
 
 bool has_models(SQLite::Database& database) {

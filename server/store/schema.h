@@ -2,6 +2,7 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include <optional>
 #include <string>
 
 #include "server/base/result.h"
@@ -17,6 +18,13 @@ inline constexpr const char* kSchemaField = "schema";  // what the error of a ne
 [[nodiscard]] Status check_readable(SQLite::Database& database, const std::string& path);
 /// What tells this store from any other one. A store of before it was recorded gets `otherwise`, or a new one.
 [[nodiscard]] Result<std::string> identity_of(SQLite::Database& database, const std::string& otherwise);
+/// Tells a state of a store from what it was before and from other stores.
+struct StoreMark {
+  std::string identity;
+  std::string counts;  ///< of all that was ever added, and of jobs that are not finished
+};
+/// Empty: it cannot be read.
+[[nodiscard]] std::optional<StoreMark> mark_of(SQLite::Database& database);
 /// Whether any model was ever stored.
 [[nodiscard]] bool has_models(SQLite::Database& database);
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/store/connection.h"
+#include "server/store/store_file.h"
 
 namespace trammel {
 
@@ -15,16 +16,19 @@ Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
   auto lock = WriterLock::take(path);
   if (!lock) return tl::make_unexpected(lock.error());
   auto copies = std::make_unique<ServedCopies>(path);
+  StoreFile file(path);
+  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());
   auto opened = open_database(path, *copies);
   if (!opened) return tl::make_unexpected(opened.error());
-  return std::unique_ptr<Store>(
-      new Store(std::make_unique<StoreConnection>(path, std::move(*lock), std::move(*opened), std::move(copies))));
+  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());  // where it was not there before
+  return std::unique_ptr<Store>(new Store(std::make_unique<StoreConnection>(std::move(*lock), std::move(file), path,
+                                                                            std::move(*opened), std::move(copies))));
 }
 
 StoreState Store::state() const { return connection_->state(); }
 
 Status Store::try_again() {
-  if (!connection_->state().why_not_written) return {};
+  if (connection_->is_in_order()) return {};
   return connection_->in_transaction([](SQLite::Database& database) -> Status {
     // Of an update that changes nothing SQLite writes nothing.
     change(database, "INSERT INTO store_identity (id) VALUES ('')");

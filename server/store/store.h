@@ -10,6 +10,8 @@
 
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
+#include "server/store/audit.h"
+#include "server/store/change_id.h"
 #include "server/store/job_outcome.h"
 #include "server/store/store_state.h"
 
@@ -28,11 +30,14 @@ struct StoredBatch {
   int poses = 0;
   std::int64_t job = 0;         ///< the job that was queued with it
   std::string quarantine = {};  ///< the reason for its quarantine; empty: not in quarantine
+  std::string who = {};         ///< of a new one: who sent it, for the audit trail
+  bool pruned = false;          ///< its text is gone
+  bool discarded = false;       ///< it stays in quarantine for ever
 };
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
 
-enum class JobKind { kTrain, kDiagnose };
+enum class JobKind { kTrain, kDiagnose, kCheck };
 
 /// A training or a diagnosis, finished or not.
 struct StoredJob {
@@ -72,17 +77,12 @@ struct StoredModel {
   std::optional<std::int64_t> measured_at = {};  ///< see ModelProvenance
 };
 
-/// A change that happens once, however often it is asked for: also when the answer to it was lost in a crash.
-struct ChangeId {
-  std::string id;     ///< unique for ever: the client and the number of its request; empty: nothing is remembered
-  std::string asked;  ///< what is asked for, in any words; the same id for anything else is a conflict
-};
-
-/// What such a change came to.
-struct ChangeOutcome {
-  int version = 0;           ///< of the model that was put in force or stored; 0: of none
-  std::int64_t job = 0;      ///< that was queued; 0: none
-  std::int64_t made_at = 0;  ///< Unix time, s
+/// How much of each cell is kept; 0: everything. What goes is the oldest of what nothing needs: never the version in
+/// force, one that a rollback returns to, what these were trained on, or what a job takes that is not over.
+struct KeepRule {
+  int models = 0;   ///< versions besides those
+  int batches = 0;  ///< likewise
+  int answers = 0;  ///< findings of diagnoses that are over
 };
 
 struct StoreConnection;
@@ -96,51 +96,66 @@ struct StoreConnection;
 /// taken where the store does not give them.
 class Store {
  public:
-  /// Creates the file if there is none. Refuses (kConflict) a second writer on the same file. A file on a disk that
-  /// cannot be written is read, and written as soon as that is possible: state(). Of a file that is damaged, emptied or
-  /// of another store the copies are there, and nothing is written to it; without copies it is refused (kInternal), as
-  /// is a file of another program or of a newer schema (kRefused). The file `<file>.lock` beside it holds the writer's
-  /// process id.
+  /// Creates the file if there is none, and no copies of models that were served from it. Refuses (kConflict) a second
+  /// writer on the same file, by whatever name. A file on a disk that cannot be written is read, and written as soon as
+  /// that is possible: state(). Of a file that is damaged, emptied, gone or of another store the copies are there, and
+  /// nothing is written to it; without copies it is refused (kInternal), as is a file of another program or of a newer
+  /// schema (kRefused). The file `<file>.lock` beside it holds the writer's process id.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
   ~Store();
 
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
-  /// Where it could not be written: whether it can now. Opens the file again where needed, once a second at most.
+  /// Where it could not be written, or is not as it was left: whether it can be written now. Opens the file again where
+  /// needed, once a second at most.
   [[nodiscard]] Status try_again();
   /// False: `stop` was requested first.
   [[nodiscard]] bool wait_until_writable(const std::stop_token& stop);
 
-  /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. A
-  /// repeat of the request with the same content returns the job that the first one made. Refuses (kConflict) a batch
-  /// id that the cell already has in any other case.
+  /// The trail of all changes, verified as a whole. Every function that changes something else than the state of a
+  /// running job writes it in its own transaction.
+  [[nodiscard]] Result<AuditTrail> audit(const AuditQuery& query = {}) const;
+
+  /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. The
+  /// same content under the same id again, from whomever, returns the job that the first one made. Refuses (kConflict)
+  /// an id that the cell has with other content.
   [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
   /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for something else. The
   /// functions that take a ChangeId record it in the transaction of the change itself; where it is recorded already
   /// they change nothing and return what was made then. The last 100,000 are kept.
   [[nodiscard]] Result<std::optional<ChangeOutcome>> outcome_of(const ChangeId& change_id) const;
-  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones. With `release` it may also
-  /// train from batches in quarantine. They leave quarantine in the transaction that puts its model in force.
+  /// Queues a job over batches that are already there. Refuses (kNotFound) unknown ones, (kConflict) discarded ones.
+  /// With `release` it may also train from batches in quarantine. They leave quarantine in the transaction that puts
+  /// its model in force.
   [[nodiscard]] Result<StoredJob> add_job(const StoredJob& job, bool release = false, const ChangeId& change_id = {});
+  /// Whether a job made that version here; false: it was imported.
+  [[nodiscard]] Result<bool> was_made_by_job(const std::string& cell, int version) const;
   /// Whether the job was added with `release`.
   [[nodiscard]] Result<bool> may_release(std::int64_t job) const;
   /// Queues a diagnosis of the one batch that `job` names, or of the one in `diagnosis`. Refuses as add_job().
   [[nodiscard]] Result<StoredJob> add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
                                                 const ChangeId& change_id = {});
-  /// kNotFound: there is no such job, or it is no diagnosis.
+  /// kNotFound: there is no such job, it is no diagnosis, or its findings were pruned.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Stores the findings of an unfinished diagnosis. The job goes on.
   [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings, const std::string& page);
+  /// kNotFound also where its text was pruned.
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
   /// The same without its text: cheap.
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
-  /// Puts the batch in quarantine for `reason`, or releases it (empty).
+  /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
                                       const ChangeId& change_id = {});
+  /// Nothing takes the batch any more: it is in quarantine for ever. Its text stays until it is pruned.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& id, const ChangeId& change_id = {});
   /// Newest last, without their text.
   [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
+
+  /// Takes the text of one model, batch or answer that `rule` lets go of; its record stays. False: there is none. Call
+  /// it until then: others use the store in between.
+  [[nodiscard]] Result<bool> prune_one(const std::string& cell, const KeepRule& rule);
 
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
   /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
@@ -153,7 +168,8 @@ class Store {
   /// queued takes the attempt back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
-  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
+  [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {},
+                                      const std::string& who = {});
   /// For a job that makes no model.
   [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
 
@@ -177,7 +193,7 @@ class Store {
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   /// From the store or, where that does not give it, from its copy.
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
-  /// The same as it is stored, not checked.
+  /// The same as it is stored, not checked. kNotFound also where it was pruned.
   [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;

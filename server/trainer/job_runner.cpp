@@ -7,6 +7,7 @@
 
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/job_sources.h"
 #include "server/trainer/pipeline/given_up.h"
 
@@ -97,7 +98,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   if (!running) return failed(running.error());
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
-  if (job->kind == JobKind::kDiagnose) {
+  if (job->kind != JobKind::kTrain) {
     auto stored = store_.diagnosis(id);
     if (!stored) return failed(stored.error());
     asked = std::move(*stored);
@@ -109,9 +110,10 @@ JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<
                                       const StopRequests& stop) {
   auto task = task_of(job, asked);
   if (!task) return tl::make_unexpected(Failed{task.error(), verdict_of(task.error())});
+  const std::vector<std::string> earlier = task->earlier_ids;
   const auto computing = start_computing(options_.compute, std::move(*task), stop);
   if (!computing) return tl::make_unexpected(Failed{computing.error(), JobVerdict::kBroken, true});
-  if (const Status given = give_batches(**computing, job, asked); !given)
+  if (const Status given = give_batches(**computing, job, asked, earlier); !given)
     return tl::make_unexpected(failed_by(**computing, given.error()));
   ComputeWatch watch;
   watch.progress = reporter(job, stop);
@@ -136,13 +138,45 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   const auto came = came_with_batch(job);
   if (!came) return tl::make_unexpected(came.error());
   task.hold_against_in_force = *came;
+  const auto alone = learns_alone(job, *came);
+  if (!alone) return tl::make_unexpected(alone.error());
+  if (!*alone) {
+    auto earlier = earlier_sessions(store_, job, task.cell->sessions, options_.max_poses);
+    if (!earlier) return tl::make_unexpected(earlier.error());
+    task.earlier_ids = std::move(*earlier);
+  }
   if (const auto present = registry_.in_force(job.cell))
     task.in_force = ModelText{present->version, serialize(present->model)};
+  task.fleet = fleet_prior_of(job);
   task.seed = options_.seed;
   task.validation_share = options_.validation_share;
   task.accept_ratio = options_.accept_ratio;
   task.now = unix_now();
   return task;
+}
+
+Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch) const {
+  if (job.kind != JobKind::kTrain) return true;
+  if (came_with_batch) return false;
+  // Somebody asked: for what he released, with all that the cell knows; else for the batches that he named.
+  const auto releases = store_.may_release(job.id);
+  if (!releases) return releases;
+  return !*releases;
+}
+
+/// From the models in force of other cells with robots of its type; empty where the cell does not want it, or where
+/// they are too few.
+std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
+  const Cell& cell = *cells_.at(job.cell);
+  const auto rules = rules_of(cell);
+  if (job.kind != JobKind::kTrain || !rules || !rules->fleet_prior) return std::nullopt;
+  std::vector<FleetMember> twins;
+  for (const auto& [name, other] : cells_) {
+    if (name == job.cell || !same_type(other->robot, cell.robot)) continue;
+    if (const auto served = registry_.in_force(name)) twins.push_back({name, served->model});
+  }
+  auto prior = learn_fleet_prior(cell.robot, twins);
+  return prior ? std::optional(std::move(*prior)) : std::nullopt;
 }
 
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
@@ -152,9 +186,9 @@ Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
   });
 }
 
-Status JobRunner::give_batches(Computing& computing, const StoredJob& job,
-                               const std::optional<StoredDiagnosis>& asked) const {
-  const auto sources = batch_sources(store_, job, !asked || asked->apply);
+Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
+                               const std::vector<std::string>& earlier) const {
+  const auto sources = batch_sources(store_, job, !asked || asked->apply, earlier);
   if (!sources) return tl::make_unexpected(sources.error());
   for (const BatchSource& source : *sources) {
     const auto stored = store_.batch(job.cell, source.id);

@@ -8,6 +8,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostSessions = 50;  // newest batches that judge
+constexpr std::int64_t kSecondsPerDay = 86400;
 
 Status check_own(const Store& store, const StoredJob& job, const std::set<std::string>& own,
                  const std::vector<StoredBatch>& stored) {
@@ -31,7 +32,36 @@ Status check_released(const StoredBatch& batch) {
       .next("release it if it is good");
 }
 
-Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job, bool judged) {
+Result<std::vector<std::string>> earlier_sessions(const Store& store, const StoredJob& job, const SessionRule& rule,
+                                                  int max_poses) {
+  const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
+  const auto stored = store.batches(job.cell);
+  if (!stored) return tl::make_unexpected(stored.error());
+  const auto learned = store.batches_learned_from(job.cell);
+  if (!learned) return tl::make_unexpected(learned.error());
+  std::int64_t newest = 0, poses = 0;
+  for (const StoredBatch& batch : *stored) {
+    if (!own.contains(batch.id)) continue;
+    newest = std::max(newest, batch.accepted_at);
+    poses += batch.poses;
+  }
+  std::vector<std::string> earlier;
+  for (auto batch = stored->rbegin(); batch != stored->rend(); ++batch) {
+    if (own.contains(batch->id) || !batch->quarantine.empty() || !learned->contains(batch->id)) continue;
+    const bool too_many =
+        rule.kind == SessionRule::Kind::kLast && earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
+    const bool too_old =
+        rule.kind == SessionRule::Kind::kDays && batch->accepted_at < newest - kSecondsPerDay * rule.count;
+    if (too_many || too_old || poses + batch->poses > max_poses) break;
+    poses += batch->poses;
+    earlier.push_back(batch->id);
+  }
+  std::reverse(earlier.begin(), earlier.end());
+  return earlier;
+}
+
+Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job, bool judged,
+                                               const std::vector<std::string>& earlier) {
   const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
   const auto stored = store.batches(job.cell);
   if (!stored) return tl::make_unexpected(stored.error());
@@ -41,16 +71,19 @@ Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJ
     const auto may_judge = store.batches_learned_from(job.cell);
     if (!may_judge) return tl::make_unexpected(may_judge.error());
     for (auto batch = stored->rbegin(); batch != stored->rend() && judging.size() < kMostSessions; ++batch) {
+      if (batch->pruned) continue;
       if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge->contains(batch->id))) continue;
       judging.push_back({batch->id, true});
     }
     std::reverse(judging.begin(), judging.end());
   }
   std::vector<BatchSource> sources;
-  for (const std::string& id : job.batch_ids) {
-    const bool judges =
-        std::any_of(judging.begin(), judging.end(), [&](const BatchSource& one) { return one.id == id; });
-    if (!judges) sources.push_back({id, false});
+  for (const std::vector<std::string>* some : {&job.batch_ids, &earlier}) {
+    for (const std::string& id : *some) {
+      const bool judges =
+          std::any_of(judging.begin(), judging.end(), [&](const BatchSource& one) { return one.id == id; });
+      if (!judges) sources.push_back({id, false});
+    }
   }
   sources.insert(sources.end(), judging.begin(), judging.end());
   return sources;

@@ -17,6 +17,7 @@
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
 #include "server/trainer/acceptance/judging.h"
+#include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/compute/job_batches.h"
 #include "server/trainer/job_sources.h"
 
@@ -132,6 +133,7 @@ Result<std::vector<std::string>> Trainer::start() {
     while (const auto taken = queue_.take(stop)) {
       const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
+      if (end == JobRunner::End::kOver) prune(taken->job.cell, stop);
       queue_.put_down();
       // Asked for while its attempt ended: it waits again, and nobody told it.
       if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested()) static_cast<void>(cancel(taken->job.id));
@@ -143,6 +145,12 @@ Result<std::vector<std::string>> Trainer::start() {
     registry_.free_models(stop);
   });
   return notices;
+}
+
+void Trainer::prune(const std::string& cell, const std::stop_token& stop) {
+  // What the store refuses now is pruned after the next job.
+  while (!stop.stop_requested() && store_.prune_one(cell, options_.keep).value_or(false)) {
+  }
 }
 
 void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop) {
@@ -206,7 +214,7 @@ void Trainer::stop() {
 }
 
 Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
-                                     const std::string& request_id) {
+                                     const std::string& request_id, const std::string& who) {
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
@@ -223,7 +231,8 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
         .of("poses")
         .beyond(poses, options_.max_poses);
   }
-  const StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
+  StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
+  stored.who = who;
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
@@ -235,14 +244,32 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
                                        const std::string& csv, bool apply, const ChangeId& id) {
-  const auto cell = find_cell(cells_, cell_name);
-  if (!cell) return tl::make_unexpected(cell.error());
-  if (!batch_id.empty() && !csv.empty()) {
-    return failure(ErrorCode::kUsage, "a diagnosis is of a stored batch or of one that is sent, not of both");
-  }
   StoredJob job;
   job.kind = JobKind::kDiagnose;
   job.cell = cell_name;
+  return look_at(std::move(job), batch_id, csv, apply, id);
+}
+
+Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
+                                    std::optional<double> tolerance_mm, const ChangeId& id) {
+  if (find_cell(cells_, cell_name) && !registry_.in_force(cell_name))
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force to hold a check against", cell_name).of("cell");
+  StoredJob job;
+  job.kind = JobKind::kCheck;
+  job.cell = cell_name;
+  if (tolerance_mm) job.level = fmt::format("{}", *tolerance_mm);
+  return look_at(std::move(job), batch_id, csv, false, id);
+}
+
+Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id, const std::string& csv, bool apply,
+                                      const ChangeId& id) {
+  const std::string& cell_name = job.cell;
+  const auto cell = find_cell(cells_, cell_name);
+  if (!cell) return tl::make_unexpected(cell.error());
+  if (!batch_id.empty() && !csv.empty()) {
+    return failure(ErrorCode::kUsage, "a {} is of a stored batch or of one that is sent, not of both",
+                   job.kind == JobKind::kCheck ? "check" : "diagnosis");
+  }
   job.created_at = unix_now();
   if (csv.empty()) {
     const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
@@ -304,6 +331,11 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   job.level = level;
   job.bias = bias;
   job.created_at = unix_now();
+  if (batch_ids.empty()) {
+    auto earlier = earlier_sessions(store_, job, (*cell)->sessions, options_.max_poses);
+    if (!earlier) return tl::make_unexpected(earlier.error());
+    job.batch_ids.insert(job.batch_ids.begin(), earlier->begin(), earlier->end());
+  }
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
@@ -325,6 +357,7 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
   std::int64_t poses = 0;
   for (const StoredBatch& batch : stored) {
     if (!wanted.contains(batch.id)) continue;
+    if (batch.pruned) return refused("batch {} was pruned", batch.id).of("batch").with_text(batch.id);
     if (const Status free = check_released(batch); !free && !release) return free;
     poses += batch.poses;
   }
@@ -334,7 +367,7 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
       .beyond(poses, options_.max_poses);
 }
 
-Status Trainer::cancel(std::int64_t id) {
+Status Trainer::cancel(std::int64_t id, const std::string& who) {
   const auto job = store_.job(id);
   if (!job) return tl::make_unexpected(job.error());
   const auto asked_for = was_asked_for(*job);
@@ -350,7 +383,7 @@ Status Trainer::cancel(std::int64_t id) {
       break;
   }
   const JobOutcome outcome = cancelled_outcome();
-  if (auto ended = store_.set_job_failed(id, outcome.why, outcome); !ended) {
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome, who); !ended) {
     queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
     return ended;
   }
@@ -362,9 +395,57 @@ Status Trainer::cancel(std::int64_t id) {
   return {};
 }
 
+Status Trainer::activate(const std::string& cell, int version, const ChangeRequest& request, bool force) {
+  const bool as_expected = !request.expected || *request.expected == registry_.version_in_force(cell);
+  if (!force && as_expected) {
+    const auto made = store_.outcome_of(request.id);
+    if (!made) return tl::make_unexpected(made.error());
+    const Status wanted = *made ? Status() : check_not_worse(cell, version);
+    if (!wanted) return wanted;
+  }
+  return history_.activate(cell, version, request);
+}
+
+Status Trainer::check_not_worse(const std::string& cell_name, int version) const {
+  const auto cell = find_cell(cells_, cell_name);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const auto present = registry_.in_force(cell_name);
+  const auto judged_here = store_.was_made_by_job(cell_name, version);
+  if (!judged_here) return tl::make_unexpected(judged_here.error());
+  if (*judged_here || !present || present->version == version) return {};
+  const auto imported = registry_.version(cell_name, version);
+  if (!imported) return tl::make_unexpected(imported.error());
+  StoredJob nothing;
+  nothing.cell = cell_name;
+  const auto sources = batch_sources(store_, nothing, true);
+  if (!sources) return tl::make_unexpected(sources.error());
+  JobBatches batches(**cell, held_out_by_service(options_.validation_share, options_.seed), {});
+  for (const BatchSource& source : *sources) {
+    const auto stored = store_.batch(cell_name, source.id);
+    if (!stored) return tl::make_unexpected(stored.error());
+    batches.add({source.id, stored->csv, stored->accepted_at}, true);
+  }
+  const GateVerdict verdict = verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
+                                         {Bar::kBetter, options_.accept_ratio});
+  const GateFigures& figures = verdict.figures;
+  const bool unjudged = !figures.before || !figures.after;  // a person decides, and has
+  const bool as_good = unjudged || *figures.after <= options_.accept_ratio * *figures.before;
+  if (verdict.put_in_force || verdict.undecided || as_good) return {};
+  return refused("cell {}: version {} was imported and is worse than version {}: {}", cell_name, version,
+                 present->version, verdict.why)
+      .of("version")
+      .with_value(version)
+      .next("activate --force where it is wanted all the same");
+}
+
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
   if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
   return store_.set_quarantine(cell_name, batch_id, "", id);
+}
+
+Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
+  if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
+  return store_.discard(cell_name, batch_id, id);
 }
 
 Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
@@ -374,7 +455,7 @@ Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_na
     auto batches = store_.batches(name);
     if (!batches) return batches;
     std::copy_if(batches->begin(), batches->end(), std::back_inserter(all),
-                 [](const StoredBatch& batch) { return !batch.quarantine.empty(); });
+                 [](const StoredBatch& batch) { return !batch.quarantine.empty() && !batch.discarded; });
   }
   return all;
 }
@@ -433,7 +514,7 @@ void Trainer::enqueue(const StoredJob& job, bool asked_for) {
 }
 
 Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
-  if (job.kind == JobKind::kDiagnose || job.batch_ids.size() != 1) return true;
+  if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return true;
   return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
     return batch.job != job.id;
   });

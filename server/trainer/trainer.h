@@ -58,11 +58,12 @@ class Trainer {
 
   /// Checks the batch against its cell, stores it with its job, queues it. When its turn comes it is held against the
   /// model in force (triage()): what must not be learned from goes into quarantine with the reason, and its job fails.
-  /// Returns the job id; the same request again returns the same. Refuses what the batch reader and the cell refuse, an
-  /// unknown cell (kNotFound), an id that the cell already has (kConflict) and too many poses (kTooLarge). However many
-  /// jobs wait, a batch is taken.
+  /// Returns the job id; the same batch again returns the same, whoever sends it. Refuses what the batch reader and the
+  /// cell refuse, an unknown cell (kNotFound), an id that the cell has with other content (kConflict) and too many
+  /// poses (kTooLarge). However many jobs wait, a batch is taken.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
-                                            const std::string& csv, const std::string& request_id);
+                                            const std::string& csv, const std::string& request_id,
+                                            const std::string& who = {});
   /// Whether batches of a training that is asked for leave quarantine. They do when its model is put in force, by
   /// itself or by a person, or when there are too few poses to judge it by; not where it is judged and found not
   /// better.
@@ -80,21 +81,29 @@ class Trainer {
   /// diagnosis(). Refuses as submit() and retrain() do, but takes a batch in quarantine.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id,
                                               const std::string& csv, bool apply, const ChangeId& id = {});
-  /// Of a job whose diagnosis is found; kBusy while it is not.
+  /// Holds a few poses against the model in force: whether the robot still is as that has it (check_health()).
+  /// `tolerance_mm`: empty as the cell file says. Returns the job; what it found is diagnosis(). Refuses as diagnose(),
+  /// and a cell without a model in force (kNotFound).
+  [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                           std::optional<double> tolerance_mm, const ChangeId& id = {});
+  /// Of a job whose diagnosis or check is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
   /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
   /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
   /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
   /// that is over (kConflict).
-  [[nodiscard]] Status cancel(std::int64_t job);
+  [[nodiscard]] Status cancel(std::int64_t job, const std::string& who = {});
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
+  /// Nothing takes the batch any more.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {}) {
-    return history_.activate(cell, version, request);
-  }
+  /// See ModelHistory. A version that was imported is judged first, as a new one would be: where it is worse on the
+  /// same poses than the one in force it is refused with the figures, unless `force` says that it is wanted.
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
+                                bool force = false);
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
     return history_.rollback(cell, request);
   }
@@ -121,6 +130,8 @@ class Trainer {
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);
+  /// What the rule lets go of, one small change after the other.
+  void prune(const std::string& cell, const std::stop_token& stop);
   /// Of a store that can be read only now.
   void take_up_late();
   void tell_troubles(std::vector<std::string>& told);
@@ -133,9 +144,14 @@ class Trainer {
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
+  /// Refuses an imported version that is worse than the one in force.
+  [[nodiscard]] Status check_not_worse(const std::string& cell, int version) const;
   /// Whether the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
                                       bool release) const;
+  /// Queues a job that looks at one batch and learns nothing from it, unless it is to `apply` what it finds.
+  [[nodiscard]] Result<std::int64_t> look_at(StoredJob job, const std::string& batch_id, const std::string& csv,
+                                             bool apply, const ChangeId& id);
   /// The id of a stored batch, of the newest where none is named; refused in quarantine where what is found in it is to
   /// be applied.
   [[nodiscard]] Result<std::string> batch_to_diagnose(const std::string& cell, const std::string& batch_id,

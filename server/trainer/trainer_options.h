@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "server/store/store.h"
 #include "server/trainer/compute/compute_options.h"
 
 namespace trammel {
@@ -12,6 +13,7 @@ struct TrainerOptions {
   double validation_share = 0.2;  ///< of the poses of a batch are held out to judge models by (judging_rows())
   double accept_ratio = 1.02;     ///< see GateOptions
   std::uint64_t seed = 1;
+  KeepRule keep = {};  ///< what of the store is pruned, after each job
   ComputeOptions compute = {};
 };
 

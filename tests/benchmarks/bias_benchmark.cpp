@@ -95,14 +95,13 @@ void mean_and_stddev(benchmark::State& state) {
 
 // ---- one process: what a single target costs --------------------------------------------------------------------
 
-// Noise of a few per cent of the signal: what a calibrated robot leaves over. All regions are worked out beforehand.
+// Noise of a few per cent of the signal: what a calibrated robot leaves over.
 void variance(benchmark::State& state, VarianceForm form) {
   const auto count = static_cast<Index>(state.range(0));
   const MatrixXd q = random_joints(count, 3);
   const GpHyperparameters at = {VectorXd::Constant(6, std::log(0.9)), std::log(1e-4), std::log(2.6e-5)};
   const auto gp = GaussianProcess::condition(make_kernel("se"), q, q.col(0), VectorXd::Ones(count), at, form);
   TRAMMEL_CHECK(gp.has_value());
-  gp->prepare([] { return true; });
   const MatrixXd targets = random_joints(1000, 4);
   Index next = 0;
   for (auto _ : state) {
@@ -190,7 +189,7 @@ BENCHMARK(mean_and_stddev)->Apply(sizes_and_targets)->Unit(benchmark::kMicroseco
 BENCHMARK_CAPTURE(variance, exact, VarianceForm::kExact)
     ->ArgsProduct({{200, 1200, 4000}, {1, 1000}})
     ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(variance, by_regions, VarianceForm::kRegional)
+BENCHMARK_CAPTURE(variance, served, VarianceForm::kServed)
     ->ArgsProduct({{200, 1200, 4000}, {1, 1000}})
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK(coupled_mean)->Args({1200, 1})->Args({1200, 10000})->Unit(benchmark::kMicrosecond);

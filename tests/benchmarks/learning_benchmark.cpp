@@ -55,15 +55,6 @@ MeasurementBatch judged_by_copies(MeasurementBatch batch) {
   return batch;
 }
 
-VirtualRobot with_joint_2_off(const World& world, double rad) {
-  VirtualRobot robot = world.robot;
-  const std::vector<Parameter> parameters = robot.truth.parameters();
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (parameters[k].name == "q2") robot.truth.values(static_cast<Eigen::Index>(k)) += rad;
-  }
-  return robot;
-}
-
 World with_two_tools() {
   World world;
   auto cell = std::make_shared<Cell>(*world.cell);
@@ -131,7 +122,7 @@ std::vector<std::pair<std::string, Case>> gains() {
   const auto joint_2 = [](int poses, bool anew) {
     return [poses, anew](std::uint64_t seed) {
       const World world;
-      const VirtualRobot changed = with_joint_2_off(world, 1e-3);
+      const VirtualRobot changed = test::with_zero_off(world.robot, 2, 1e-3);
       return outcome(world, changed,
                      {measured_on(world.robot, {.seed = seed}),
                       measured_on(changed, {.poses = poses, .seed = seed + 500, .set_up_anew = anew})});

@@ -207,7 +207,7 @@ TEST(OrientationCheck, AJointThatPositionsHardlyShowIsSuspectedToo) {
   for (Measurement& m : batch.measurements) m.context.q(5) = -m.context.q(5);
   const auto doubt = orientation_doubt(batch, *cell);
   ASSERT_TRUE(doubt);
-  EXPECT_EQ(doubt->text, "with joint 6 reversed") << said(doubt);
+  EXPECT_EQ(doubt->text, "with the other sign of q6_deg") << said(doubt);
 }
 
 TEST(OrientationCheck, JointsThatLeadElsewhereAreLeftToThePositions) {

@@ -158,10 +158,13 @@ TEST(ModelFile, ThatWouldPredictOtherwiseNowIsRefused) {
         return deserialize(file.dump(), "cell.model");
       };
       EXPECT_TRUE(changed_by(1e-12)) << "another processor rounds otherwise";
-      const bool is_stddev = part == std::string("stddev_m");  // of another processor it may differ by 2 %
+      const bool is_stddev = part == std::string("stddev_m");
       const auto read = changed_by(is_stddev ? 0.1 * value : 1e-6);
       ASSERT_FALSE(read) << part << " of pose " << pose;
       EXPECT_EQ(read.error().field, "self_test");
+      if (!is_stddev) continue;
+      EXPECT_TRUE(changed_by(0.02 * value)) << "stated too large, as files from before may have it";
+      EXPECT_FALSE(changed_by(-0.02 * value)) << "stated too small";
     }
   }
 }

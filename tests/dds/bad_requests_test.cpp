@@ -285,7 +285,7 @@ std::size_t BadRequests::submissions() {
     r.batch_id("");
   });
   expect("an id that is taken", wire::RESULT_CONFLICT, [&](Request& r) {
-    r.csv(csv);
+    r.csv(csv + "\n");
     r.batch_id("lt-07");
   });
   expect("an id that is no UTF-8", wire::RESULT_REFUSED, [&](Request& r) {
@@ -373,9 +373,13 @@ std::size_t BadRequests::diagnoses() {
     r.csv("{}");
   });
   wire::CheckHealthRequest check;
+  check.batch_id("lt-99");
+  check.tolerance_mm(std::numeric_limits<double>::quiet_NaN());
   auto checks = sender<wire::CheckHealth>(check);
   send_what_is_always_wrong(checks);
-  checks.expect("a check", wire::RESULT_UNSUPPORTED, [](wire::CheckHealthRequest&) {});
+  checks.expect("an unknown batch", wire::RESULT_NOT_FOUND, [](wire::CheckHealthRequest&) {});
+  checks.expect("a tolerance below 0", wire::RESULT_INVALID_ARGUMENT,
+                [](wire::CheckHealthRequest& r) { r.tolerance_mm(-0.1); });
   return send.check() + checks.check();
 }
 
@@ -392,8 +396,7 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_AUDIT,
-                          wire::READ_REPLAY}) {
+  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_REPLAY}) {
     expect("what is not built yet", wire::RESULT_UNSUPPORTED, what);
   }
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });
@@ -419,7 +422,10 @@ std::size_t BadRequests::changes() {
   expect("an unknown action", wire::RESULT_INVALID_ARGUMENT,
          [](Request& r) { r.action(static_cast<wire::ManageAction>(5)); });
   expect("a backup", wire::RESULT_UNSUPPORTED, [](Request& r) { r.action(wire::MANAGE_BACKUP); });
-  expect("force", wire::RESULT_UNSUPPORTED, [](Request& r) { r.force(true); });
+  expect("force", wire::RESULT_UNSUPPORTED, [](Request& r) {
+    r.action(wire::MANAGE_ROLLBACK);
+    r.force(true);
+  });
   expect("another version than in force", wire::RESULT_CONFLICT, [](Request& r) {
     r.version(2);
     r.change().expected_version(2);
@@ -462,7 +468,7 @@ std::size_t BadRequests::releases() {
   expect("an unknown batch", wire::RESULT_NOT_FOUND, [](Request&) {});
   expect("an unknown action", wire::RESULT_INVALID_ARGUMENT,
          [](Request& r) { r.action(static_cast<wire::ReleaseAction>(3)); });
-  expect("to discard", wire::RESULT_UNSUPPORTED, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
+  expect("to discard an unknown batch", wire::RESULT_NOT_FOUND, [](Request& r) { r.action(wire::RELEASE_DISCARD); });
   expect("nothing", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({}); });
   expect("two at once", wire::RESULT_INVALID_ARGUMENT, [](Request& r) { r.batch_ids({"lt-07", "lt-08"}); });
   expect("to train from nothing", wire::RESULT_REFUSED, [](Request& r) {

@@ -307,6 +307,8 @@ TEST_F(HandlersTest, SubmitStoresBeforeItAnswersAndKnowsItsRepeats) {
 
   auto another = submit_request("lt-07");
   another.header().request_id().sequence_number(6);
+  EXPECT_EQ(handlers_.answer(another)->job(), first->job()) << "whoever lost the receipt gets it again";
+  another.csv(test::small_batch_csv(*backend_.cell, {.seed = 9}));
   EXPECT_EQ(refusal(another), Refusal("", {}, "batch").of(ErrorCode::kConflict).text("lt-07"));
   EXPECT_EQ(refusal(submit_request("")), Refusal("", {}, "batch_id"));
   auto bad = submit_request("lt-08");
@@ -513,6 +515,32 @@ TEST_F(HandlersTest, DiagnoseIsQueuedAndAnswersWhenItIsDone) {
   EXPECT_EQ(handlers_.answer(fetch).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(HandlersTest, ACheckIsQueuedAgainstTheModelInForceAndRefusedWithoutOne) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  wire::CheckHealthRequest request;
+  request.about().cell("cell-7");
+  request.batch_id("lt-07");
+  request.tolerance_mm(0.05);
+  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kNotFound);
+  ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
+  const auto queued = handlers_.answer(request);
+  ASSERT_TRUE(queued) << queued.error().message;
+  EXPECT_EQ(backend_.store->job(queued->job())->kind, JobKind::kCheck);
+  ASSERT_TRUE(backend_.store->store_findings(queued->job(), R"({"verdict": "healthy"})", ""));
+  auto fetch = read_request(wire::READ_FINDINGS);
+  fetch.job(queued->job());
+  EXPECT_EQ(handlers_.answer(fetch)->text(), R"({"verdict": "healthy"})");
+  request.tolerance_mm(0);
+  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kUsage);
+}
+
+TEST_F(HandlersTest, TheFleetListsEveryCell) {
+  const auto fleet = handlers_.answer(read_request(wire::READ_FLEET));
+  ASSERT_TRUE(fleet) << fleet.error().message;
+  EXPECT_NE(fleet->text().find("\"cell\": \"cell-7\""), std::string::npos) << fleet->text();
+}
+
 TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
   ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
   wire::TrainRequest request;
@@ -532,19 +560,16 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
   const auto is_unsupported = [](const auto& reply) {
     return reply && reply->header().result() == wire::RESULT_UNSUPPORTED && reply->header().problems().size() == 1;
   };
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_FLEET, wire::READ_AUDIT,
-                          wire::READ_REPLAY}) {
+  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_REPLAY}) {
     EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
   }
   EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
-  auto forced = manage_request(wire::MANAGE_ACTIVATE, 1);
+  auto forced = manage_request(wire::MANAGE_ROLLBACK);
   forced.force(true);
   EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
   auto of_epoch = manage_request(wire::MANAGE_ACTIVATE, 1);
   of_epoch.change().expected_epoch(3);
   EXPECT_TRUE(is_unsupported(handlers_.answer(of_epoch)));
-  EXPECT_TRUE(is_unsupported(handlers_.answer(release_request(wire::RELEASE_DISCARD, {"lt-07"}))));
-  EXPECT_TRUE(is_unsupported(handlers_.answer(wire::CheckHealthRequest())));
   wire::TrainRequest train;
   train.batch_rule("last 3");
   EXPECT_TRUE(is_unsupported(handlers_.answer(train)));

@@ -689,6 +689,22 @@ TEST_F(CommandLineWithService, ASubmittedBatchIsTrainedListedExportedAndAnswersA
   EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));
 }
 
+TEST_F(CommandLineWithService, AProgramIsTheSameBytesFromAFileFromAPipeAndFromAService) {
+  const std::string model = train(measure("first", 40, 1), "M3");
+  const int version = imported(model);
+  must_answer({"activate", "--model", fmt::format("cell-7@{}", version)});
+  const std::string program = TRAMMEL_SOURCE_DIR "/config/programs/drill.mod";
+  must({"correct", "--model", model, program, "-o", file("here.mod"), "--receipt", file("here.csv")});
+  must_answer({"correct", "--model", "cell-7", program, "-o", file("there.mod"), "--receipt", file("there.csv")});
+  EXPECT_EQ(test::read_file(file("there.mod")), test::read_file(file("here.mod")));
+  EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));
+  const Finished piped = test::run({"/bin/sh", "-c",
+                                    fmt::format("{}/clients/trammel correct --model {} --format rapid - -o - < {}",
+                                                TRAMMEL_BINARY_DIR, model, program)});
+  EXPECT_EQ(piped.exit_code, 0) << piped.err;
+  EXPECT_EQ(piped.out, test::read_file(file("here.mod")));
+}
+
 TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImported) {
   must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 40, 1), "--id", "lt-01", "--watch"});
   const Finished worse =

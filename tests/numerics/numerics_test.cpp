@@ -107,15 +107,25 @@ TEST_P(EveryBuild, MultipliesByATranspose) {
   }
 }
 
-TEST_P(EveryBuild, MultipliesAPackedMatrixInSinglePrecisionByAVector) {
-  for (const auto& [rows, cols] : {std::pair{1, 1}, {24, 6}, {25, 7}, {61, 480}}) {
-    const MatrixXd a = random_joints(rows, 55, cols);
-    const VectorXd k = random_joints(cols, 56, 1);
-    std::vector<float> packed(static_cast<std::size_t>(build().panel_size(rows, cols)));
-    build().pack_panels(rows, cols, a.data(), a.rows(), packed.data());
-    VectorXd product(padded_rows(rows));
-    build().panel_product(rows, cols, packed.data(), k.data(), product.data());
-    EXPECT_LT((product.head(rows) - a.cast<float>().cast<double>() * k).norm(), 1e-12 * cols) << rows << " " << cols;
+TEST_P(EveryBuild, MultipliesAPackedTriangleInSinglePrecisionByVectors) {
+  for (const Index n : {1, 7, 33, 401}) {
+    const MatrixXd triangle = random_joints(n, 55, n).triangularView<Eigen::Lower>();
+    const MatrixXd rounded = triangle.cast<float>().cast<double>();
+    std::vector<double> packed(static_cast<std::size_t>(build().packed_size(n)));
+    for (Index first = 0; first < n; first += build().packed_rows)
+      build().pack_lower(n, first, triangle.data(), n, packed.data() + build().packed_size(first));
+    const std::vector<float> singles(packed.begin(), packed.end());
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> k = random_joints(n, 56, kTargetBlock);
+    double norms[kTargetBlock];
+    build().square_norms_single(n, singles.data(), kTargetBlock, k.data(), norms);
+    for (Index j = 0; j < kTargetBlock; ++j) {
+      const VectorXd column = k.col(j);
+      const double expected = (rounded * column).squaredNorm();
+      EXPECT_NEAR(norms[j], expected, 1e-12 * expected) << n;
+      double alone = 0;
+      build().square_norms_single(n, singles.data(), 1, column.data(), &alone);
+      EXPECT_NEAR(alone, expected, 1e-12 * expected) << n;
+    }
   }
 }
 

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -14,6 +16,7 @@
 #include "server/base/hash.h"
 #include "server/compensate/model_file.h"
 #include "server/store/store.h"
+#include "server/store/writer_lock.h"
 #include "tests/support/demand.h"
 #include "tests/support/faulty_disk.h"
 #include "tests/support/small_cell.h"
@@ -179,7 +182,7 @@ class Changes {
  public:
   explicit Changes(std::uint64_t seed) {
     std::mt19937_64 random(seed);
-    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 4)(random));
+    for (int i = 0; i < 12; ++i) kinds_.push_back(std::uniform_int_distribution<int>(0, 7)(random));
   }
   /// Those from `*next` on, which rises with every answer.
   void ask(Store& store, std::size_t* next) const {
@@ -202,6 +205,18 @@ class Changes {
         case 3:
           static_cast<void>(store.add_job(job_of("first"), false, id));
           break;
+        case 4:
+          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, true,
+                                            "better", false, id));
+          break;
+        case 5:
+          static_cast<void>(store.add_model("cell-7", test::nominal_model(cell_, 100 + static_cast<int>(i)), 0, false,
+                                            "not better", false, id));
+          break;
+        case 6:
+          while (store.prune_one("cell-7", {1, 1, 1}).value_or(false)) {
+          }
+          break;
         default:
           static_cast<void>(store.set_quarantine("cell-7", "first", name, id));
       }
@@ -210,16 +225,30 @@ class Changes {
 
  private:
   std::vector<int> kinds_;
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
 };
+
+/// The trail without its times; "broken" where it does not verify.
+std::string audited(const Store& store) {
+  const AuditTrail trail = demand(store.audit());
+  std::string all = trail.broken ? "broken: " + sentence(*trail.broken) : "";
+  for (const AuditRow& row : trail.rows)
+    all += fmt::format("\n{} {} {}: {} -> {} ({}) {}", row.number, row.what, row.subject, row.before, row.after,
+                       row.why, row.request);
+  return all;
+}
 
 /// Everything that the changes change.
 std::string contents(const Store& store) {
   std::string all = fmt::format("in force {}", demand(store.version_in_force("cell-7")).value_or(0));
   if (const auto before = store.previous_in_force("cell-7")) all += fmt::format(", before {}", fmt::join(*before, " "));
-  for (const StoredBatch& one : demand(store.batches("cell-7"))) all += "\n" + one.id + " " + one.quarantine;
+  for (const StoredBatch& one : demand(store.batches("cell-7")))
+    all += "\n" + one.id + " " + one.quarantine + (one.pruned ? " pruned" : "");
+  for (const StoredModel& one : demand(store.models("cell-7")))
+    all += fmt::format("\nversion {} {}", one.version, store.model("cell-7", one.version) ? "there" : "pruned");
   for (const StoredJob& one : demand(store.unfinished_jobs()))
     all += fmt::format("\njob of {}", fmt::join(one.batch_ids, " "));
-  return all;
+  return all + "\n" + audited(store);
 }
 
 class KilledStore : public StoreFaults, public testing::WithParamInterface<int> {};
@@ -278,6 +307,55 @@ TEST_P(KilledStore, AtAnyCallHasMadeEveryChangeOnceThatIsAskedForAgain) {
     EXPECT_EQ(contents(*store), expected) << "seed " << seed << ", call " << static_cast<int>(calls) * point / kPoints;
   }
   EXPECT_GE(killed, kPoints - 1);
+}
+
+TEST_P(KilledStore, WhileAFileOfBeforeTheTrailIsTakenOnHasTakenItOnOnce) {
+  constexpr int kPoints = 30;
+  open();
+  for (int i = 1; i <= 1 + GetParam(); ++i) {
+    put_in_force(i);
+    ASSERT_TRUE(store_->add_batch(batch(std::to_string(i)), job_of(std::to_string(i))));
+  }
+  store_.reset();
+  {
+    SQLite::Database before(path_, SQLite::OPEN_READWRITE);
+    before.exec("DROP TABLE audit; DROP TABLE audit_end; DROP TABLE pruned");
+  }
+  std::size_t calls = 0;
+  const auto fresh_copy = [&](const test::TemporaryFolder& to) {
+    fs::copy(folder_.path(), to.path(), fs::copy_options::recursive);
+    return to.file("trammel.db");
+  };
+  {
+    test::TemporaryFolder whole;
+    test::FaultyDisk disk;
+    demand(Store::open(fresh_copy(whole))).reset();
+    calls = disk.calls();
+  }
+  for (int point = 0; point < kPoints; ++point) {
+    test::TemporaryFolder left;
+    const std::string path = fresh_copy(left);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      test::FaultyDisk disk;
+      auto calls_left = static_cast<int>(calls) * point / kPoints;
+      disk.set_plan([calls_left](auto, const std::string&) mutable {
+        if (calls_left-- == 0) ::kill(::getpid(), SIGKILL);
+        return SQLITE_OK;
+      });
+      static_cast<void>(Store::open(path));
+      ::_exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    const auto store = demand(Store::open(path));
+    const AuditTrail trail = demand(store->audit());
+    EXPECT_FALSE(trail.broken) << sentence(*trail.broken);
+    ASSERT_EQ(trail.rows.size(), 1u) << "call " << static_cast<int>(calls) * point / kPoints;
+    EXPECT_EQ(trail.rows.front().what, "migrate");
+    EXPECT_EQ(demand(store->version_in_force("cell-7")), 1 + GetParam());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, KilledStore, testing::Range(0, 10));
@@ -412,6 +490,157 @@ TEST_F(StoreFaults, AJournalThatIsLostDamagedOrCutLosesNothing) {
     EXPECT_EQ(demand(store->version_in_force("cell-7")), 3);
     EXPECT_TRUE(store->model("cell-7", 3));
   }
+}
+
+/// What another program may do to the file while the store is open, and how that is taken back. `kept` is the file as
+/// it was just before.
+struct Meddling {
+  const char* name;
+  void (*meddle)(const std::string& path, const std::string& kept, const std::string& earlier);
+  void (*take_back)(const std::string& path, const std::string& kept);
+};
+
+void put_in_place_of(const std::string& path, const std::string& text) {
+  std::ofstream(path + ".new", std::ios::binary) << text;
+  fs::rename(path + ".new", path);
+}
+
+void write_over(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
+}
+
+void replace_by_pipe(const std::string& path) {
+  fs::remove(path);
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+}
+
+const Meddling kMeddlings[] = {
+    {"Renamed", [](auto& path, auto&, auto&) { fs::rename(path, path + ".away"); },
+     [](auto& path, auto&) { fs::rename(path + ".away", path); }},
+    {"Removed", [](auto& path, auto&, auto&) { fs::remove(path); }, put_in_place_of},
+    {"ReplacedByAnEarlierState", [](auto& path, auto&, auto& earlier) { put_in_place_of(path, earlier); },
+     put_in_place_of},
+    {"ReplacedByNoStore", [](auto& path, auto&, auto&) { put_in_place_of(path, "something else"); }, put_in_place_of},
+    {"ReplacedByAPipe", [](auto& path, auto&, auto&) { replace_by_pipe(path); }, put_in_place_of},
+    {"Emptied", [](auto& path, auto&, auto&) { fs::resize_file(path, 0); }, write_over},
+    {"Cut", [](auto& path, auto& kept, auto&) { fs::resize_file(path, kept.size() / 2); }, write_over},
+    {"WrittenOverByAnEarlierState", [](auto& path, auto&, auto& earlier) { write_over(path, earlier); }, write_over},
+    {"WrittenOverByNoStore", [](auto& path, auto& kept, auto&) { write_over(path, std::string(kept.size(), 'x')); },
+     write_over}};
+
+class MeddledStore : public StoreFaults, public testing::WithParamInterface<Meddling> {};
+
+TEST_P(MeddledStore, AcknowledgesNothingUntilTheFileIsBackAndLosesNothing) {
+  open();
+  put_in_force(1);
+  const std::string earlier = test::read_file(path_);
+  put_in_force(2);
+  ASSERT_TRUE(store_->add_batch(batch("before"), job_of("before")));
+  const std::string kept = test::read_file(path_);
+  GetParam().meddle(path_, kept, earlier);
+  EXPECT_FALSE(store_->try_again()) << "it is noticed without a change";
+  ASSERT_TRUE(store_->state().why_not_written);
+  const auto refused = store_->add_batch(batch("during"), job_of("during"));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kBusy) << sentence(refused.error());
+  EXPECT_FALSE(store_->activate("cell-7", 1));
+  EXPECT_EQ(served(), 2) << "models are served";
+  GetParam().take_back(path_, kept);
+  EXPECT_TRUE(store_->wait_until_writable({}));
+  EXPECT_FALSE(store_->state().why_not_written);
+  EXPECT_TRUE(store_->add_batch(batch("after"), job_of("after")));
+  EXPECT_TRUE(store_->activate("cell-7", 1));
+  restart();
+  EXPECT_FALSE(store_->state().why_not_written);
+  EXPECT_EQ(served(), 1);
+  std::set<std::string> ids;
+  for (const StoredBatch& one : demand(store_->batches("cell-7"))) ids.insert(one.id);
+  EXPECT_EQ(ids, (std::set<std::string>{"before", "after"}));
+}
+
+TEST_P(MeddledStore, StartedAgainInThatStateServesTheModels) {
+  open();
+  put_in_force(1);
+  const std::string earlier = test::read_file(path_);
+  put_in_force(2);
+  GetParam().meddle(path_, test::read_file(path_), earlier);
+  restart();
+  EXPECT_EQ(served(), 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(WhileOpen, MeddledStore, testing::ValuesIn(kMeddlings),
+                         [](const auto& meddling) { return meddling.param.name; });
+
+TEST_F(StoreFaults, AStoreThatWasRemovedSaysHowToBringItBackAndThatBringsAllOfItBack) {
+  open();
+  put_in_force(1);
+  fs::remove(path_);
+  ASSERT_FALSE(store_->try_again());
+  const std::string said = store_->state().why_not_written->next;
+  const std::size_t from = said.find("cp "), to = said.find(')');
+  ASSERT_NE(from, std::string::npos) << said;
+  ASSERT_EQ(std::system(said.substr(from, to - from).c_str()), 0) << said;
+  EXPECT_TRUE(store_->wait_until_writable({})) << sentence(*store_->state().why_not_written);
+  restart();
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 1);
+}
+
+TEST_F(StoreFaults, AStoreThatIsOnlyTouchedGoesOn) {
+  open();
+  put_in_force(1);
+  fs::permissions(path_, fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_TRUE(store_->add_batch(batch("a"), job_of("a")));
+  fs::create_hard_link(path_, folder_.file("backup.db"));
+  EXPECT_TRUE(store_->add_batch(batch("b"), job_of("b")));
+  fs::remove(path_ + "-wal");
+  EXPECT_TRUE(store_->add_batch(batch("c"), job_of("c")));
+  restart();
+  EXPECT_EQ(demand(store_->batches("cell-7")).size(), 3u);
+}
+
+TEST_F(StoreFaults, AFileThatIsGoneIsNoNewBeginningWhileItsCopiesAreThere) {
+  open();
+  put_in_force(1);
+  put_in_force(2);
+  store_.reset();
+  const std::string kept = test::read_file(path_);
+  fs::remove(path_);
+  open();
+  EXPECT_EQ(served(), 2);
+  ASSERT_TRUE(store_->state().why_not_written);
+  EXPECT_NE(sentence(*store_->state().why_not_written).find("not there"), std::string::npos);
+  EXPECT_FALSE(store_->add_batch(batch("a"), job_of("a")));
+  EXPECT_FALSE(fs::exists(path_));
+  write_over(path_, kept);
+  EXPECT_TRUE(store_->wait_until_writable({}));
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 2);
+  store_.reset();
+  fs::remove(path_);
+  forget_copies();
+  open();
+  EXPECT_EQ(served(), 0) << "a new beginning";
+}
+
+TEST_F(StoreFaults, ASecondWriterIsRefusedByWhateverNameItComes) {
+  open();
+  put_in_force(1);
+  const std::string other = folder_.file("other.db");
+  fs::create_hard_link(path_, other);
+  fs::remove(path_ + ".lock");
+  for (const std::string& name : {other, path_}) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      const auto store = Store::open(name);
+      const bool refused = !store && store.error().code == ErrorCode::kConflict;
+      ::_exit(refused && !WriterLock::look(name) ? 0 : 1);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0) << name;
+  }
+  put_in_force(2);
+  EXPECT_FALSE(store_->state().why_not_written);
 }
 
 }  // namespace

@@ -53,6 +53,11 @@ int LearningCell::in_force() const {
 
 const CompensatedModel& LearningCell::model() const { return registry_.in_force(cell_)->model; }
 
+const CompensatedModel& LearningCell::version(int version) {
+  asked_ = demand(registry_.version(cell_, version));
+  return asked_->model;
+}
+
 double true_error(const CompensatedModel& model, const VirtualRobot& robot, const std::string& tool) {
   const Cell& cell = *robot.truth.cell;
   const Eigen::MatrixXd q = demand(plan_poses(cell, {kTruePoses, 987654}));

@@ -23,6 +23,8 @@ class LearningCell {
   /// The version in force; 0 where none is.
   [[nodiscard]] int in_force() const;
   [[nodiscard]] const CompensatedModel& model() const;
+  /// A stored version.
+  [[nodiscard]] const CompensatedModel& version(int version);
   [[nodiscard]] Trainer& trainer() { return *trainer_; }
   JobProgress finished(std::int64_t job);
 
@@ -36,6 +38,7 @@ class LearningCell {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::int64_t, JobProgress> finished_;  // guarded by mutex_
+  ServedModelPtr asked_;                          // the last version that was asked for
 };
 
 /// m, rms over the cell's joint ranges of what the model gets wrong of the robot without noise, with the best shift and

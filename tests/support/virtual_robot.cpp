@@ -27,6 +27,14 @@ VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell) {
   return demand(read_virtual_robot(kSource + "/models/truth/chapter-5.yaml", cell));
 }
 
+VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad) {
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (parameters[k].name == fmt::format("q{}", joint)) robot.truth.values(static_cast<Eigen::Index>(k)) += rad;
+  }
+  return robot;
+}
+
 MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed, bool orientation) {
   const Eigen::MatrixXd q = demand(plan_poses(*robot.truth.cell, {poses, seed}));
   SimulateOptions options;

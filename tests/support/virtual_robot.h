@@ -15,6 +15,8 @@ namespace trammel::test {
 /// cell-7 with base and tool unknown, for data as they arrive from a shop floor.
 [[nodiscard]] std::shared_ptr<const Cell> cell_7_unlocated();
 [[nodiscard]] VirtualRobot chapter_5_robot(const std::shared_ptr<const Cell>& cell);
+/// The robot whose joint (1-based) has lost its zero by that much.
+[[nodiscard]] VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad);
 /// `poses` poses of the cell's ranges as its tracker measures them.
 [[nodiscard]] MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed,
                                         bool orientation = true);

@@ -99,7 +99,9 @@ TEST_F(GateTest, AnArmThatWasIsNotLearnedAgainFromTheBatchesOfItsTime) {
   const CompensatedModel changed = test::demand(
       train(cell_, measured_on(with_joint_2_off(1e-3), {.poses = 120, .seed = 39, .set_up_anew = true}), offline));
   const int version = test::demand(learning.trainer().import_model(cell_->name, serialize(changed)));
-  ASSERT_TRUE(learning.trainer().activate(cell_->name, version)) << "the arm has changed, and a person says so";
+  ASSERT_FALSE(learning.trainer().activate(cell_->name, version)) << "it is worse on what was measured before";
+  ASSERT_TRUE(learning.trainer().activate(cell_->name, version, {}, true))
+      << "the arm has changed, and a person says so";
   const JobProgress again = learning.finished(test::demand(learning.trainer().retrain(cell_->name, {"day-1"}, "", "")));
   EXPECT_FALSE(again.in_force) << again.what;
   EXPECT_EQ(learning.in_force(), version);

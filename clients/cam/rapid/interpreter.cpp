@@ -172,7 +172,7 @@ void Interpreter::note_changes() {
       const Expression* root = root_of(assignment.target);
       if (root == nullptr) continue;
       note_change(assignment.target, *own_scope(m, assignment.routine),
-                  fmt::format("{} is set at run time ({})", root->name, place_of(m, assignment.line)));
+                  fmt::format("{} is set at run time ({})", root->name.text(), place_of(m, assignment.line)));
     }
   }
   // A change of a parameter changes what is handed over, through any number of calls.
@@ -193,13 +193,13 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
     const std::size_t at = argument.label.empty() ? position++ : position;
     const Expression* root = root_of(argument);
     if (root == nullptr) continue;
-    const std::string why = fmt::format("{} may be changed by {} ({})", root->name, shown(instruction.spelled),
+    const std::string why = fmt::format("{} may be changed by {} ({})", root->name.text(), shown(instruction.spelled),
                                         place_of(module, instruction.line));
     if (routine) {
       const Routine& called = modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
-      const std::string& parameter = !argument.label.empty()         ? argument.label
+      const std::string& parameter = !argument.label.empty()         ? argument.label.text()
                                      : at < called.parameters.size() ? called.parameters[at]
-                                                                     : root->name;
+                                                                     : root->name.text();
       const auto found = by_name_[routine->first].find({routine->second, parameter});
       if (found == by_name_[routine->first].end() || !found->second->may_be_changed) continue;
       if (changed_.contains(found->second)) note_change(argument, scope, why);
@@ -298,7 +298,7 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
   switch (expression.kind) {
     case Kind::kName: {
       const auto found = find(expression.name, scope);
-      if (!found) return because(fmt::format("{} is not in the files handed over", shown(expression.name)));
+      if (!found) return because(fmt::format("{} is not in the files handed over", shown(expression.name.text())));
       const Declaration& declared = *found->declaration;
       if (declared.storage == Storage::kLoop) return because(fmt::format("a loop counts {}", shown(declared.name)));
       if (declared.storage == Storage::kParameter) {
@@ -321,7 +321,7 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
     case Kind::kElement:
       return element_of(expression, scope, depth);
     case Kind::kCall:
-      return because(fmt::format("the function {} decides it", shown(expression.name)));
+      return because(fmt::format("the function {} decides it", shown(expression.name.text())));
     default:
       return std::vector<Data>{{&expression, &scope, type_of(expression, scope), nullptr}};
   }
@@ -333,7 +333,7 @@ Told<std::vector<Data>> Interpreter::field_of(const Expression& expression, cons
   std::vector<Data> all;
   for (const Data& data : *of) {
     const auto known = field(data.type, expression.name, data.scope->module);
-    if (!known) return because(fmt::format("{} of a {} is not known", shown(expression.name), shown(data.type)));
+    if (!known) return because(fmt::format("{} of a {} is not known", shown(expression.name.text()), shown(data.type)));
     const Expression* node = data.node;
     if (node->kind != Kind::kAggregate) {
       const Told<std::vector<Data>> inner = data_of(*node, *data.scope, depth + 1);
@@ -439,7 +439,7 @@ Told<std::vector<double>> Interpreter::numbers_of(const Expression& expression, 
 }
 
 Told<TargetValue> Interpreter::offset_of(const Expression& call, const Scope& scope, int depth) const {
-  if (call.parts.size() < 4) return because(fmt::format("{} with {} arguments", call.name, call.parts.size()));
+  if (call.parts.size() < 4) return because(fmt::format("{} with {} arguments", call.name.text(), call.parts.size()));
   Told<TargetValue> base = target_of(call.parts[0], scope, depth + 1);
   if (!base) return base;
   Vector3 d;
@@ -456,9 +456,9 @@ Told<TargetValue> Interpreter::offset_of(const Expression& call, const Scope& sc
   Vector3 turn = Vector3::Zero();
   for (std::size_t k = 4; k < call.parts.size(); ++k) {
     const Expression& part = call.parts[k];
-    const std::size_t axis = std::string("xyz").find(part.label.size() == 2 ? part.label[1] : '?');
-    if (part.label.front() != 'r' || axis == std::string::npos)
-      return because(fmt::format("RelTool with '{}'", shown(part.label)));
+    const std::size_t axis = std::string("xyz").find(part.label.text().size() == 2 ? part.label.text()[1] : '?');
+    if (!part.label.text().starts_with("r") || axis == std::string::npos)
+      return because(fmt::format("RelTool with '{}'", shown(part.label.text())));
     const Told<double> number = number_of(part, scope, depth + 1);
     if (!number) return because(number.error());
     turn(static_cast<Eigen::Index>(axis)) = from_deg(*number);

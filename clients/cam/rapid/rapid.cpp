@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <string_view>
 #include <tuple>
 
 #include "clients/cam/rapid/interpreter.h"
@@ -17,10 +16,10 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr std::string_view kFrameLabel = "wobj", kToolLabel = "tool";  // of a motion, in lower case
-
 using namespace rapid;
 using Kind = Expression::Kind;
+
+constexpr const char* kToolArgument = "tool";  // `\Tool:=`
 
 bool is_search(const std::string& name) { return name.starts_with("search"); }
 
@@ -171,6 +170,7 @@ class Reader {
     tool.name = meaning_->text_of(*expression, *where);
     if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
       if (expression->name == "tool0") tool.X_FT = Pose::Identity();
+      if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
       return known_tool(std::move(tool));
     }
     const Told<Data> data = named(*expression, *where);
@@ -218,7 +218,12 @@ class Reader {
     frame.name = meaning_->text_of(*expression, *where);
     if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
       if (expression->name == "wobj0") return 0;
-      frame.why_not = fmt::format("work object {} is not in the files handed over", shown(frame.name));
+      if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
+        frame.X_BO = given->second;
+      } else {
+        frame.why_not =
+            fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
+      }
       return known_frame(std::move(frame));
     }
     const Told<Data> data = named(*expression, *where);
@@ -288,10 +293,11 @@ class Reader {
     const Expression* tool = nullptr;
     for (const Expression& argument : motion.arguments) {
       if (argument.label.empty()) positional.push_back(&argument);
-      if (argument.label == kFrameLabel) frame = &argument;
-      if (argument.label == kToolLabel) tool = &argument;
+      if (argument.label == "wobj") frame = &argument;
+      if (argument.label == kToolArgument) tool = &argument;
     }
     if (positional.empty()) return;
+    for (const Expression* argument : positional) note_names(*argument);
     const std::string first = meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]);
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
     const auto displaced = displaced_.find(&motion);
@@ -538,7 +544,7 @@ class Reader {
         NumberStyle style;
         style.decimals = decimals;
         if (!written) target.folded = true;
-        target.rewrites.push_back({{part.begin, part.end}, {"", ""}, {{first + k, written ? written->style : style}}});
+        target.rewrites.push_back({{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
       }
       return;
     }
@@ -581,16 +587,16 @@ class Reader {
         const Expression& value = *declared.value;
         const auto site = sites_.lower_bound({m, value.begin});
         const bool used = site != sites_.end() && site->first.first == m && site->first.second < value.end;
-        if (used || mentioned(declared.name)) continue;
+        if (used || named_.contains(declared.name)) continue;
         program_.left.push_back({declared.name, m, declared.line, "", "no motion in these files goes to it"});
       }
     }
   }
 
-  /// Whether what uses it is listed already.
-  [[nodiscard]] bool mentioned(const std::string& name) const {
-    return std::any_of(program_.left.begin(), program_.left.end(),
-                       [&](const LeftAlone& left) { return in_lower_case(left.name).find(name) != std::string::npos; });
+  /// The names in what motions go to: what becomes of them is told there.
+  void note_names(const Expression& expression) {
+    if (expression.kind == Kind::kName) named_.insert(expression.name);
+    for (const Expression& part : expression.parts) note_names(part);
   }
 
   ReadOptions options_;
@@ -600,6 +606,7 @@ class Reader {
   std::map<std::pair<std::size_t, std::size_t>, Site> sites_;
   std::map<std::size_t, Scope> own_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
+  std::set<std::string> named_;
   std::string open_displacement_;
   std::map<const Instruction*, std::string> displaced_;
 };

@@ -61,7 +61,7 @@ class Parser {
   }
   [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
 
-  [[nodiscard]] std::size_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
+  [[nodiscard]] std::uint32_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
 
   /// Behind the next `;`.
   void skip_statement() {

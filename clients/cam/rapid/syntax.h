@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,16 +13,54 @@
 /// understood is passed over.
 namespace trammel::cam::rapid {
 
+/// A text that takes a pointer where it is empty: most parts of a long program are numbers.
+class Name {
+ public:
+  Name() = default;
+  Name(std::string text)  // NOLINT(google-explicit-constructor): it is one
+      : text_(text.empty() ? nullptr : std::make_unique<std::string>(std::move(text))) {}
+  Name(const Name& other) : Name(other.text()) {}
+  Name(Name&&) noexcept = default;
+  Name& operator=(Name other) noexcept {
+    text_ = std::move(other.text_);
+    return *this;
+  }
+  ~Name() = default;
+
+  [[nodiscard]] const std::string& text() const {
+    static const std::string kEmpty;
+    return text_ ? *text_ : kEmpty;
+  }
+  operator const std::string&() const { return text(); }  // NOLINT(google-explicit-constructor)
+  [[nodiscard]] bool empty() const { return !text_; }
+  [[nodiscard]] bool operator==(std::string_view other) const { return text() == other; }
+
+ private:
+  std::unique_ptr<std::string> text_;
+};
+
 /// An expression, with its bytes. Names are in lower case: RAPID does not tell cases apart.
 struct Expression {
-  enum class Kind { kNumber, kText, kTruth, kName, kAggregate, kCall, kField, kElement, kUnary, kBinary, kUnknown };
+  enum class Kind : unsigned char {
+    kNumber,
+    kText,
+    kTruth,
+    kName,
+    kAggregate,
+    kCall,
+    kField,
+    kElement,
+    kUnary,
+    kBinary,
+    kUnknown
+  };
   Kind kind = Kind::kUnknown;
-  std::size_t begin = 0, end = 0;
+  char sign = 0;  ///< of a unary or binary operation
   int line = 0;
-  std::string name;               ///< of a name, a call, a field; the word of a truth value
+  std::uint32_t begin = 0, end = 0;
   double value = 0;               ///< of a number
-  char sign = 0;                  ///< of a unary or binary operation
-  std::string label;              ///< of an argument `\Rx:=...`: `rx`
+  Name name;                      ///< of a name, a call, a field; the word of a truth value
+  Name label;                     ///< of an argument `\Rx:=...`: `rx`
   std::vector<Expression> parts;  ///< elements, arguments, operands; of a field or element: what it is of, first
 };
 

@@ -19,7 +19,7 @@ class Scanner {
 
   Token next() {
     skip_blanks();
-    Token token{TokenKind::kEnd, at_, at_, line_};
+    Token token{TokenKind::kEnd, static_cast<std::uint32_t>(at_), static_cast<std::uint32_t>(at_), line_};
     if (at_ >= text_.size()) return token;
     const char c = text_[at_];
     if (is_letter(c)) {
@@ -35,7 +35,7 @@ class Scanner {
       token.kind = TokenKind::kSign;
       at_ += (c == ':' && peek(1) == '=') ? 2 : 1;
     }
-    token.end = at_;
+    token.end = static_cast<std::uint32_t>(at_);
     return token;
   }
 
@@ -80,6 +80,7 @@ class Scanner {
 
 std::vector<Token> tokens_of(std::string_view text) {
   std::vector<Token> tokens;
+  tokens.reserve(text.size() / 3);
   Scanner scanner(text);
   do {
     tokens.push_back(scanner.next());

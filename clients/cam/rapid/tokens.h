@@ -1,18 +1,19 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace trammel::cam::rapid {
 
-enum class TokenKind { kWord, kNumber, kString, kSign, kEnd };
+enum class TokenKind : unsigned char { kWord, kNumber, kString, kSign, kEnd };
 
 /// A piece of a module. Bytes between tokens are blanks and comments.
 struct Token {
   TokenKind kind = TokenKind::kEnd;
-  std::size_t begin = 0, end = 0;
+  std::uint32_t begin = 0, end = 0;
   int line = 1;
 };
 

@@ -168,13 +168,13 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
 /// What correct is asked for, a program or a table of targets.
 struct CorrectArguments : ApplyArguments {
   std::vector<std::string> inputs;
-  std::string receipt, report, format;
+  std::string receipt, report, format, frames;
   bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
        keep_joints = false;
   double tolerance_mm = 0;
 
   [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,
+    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,   frames,
             allow_failed, strict, keep_digits, undo,    again,  split,  keep_joints, tolerance_mm, service};
   }
 };
@@ -257,6 +257,17 @@ void add_program_options(CLI::App& command, CorrectArguments& arguments) {
                   fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
       ->group(group);
   command.add_option("--receipt", arguments.receipt, "What became of each target, as CSV")->group(group);
+  command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
+  command
+      .add_option("--tolerance", arguments.tolerance_mm,
+                  "Tell how many targets are expected within so many mm of where they are wanted, with 95 %")
+      ->check(CLI::PositiveNumber)
+      ->group(group);
+  command
+      .add_option("--frames", arguments.frames,
+                  "Values of tools and frames that the program leaves to the controller (CSV: "
+                  "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...)")
+      ->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,
                 "Write numbers with the decimals that they have, even where rounding takes more than a tenth of what "

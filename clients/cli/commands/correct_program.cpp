@@ -9,6 +9,7 @@
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/receipt_page.h"
 #include "clients/cli/text/receipt_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -161,10 +162,23 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
 }
 
 Status write_receipts(const cam::CorrectedProgram& corrected, const CorrectProgramArguments& arguments) {
+  if (!arguments.report.empty()) {
+    const Status written = write_output(arguments.report, receipt_page(corrected, arguments.tolerance_mm));
+    if (!written) return written;
+  }
   if (!arguments.receipt.empty()) {
     if (const Status written = write_output(arguments.receipt, receipt_csv(corrected)); !written) return written;
   }
-  return write_json(arguments.json, receipt_json(corrected));
+  nlohmann::ordered_json json = receipt_json(corrected);
+  if (arguments.tolerance_mm > 0) {
+    const ToleranceVerdict verdict = tolerance_verdict(corrected, arguments.tolerance_mm);
+    json["tolerance"] = {{"tolerance_mm", verdict.tolerance_mm},
+                         {"targets", verdict.targets},
+                         {"inside_before", verdict.before},
+                         {"inside_after", verdict.after},
+                         {"expected_inside_after", verdict.expected_after}};
+  }
+  return write_json(arguments.json, json);
 }
 
 }  // namespace
@@ -177,8 +191,13 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (!files) return tl::make_unexpected(files.error());
   const auto paths = output_paths(*files, arguments.output);
   if (!paths) return tl::make_unexpected(paths.error());
-  const cam::Program program =
-      cam::read_program(files->dialect, files->files, {arguments.split, arguments.keep_joints});
+  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}};
+  if (!arguments.frames.empty()) {
+    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
+    if (!frames) return tl::make_unexpected(frames.error());
+    reading.frames = std::move(*frames);
+  }
+  const cam::Program program = cam::read_program(files->dialect, files->files, reading);
   const Result<cam::CorrectedProgram> corrected =
       arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments);
   if (!corrected) return tl::make_unexpected(corrected.error());
@@ -186,7 +205,9 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
   if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
     return tl::make_unexpected(written.error());
-  fmt::print(stderr, "{}", shown_lines(receipt_summary(*corrected) + left));
+  std::string told = receipt_summary(*corrected) + left;
+  if (arguments.tolerance_mm > 0) told += verdict_text(tolerance_verdict(*corrected, arguments.tolerance_mm)) + "\n";
+  fmt::print(stderr, "{}", shown_lines(told));
   if (const Status written = write_receipts(*corrected, arguments); !written)
     return tl::make_unexpected(written.error());
   return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;

@@ -12,7 +12,7 @@ namespace trammel::cli {
 /// What `correct` is asked for where the input is a program.
 struct CorrectProgramArguments {
   std::vector<std::string> inputs;
-  std::string model, tool, payload, format, output, receipt, report, json;
+  std::string model, tool, payload, format, output, receipt, report, json, frames;
   bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
        keep_joints = false;
   double tolerance_mm = 0;  ///< 0: none

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/service/diagnose_service.h"
 #include "clients/cli/terminal/options.h"
@@ -10,7 +11,6 @@
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/diagnose/diagnose.h"
-#include "server/measurement/files/batch_file.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
 #include "server/robot/cell_sources_file.h"
@@ -91,17 +91,17 @@ Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBa
 
 /// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
 Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
-  return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
-    return check_against_cell(std::move(batch), cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
-  });
+  return read_checked_batches(arguments.batches, cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
 }
 
 Status diagnose_files(const DiagnoseArguments& arguments) {
-  if (arguments.batch.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
+  if (arguments.batches.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
-  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
+  std::vector<NamedFile> inputs = {{"--cell", arguments.cell}};
+  for (const std::string& path : arguments.batches) inputs.push_back({"--batch", path});
+  if (const Status fine = outputs.check(inputs); !fine) return fine;
   Result<Cell> read = read_cell_to_train(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
@@ -155,10 +155,12 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "diagnose", "Tell which physical cause the model lacks, how sure that is, and what to measure next");
   command->add_option("--cell", arguments->cell, "Cell file (YAML); with --service also the cell's id")->required();
-  command->add_option(
-      "--batch", arguments->batch,
-      "Measurements (CSV: joints in deg, rails in mm; positions in mm); with --service also the id of a batch that the "
-      "service has; left out there: its newest batch");
+  command
+      ->add_option("--batch", arguments->batches,
+                   "Measurements (CSV: joints in deg, rails in mm; positions in mm), on files again for each measuring "
+                   "session; with "
+                   "--service also the id of a batch that the service has; left out there: its newest batch")
+      ->allow_extra_args(false);
   command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
       ->type_name("FILE");
   command

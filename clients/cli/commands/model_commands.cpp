@@ -3,15 +3,17 @@
 #include <chrono>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
-#include "server/measurement/files/batch_file.h"
 #include "server/report/model_page.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
 #include "server/trainer/pipeline/train.h"
 
@@ -23,19 +25,16 @@ std::int64_t unix_time() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-Result<CheckedBatch> read_checked_batch(const std::string& path, const Cell& cell,
-                                        const HoldOut& hold_out = drawn(0, 0)) {
-  return read_batch(path).and_then(
-      [&](MeasurementBatch batch) { return check_against_cell(std::move(batch), cell, hold_out); });
-}
-
 struct TrainArguments {
   std::string from;
   std::string refit = "base,tool";
-  std::string cell, batch, output, json;
+  std::string cell, output, json;
+  std::vector<std::string> batches;
   std::optional<std::string> level, bias;
+  std::vector<std::string> fleet;
   std::uint64_t seed = 1;
   double validation_share = 0;
+  bool as_read = false;
 };
 
 /// Checks the batch against the model to start from, as the service does before training. Only the refitted sources may
@@ -60,18 +59,60 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
       .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
 }
 
+/// What robots of the cell's type have in common, by the models of `paths`; empty where nobody wants to know.
+Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths, const Cell& cell) {
+  const Result<CellRules> rules = rules_of(cell);
+  if (!rules) return tl::make_unexpected(rules.error());
+  if (!rules->fleet_prior && paths.empty()) return std::optional<FleetPrior>();
+  if (paths.empty()) {
+    return failure(ErrorCode::kUsage, "cell {} says prior: fleet, and no robot of its type is named", cell.name)
+        .of("--fleet")
+        .next("name their models, --fleet once for each");
+  }
+  std::vector<FleetMember> members;
+  for (const std::string& path : paths) {
+    Result<CompensatedModel> model = load_model(path);
+    if (!model) return tl::make_unexpected(model.error());
+    members.push_back({path, std::move(*model)});
+  }
+  return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) { return std::optional(std::move(prior)); });
+}
+
+std::string unlike_text(const std::vector<Unlike>& unlike) {
+  std::string text;
+  for (const Unlike& one : unlike) text += "unlike its twins: " + to_string(one) + "\n";
+  return text;
+}
+
+nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const Unlike& one : unlike) {
+    json.push_back({{"parameter", one.parameter},
+                    {"unit", one.unit},
+                    {"value", one.value},
+                    {"twins", one.fleet_mean},
+                    {"twins_u95", 2 * one.fleet_stddev},
+                    {"z", one.z}});
+  }
+  return json;
+}
+
 Status train_model(const TrainArguments& arguments) {
   Result<Cell> cell = read_cell_to_train(
       arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<CheckedBatch> batch =
-      read_checked_batch(arguments.batch, *cell, drawn(arguments.validation_share, arguments.seed));
+      read_checked_batches(arguments.batches, *cell, drawn(arguments.validation_share, arguments.seed));
   if (!batch) return tl::make_unexpected(batch.error());
   TrainOptions options;
   options.level = arguments.level;
   options.bias = arguments.bias;
   options.seed = arguments.seed;
   options.trained_at = unix_time();
+  options.looked_at = arguments.as_read;
+  Result<std::optional<FleetPrior>> fleet = fleet_prior(arguments.fleet, *cell);
+  if (!fleet) return tl::make_unexpected(fleet.error());
+  options.fleet = std::move(*fleet);
   if (!arguments.from.empty()) {
     Result<CompensatedModel> from = load_model(arguments.from);
     if (!from) return tl::make_unexpected(from.error());
@@ -92,28 +133,41 @@ Status train_model(const TrainArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
   const auto& parts = model->parts();
-  tell(model_text(*model) +
+  const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
+  tell(model_text(*model) + unlike_text(unlike) +
            (parts.validation
                 ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
                 : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
                               parts.training.poses, parts.provenance.figures_batch_id()) +
                       evaluation_table(parts.training)),
        {arguments.output, arguments.json});
-  return write_json(arguments.json, model_json(*model));
+  nlohmann::ordered_json json = model_json(*model);
+  if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
+  return write_json(arguments.json, json);
 }
 
 struct EvaluateArguments {
-  std::string model, batch, json;
+  std::string model, json;
+  std::vector<std::string> batches;
 };
+
+/// What the sessions of a batch stand on for a model, for people; empty where nothing had to be found.
+std::string located_text(const InWorld& world) {
+  if (world.located.empty()) return "";
+  return fmt::format("note: where the instrument of session {} stood was found from its own poses\n",
+                     fmt::join(world.located, ", "));
+}
 
 Status evaluate(const EvaluateArguments& arguments) {
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
-  const Result<CheckedBatch> batch = read_checked_batch(arguments.batch, model->cell());
+  const Result<CheckedBatch> batch = read_checked_batches(arguments.batches, model->cell());
   if (!batch) return tl::make_unexpected(batch.error());
-  const Evaluation evaluation = model->evaluate(batch->rows());
+  const Result<InWorld> world = in_world_of(*model, batch->rows());
+  if (!world) return tl::make_unexpected(world.error());
+  const Evaluation evaluation = model->evaluate(world->batch);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id()) +
-           evaluation_table(evaluation),
+           evaluation_table(evaluation) + located_text(*world),
        {arguments.json});
   return write_json(arguments.json, evaluation_json(evaluation));
 }
@@ -127,9 +181,11 @@ Status report(const ReportArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   std::optional<MeasurementBatch> batch;
   if (!arguments.batch.empty()) {
-    const Result<CheckedBatch> checked = read_checked_batch(arguments.batch, model->cell());
+    const Result<CheckedBatch> checked = read_checked_batches({arguments.batch}, model->cell());
     if (!checked) return tl::make_unexpected(checked.error());
-    batch = checked->rows();
+    Result<InWorld> world = in_world_of(*model, checked->rows());
+    if (!world) return tl::make_unexpected(world.error());
+    batch = std::move(world->batch);
   }
   if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
   tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
@@ -141,8 +197,7 @@ void add_train(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<TrainArguments>();
   CLI::App* command = app.add_subcommand("train", "Calibrate a cell's robot, and learn what calibration leaves over");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
-      ->required();
+  add_batches_option(*command, arguments->batches)->required();
   command->add_option(
       "--level", arguments->level,
       "What to identify instead of the cell's error sources: M0 (nothing), M1 (base), M2 (base, geometry), M3 "
@@ -156,12 +211,17 @@ void add_train(CLI::App& app, Action& chosen) {
   command->add_option("--refit", arguments->refit, "With --from: error sources to identify anew, joined by commas")
       ->needs("--from")
       ->capture_default_str();
+  command->add_option("--fleet", arguments->fleet,
+                      "Model file of a robot of the same type, once for each, at least three: what they have in common "
+                      "is expected of this one, but for what it is unlike them in");
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
                    "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
+  command->add_flag("--as-read", arguments->as_read,
+                    "Learn from the positions as they are read, though another reading of the batch fits better");
   command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });
@@ -172,8 +232,7 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
-  command->add_option("--batch", arguments->batch, "Measurements (CSV: joints in deg, rails in mm; positions in mm)")
-      ->required();
+  add_batches_option(*command, arguments->batches)->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }

@@ -1,10 +1,13 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
+#include <limits>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/units.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/pose_columns.h"
 #include "server/plan/measuring_program.h"
@@ -21,6 +24,7 @@ struct PlanArguments {
   PlanOptions options;
   ProgramOptions program;
   bool positions_only = false;
+  int check = 0;  // poses of a check; 0: no check is planned
 };
 
 /// `lhs`, `observability`, or `separate:CAUSE,CAUSE`; a cause may hold a colon of its own.
@@ -97,6 +101,22 @@ std::string separation_text(const PlanArguments& arguments, const Plan::Separati
                      in_words(options.other), separation.needs);
 }
 
+/// The change that this check shows worst.
+const SmallestEffect* hardest_seen(const Plan& plan) {
+  const auto rms = [](const SmallestEffect& one) { return one.rms.value_or(std::numeric_limits<double>::infinity()); };
+  const auto worst = std::max_element(plan.smallest.begin(), plan.smallest.end(),
+                                      [&](const auto& one, const auto& other) { return rms(one) < rms(other); });
+  return worst == plan.smallest.end() ? nullptr : &*worst;
+}
+
+std::string check_text(const Plan& plan) {
+  const SmallestEffect* hardest = hardest_seen(plan);
+  if (hardest == nullptr) return "";
+  if (!hardest->rms) return fmt::format("No change of {} would be seen\n", in_words(hardest->cause));
+  return fmt::format("Every single change of {:.3f} mm rms is seen with 95 %, hardest {}, beside the tracker's noise\n",
+                     to_mm(*hardest->rms), in_words(hardest->cause));
+}
+
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
   const DrawCount& draw = plan.draw;
   if (!arguments.from.empty()) {
@@ -111,7 +131,7 @@ std::string in_words(const Cell& cell, const PlanArguments& arguments, const Pla
                         plan.criterion_of_latin_hypercube);
   }
   if (plan.separation) text += separation_text(arguments, *plan.separation);
-  return text;
+  return text + check_text(plan);
 }
 
 ordered_json as_json(const Separability& separability) {
@@ -133,7 +153,11 @@ ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Pla
                        {"outside_workspace", draw.outside},
                        {"out_of_sight", draw.unseen},
                        {"near_joint_limit", draw.no_way}};
-  if (arguments.options.criterion != PlanCriterion::kLatinHypercube) {
+  if (arguments.check > 0) {
+    const SmallestEffect* hardest = hardest_seen(plan);
+    const bool seen = hardest != nullptr && hardest->rms.has_value();
+    json["would_have_seen_mm"] = seen ? ordered_json(to_mm(*hardest->rms)) : ordered_json(nullptr);
+  } else if (arguments.options.criterion != PlanCriterion::kLatinHypercube) {
     json["log_det"] = plan.criterion;
     json["log_det_lhs"] = plan.criterion_of_latin_hypercube;
   }
@@ -155,10 +179,15 @@ Result<Plan> plan_from(const Cell& cell, const std::string& path) {
 }
 
 Status plan(PlanArguments arguments) {
-  if (arguments.options.count == 0 && arguments.from.empty()) {
-    return failure(ErrorCode::kUsage, "--count or --from is required").of("--count");
+  if (arguments.options.count == 0 && arguments.check == 0 && arguments.from.empty()) {
+    return failure(ErrorCode::kUsage, "--count, --check or --from is required").of("--count");
   }
   if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
+  if (arguments.check > 0) {
+    arguments.criterion = "check";
+    arguments.options.criterion = PlanCriterion::kCheck;
+    arguments.options.count = arguments.check;
+  }
   arguments.options.orientation = !arguments.positions_only;
   Result<Cell> read = read_cell_to_train(arguments.cell, {.bias = false});
   if (!read) return tl::make_unexpected(read.error());
@@ -182,13 +211,22 @@ void add_plan_command(CLI::App& app, Action& chosen) {
   PlanOptions& options = arguments->options;
   CLI::App* command = app.add_subcommand("plan", "Plan measuring poses for a cell, and write them as robot programs");
   command->add_option("--cell", arguments->cell, "Cell file (YAML)")->required();
-  CLI::Option* count = command->add_option("--count", options.count, "Number of poses; this or --from is required")
-                           ->check(CLI::Range(1, 1000000));
+  CLI::Option* count =
+      command->add_option("--count", options.count, "Number of poses; this, --check or --from is required")
+          ->check(CLI::Range(1, 1000000));
+  CLI::Option* check =
+      command
+          ->add_option(
+              "--check", arguments->check,
+              "Number of poses of a health check (command check): those that show most of what may have changed")
+          ->check(CLI::Range(1, 1000))
+          ->excludes(count);
   command
       ->add_option("--from", arguments->from,
                    "Poses chosen already (CSV: joints in deg, rails in mm), as diagnose --next-poses writes them, to "
                    "write programs of")
-      ->excludes(count);
+      ->excludes(count)
+      ->excludes(check);
   add_seed_option(*command, options.seed, "Seed of the draw");
   command
       ->add_option(

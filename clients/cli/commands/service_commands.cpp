@@ -16,10 +16,10 @@ using nlohmann::ordered_json;
 
 /// The options of all these commands; each uses its own part.
 struct ServiceArguments {
-  std::string cell, batch, batch_id, level, bias, model, output, json;
+  std::string cell, batch, batch_id, level, bias, model, output, json, reason;
   std::vector<std::string> batch_ids;
   std::int64_t job = 0;
-  bool watch = false, release = false;
+  bool watch = false, release = false, force = false;
   double limit_s = 3600;
   ServiceOptions service;
 };
@@ -132,6 +132,34 @@ Status now_in_force(const std::string& cell, const Result<int>& version, const S
   return write_json(arguments.json, {{"cell", cell}, {"version", *version}});
 }
 
+client::ChangeOptions because(const ServiceArguments& arguments) {
+  client::ChangeOptions change;
+  change.reason = arguments.reason;
+  return change;
+}
+
+/// `now`: what the batch is afterwards.
+Status quarantine_changed(const std::string& cell, const std::string& batch, const Status& changed, const char* now,
+                          const ServiceArguments& arguments) {
+  if (!changed) return changed;
+  tell(fmt::format("cell {}: batch {} is {}\n", cell, batch, now), {arguments.json});
+  return write_json(arguments.json, {{"cell", cell}, {"batch", batch}, {"is", now}});
+}
+
+Status release(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  return quarantine_changed(*cell, arguments.batch_id, session.release(*cell, arguments.batch_id, because(arguments)),
+                            "released", arguments);
+}
+
+Status discard(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  return quarantine_changed(*cell, arguments.batch_id, session.discard(*cell, arguments.batch_id, because(arguments)),
+                            "discarded", arguments);
+}
+
 Status activate(client::Session& session, const ServiceArguments& arguments) {
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
@@ -140,13 +168,15 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
         .of("--model")
         .with_text(arguments.model);
   }
-  return now_in_force(model->cell, session.activate(model->cell, model->version), arguments);
+  client::ChangeOptions options = because(arguments);
+  options.force = arguments.force;
+  return now_in_force(model->cell, session.activate(model->cell, model->version, options), arguments);
 }
 
 Status rollback(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  return now_in_force(*cell, session.rollback(*cell), arguments);
+  return now_in_force(*cell, session.rollback(*cell, because(arguments)), arguments);
 }
 
 Status export_model(client::Session& session, const ServiceArguments& arguments) {
@@ -202,11 +232,48 @@ void add_cell(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it")->required();
 }
 
+void add_reason(CLI::App& command, ServiceArguments& arguments) {
+  command.add_option("--reason", arguments.reason, "Why, for the audit trail");
+}
+
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
   command.add_flag("--watch", arguments.watch, "Wait until the training is done, and say how it ended");
   command.add_option("--limit", arguments.limit_s, "Longest wait for the training, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+}
+
+/// What is in force, what may be learned from, and models as files.
+void add_model_changes(ServiceCommands& commands) {
+  commands.add(
+      "activate", "Put a stored version of a cell's model in force", activate,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
+        command.add_flag("--force", arguments.force,
+                         "Also where it was imported and is worse than the version in force on the poses held out");
+        add_reason(command, arguments);
+      });
+  commands.add("rollback", "Put back in force the model that was before", rollback,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 add_reason(command, arguments);
+               });
+  const auto add_batch = [](CLI::App& command, ServiceArguments& arguments) {
+    add_cell(command, arguments);
+    command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")->required();
+    add_reason(command, arguments);
+  };
+  commands.add("release", "Let later trainings take a batch that is in quarantine", release, add_batch);
+  commands.add("discard", "Let nothing take a batch any more", discard, add_batch);
+  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
+    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
+    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
+  });
+  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_cell(command, arguments);
+                 command.add_option("--model", arguments.model, "Model file to add")->required();
+               });
 }
 
 }  // namespace
@@ -255,21 +322,7 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->capture_default_str();
                });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
-  commands.add(
-      "activate", "Put a stored version of a cell's model in force", activate,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
-      });
-  commands.add("rollback", "Put back in force the model that was before", rollback, add_cell);
-  commands.add("export", "Fetch a model as a file", export_model, [](CLI::App& command, ServiceArguments& arguments) {
-    command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
-    command.add_option("-o,--output", arguments.output, "Model file to write")->required();
-  });
-  commands.add("import", "Add a model file to a cell's history; activate puts it in force", import_model,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 add_cell(command, arguments);
-                 command.add_option("--model", arguments.model, "Model file to add")->required();
-               });
+  add_model_changes(commands);
 }
 
 }  // namespace trammel::cli

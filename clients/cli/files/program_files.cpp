@@ -8,6 +8,8 @@
 
 #include "clients/cam/mark.h"
 #include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
 
 namespace trammel::cli {
 
@@ -121,6 +123,32 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
   }
   if (!any && !all) return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
   return before;
+}
+
+Result<std::map<std::string, Pose>> read_frames_csv(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::make_unexpected(text.error());
+  const Result<CsvTable> table = CsvTable::parse(*text, path);
+  if (!table) return tl::make_unexpected(table.error());
+  const Result<std::size_t> name = table->require("name");
+  if (!name) return tl::make_unexpected(name.error());
+  const auto columns = table->all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
+  if (!columns) return tl::make_unexpected(columns.error());
+  if (columns->empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
+  std::map<std::string, Pose> frames;
+  for (std::size_t row = 0; row < table->size(); ++row) {
+    Vector3 p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Result<double> value = table->number(row, (*columns)[k], 1e6);
+      if (!value) return tl::make_unexpected(value.error());
+      p(static_cast<Eigen::Index>(k)) = from_mm(*value);
+    }
+    const Result<Matrix3> R = table->rotation(row, {columns->begin() + 3, columns->end()});
+    if (!R) return tl::make_unexpected(R.error());
+    if (!frames.emplace(table->field(row, *name), make_pose(*R, p)).second)
+      return table->refuse(row, "{} is there twice", table->field(row, *name)).of("name");
+  }
+  return frames;
 }
 
 Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,10 @@ struct ProgramFiles {
 /// Of a program that is marked as corrected: each file as it was before. Refuses a file whose original is not kept
 /// beside it, or is not the one that the mark names. `all`: also where no file is marked, as for a new correction.
 [[nodiscard]] Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all);
+
+/// Values of tools and frames that a program leaves open (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the
+/// robot's base, tools from the flange).
+[[nodiscard]] Result<std::map<std::string, Pose>> read_frames_csv(const std::string& path);
 
 /// Where each file goes: `output` itself for a single file, else into the folder of that name. Refuses to write over
 /// an input.

@@ -16,8 +16,9 @@ using nlohmann::ordered_json;
 constexpr std::chrono::hours kLongest{1};
 
 Result<std::int64_t> ask(client::Session& session, const std::string& cell, const DiagnoseArguments& arguments) {
-  if (!std::filesystem::exists(arguments.batch)) return session.diagnose(cell, arguments.batch, "", arguments.apply);
-  const Result<std::string> csv = read_text_file(arguments.batch);
+  const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
+  if (!std::filesystem::exists(batch)) return session.diagnose(cell, batch, "", arguments.apply);
+  const Result<std::string> csv = read_text_file(batch);
   if (!csv) return tl::make_unexpected(csv.error());
   return session.diagnose(cell, "", *csv, arguments.apply);
 }
@@ -60,7 +61,11 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
         .next("a service keeps its models itself");
   }
   Outputs outputs = outputs_of(arguments);
-  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", arguments.batch}}); !fine) return fine;
+  if (arguments.batches.size() > 1)
+    return failure(ErrorCode::kUsage, "a service diagnoses one batch, {} are named", arguments.batches.size())
+        .of("--batch");
+  const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}); !fine) return fine;
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto session = open_session(arguments.service);

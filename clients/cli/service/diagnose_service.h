@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
@@ -10,7 +11,8 @@ namespace trammel::cli {
 
 /// What `trammel diagnose` was asked.
 struct DiagnoseArguments {
-  std::string cell, batch, report, next_poses, json, model, cell_out;
+  std::string cell, report, next_poses, json, model, cell_out;
+  std::vector<std::string> batches;  ///< at a service one at most
   std::uint64_t seed = 1;
   bool apply = false;
   ServiceOptions service;
@@ -26,7 +28,7 @@ void say(const std::string& text, const DiagnoseArguments& arguments);
 [[nodiscard]] Status write_diagnosis(const nlohmann::ordered_json& json, std::string page, Outputs& outputs,
                                      const DiagnoseArguments& arguments);
 
-/// Has a service diagnose one of its batches (`batch` names it; empty: the newest) or the file `batch`, waits, and
+/// Has a service diagnose one of its batches (`batches` names it; none: the newest) or a file, waits, and
 /// writes what it found. Refuses if the result was to be put in force and was not.
 [[nodiscard]] Status diagnose_at_service(const DiagnoseArguments& arguments);
 

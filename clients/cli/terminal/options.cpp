@@ -64,6 +64,14 @@ void add_json_option(CLI::App& command, std::string& path) {
       ->type_name("FILE");
 }
 
+CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths) {
+  return command
+      .add_option("--batch", paths,
+                  "Measurements (CSV: joints in deg, rails in mm; positions in mm); again for each measuring session: "
+                  "the tracker may stand elsewhere in each")
+      ->allow_extra_args(false);
+}
+
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload) {
   command.add_option("--tool", tool,
                      "Tool id of the cell, for rows that name none; may be left out where the cell has only one");

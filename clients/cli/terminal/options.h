@@ -10,7 +10,8 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 /// Options that several commands have.
 namespace trammel::cli {
@@ -31,6 +32,8 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
 /// `--seed`: a whole number from 0.
 void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
 void add_json_option(CLI::App& command, std::string& path);
+/// `--batch FILE`, again for each: every one is a measuring session.
+CLI::Option* add_batches_option(CLI::App& command, std::vector<std::string>& paths);
 void add_tool_options(CLI::App& command, std::string& tool, std::string& payload);
 
 /// `cell` or `cell@version`, as --model and --service name a model.

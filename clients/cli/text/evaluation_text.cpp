@@ -215,6 +215,53 @@ ordered_json parameters_json(const std::vector<IdentifiedParameter>& parameters)
   return list;
 }
 
+ordered_json sessions_json(const CompensatedModel::Parts& parts) {
+  ordered_json list = ordered_json::array();
+  for (const SessionSetting& session : parts.sessions) {
+    list.push_back({{"session_id", session.id},
+                    {"poses", session.poses},
+                    {"first_pose_id", session.first_pose},
+                    {"own_noise_mm", to_mm(session.own_noise)},
+                    {"own_noise_deg", to_deg(session.own_noise_rotation)}});
+  }
+  for (const LeftOutSession& session : parts.sessions_left_out)
+    list.push_back({{"session_id", session.id}, {"left_out", session.why}});
+  return list;
+}
+
+/// As the contract names a cause: `cause`, `joint` from 1 where it concerns one.
+ordered_json cause_json(const std::string& source) {
+  const std::string spelled = source.substr(0, source.find('@'));
+  const std::size_t colon = spelled.find(':');
+  ordered_json json = {{"cause", spelled.substr(0, colon)}};
+  if (colon != std::string::npos) json["joint"] = std::stoi(spelled.substr(colon + 1));
+  return json;
+}
+
+ordered_json changes_json(const CompensatedModel::Parts& parts) {
+  ordered_json list = ordered_json::array();
+  for (const Change& change : parts.changes) {
+    ordered_json json = cause_json(change.source);
+    const SessionSetting& since = parts.sessions[change.session];
+    json["since"] = {{"session_id", since.id}, {"pose_id", since.first_pose}};
+    json["source"] = change.source;
+    json["strength"] = change.gain;
+    json["p_value"] = change.p_value;
+    std::size_t next = 0;
+    for (const ErrorSourcePtr& source : parts.physics.sources) {
+      for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
+        if (source->name() != change.source) continue;
+        const ordered_json one = parameters_json({parts.parameters[next]});
+        json["parameters"][one.front().at("name").get<std::string>()] = one.front();
+      }
+    }
+    json["could_also_be"] = ordered_json::array();
+    for (const std::string& other : change.could_also_be) json["could_also_be"].push_back(cause_json(other));
+    list.push_back(json);
+  }
+  return list;
+}
+
 ordered_json unidentifiable_json(const std::vector<UnidentifiableCombination>& combinations) {
   ordered_json list = ordered_json::array();
   for (const UnidentifiableCombination& one : combinations) {
@@ -277,6 +324,8 @@ ordered_json model_json(const CompensatedModel& model) {
   json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
   json["training"] = evaluation_json(parts.training);
   if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
+  if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
+  if (!parts.sessions.empty()) json["changes"] = changes_json(parts);
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;

@@ -37,6 +37,8 @@ const char* spelled(cam::Coordinates coordinates) {
       return "m_rotvec_rad";
     case cam::Coordinates::kJoints:
       return "joints_deg";
+    case cam::Coordinates::kJointRadians:
+      return "joints_rad";
   }
   return "";
 }

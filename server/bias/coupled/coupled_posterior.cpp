@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/bias/process/inducing_points.h"
 #include "server/numerics/numerics.h"
 
 namespace trammel {
@@ -23,6 +24,11 @@ constexpr Index kTargets = 64;   // at once: the matrices pass through the cache
 // standard deviations of R A⁻¹ Rᵀ change by |δ|/σ at most. With |δ| = kPassedOver σ³/σ_f both stay below the noise.
 constexpr double kPassedOver = 1e-3;
 constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one in so many matters
+
+// What few points leave unexplained of any pose, of the noise variance: what they say of the columns is then off by no
+// more of a posterior variance than R A⁻¹ Rᵀ of their errors, which is below it.
+constexpr double kUnexplained = 1e-4;
+constexpr Index kWorthFew = 3;  // few points pay where they are less than one in so many
 
 AlignedMatrix packed_inverse_root(const MatrixXd& A) {
   const Index p = A.rows();
@@ -86,7 +92,10 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   for (Index d = 0; d < data.y.cols(); ++d) {
     const auto output = static_cast<std::size_t>(d);
     const VectorXd own = data.y.col(d) - data.columns[output] * posterior.weights_;
-    const VarianceForm kept = form == VarianceForm::kCompressed ? VarianceForm::kCompressedOnly : form;
+    const bool is_served = form == VarianceForm::kServed || form == VarianceForm::kLearned;
+    const VarianceForm kept = is_served                           ? VarianceForm::kServedAsPart
+                              : form == VarianceForm::kCompressed ? VarianceForm::kCompressedOnly
+                                                                  : form;
     auto process = GaussianProcess::condition(kernel, data.q, own, data.noise_shape, at.outputs[output], kept);
     if (!process) return std::nullopt;
     posterior.outputs_.push_back(std::move(*process));
@@ -106,7 +115,28 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   posterior.kernel_ = std::move(kernel);
   posterior.packed_root_ = packed_inverse_root(solution->A);
   posterior.features_ = std::move(solution->features);
+  posterior.few_.resize(posterior.outputs_.size());
+  if (form == VarianceForm::kServed || form == VarianceForm::kLearned) {
+    for (std::size_t d = 0; d < posterior.outputs_.size(); ++d) posterior.explain_by_few(d, data.noise_shape);
+  }
   return posterior;
+}
+
+// With R_xx ≈ R_xu R_uu⁻¹ R_ux.
+void CoupledPosterior::explain_by_few(std::size_t output, const VectorXd& noise) {
+  const GpHyperparameters& at = hyperparameters_[output];
+  const double ratio = std::exp(2 * (at.log_noise_stddev - at.log_signal_stddev));
+  const Index most = points_ / kWorthFew;
+  const std::vector<Index> points =
+      spanning_points(*kernel_, at.kernel, features_[output], points_, kUnexplained * ratio * noise.minCoeff(), most);
+  if (static_cast<Index>(points.size()) == most) return;
+  const auto few = InducingPoints::at(*kernel_, at.kernel, features_[output], points);
+  if (!few) return;
+  const Index r = few->size();
+  const AlignedMatrix basis = few->basis(*kernel_, at.kernel, rows_of(features_[output], 0, points_));
+  const MatrixXd by_basis = explained_[output] * basis.map().topLeftCorner(r, points_).transpose();
+  explained_[output] = by_basis * few->root().map().topLeftCorner(r, r);
+  few_[output] = {few->features().copy(), r};
 }
 
 // B: the rows and columns of C⁻¹ that belong to the poses left out. Their covariance is B⁻¹, their error B⁻¹ α.
@@ -208,9 +238,11 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
   const double signal = std::exp(2 * at.log_signal_stddev);
   MatrixXd targets(q.rows(), kernel_->feature_count(q.cols()));
   kernel_->features(at.kernel, q, targets.data(), q.rows());
-  AlignedMatrix cross(padded_rows(points_), q.rows());
-  kernel_->tile(at.kernel, {features_[output].data(), points_, features_[output].rows()},
-                {targets.data(), q.rows(), q.rows()}, cross.data(), cross.rows());
+  const AlignedMatrix& known_of = few_[output] ? few_[output]->features : features_[output];
+  const Index points = few_[output] ? few_[output]->size : points_;
+  AlignedMatrix cross(padded_rows(points), q.rows());
+  kernel_->tile(at.kernel, rows_of(known_of, 0, points), {targets.data(), q.rows(), q.rows()}, cross.data(),
+                cross.rows());
   Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()), VectorXd(q.rows())};
   kernel_->diagonal(at.kernel, {targets.data(), q.rows(), q.rows()}, part.prior.data());
   part.prior *= signal;
@@ -218,10 +250,14 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
   part.prior += part.R.colwise().squaredNorm().transpose();
   std::vector<Index> far_reaching;
   for (Index i = 0; i < q.rows(); ++i) {
-    auto k = cross.map().col(i).head(points_);
+    auto k = cross.map().col(i).head(points);
     k *= signal;
+    if (inverse_[output].empty()) {
+      far_reaching.push_back(i);
+      continue;
+    }
     const std::vector<Index> near = near_poses(k.data(), output);
-    if (static_cast<Index>(near.size()) * kWorthPassing > points_ || inverse_[output].empty()) {
+    if (static_cast<Index>(near.size()) * kWorthPassing > points) {
       far_reaching.push_back(i);
       continue;
     }
@@ -229,7 +265,7 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
     part.known[i] = std::clamp(part.known[i] - quadratic(inverse_[output], near, k.data()), 0.0, part.known[i]);
   }
   if (far_reaching.empty()) return part;
-  const MatrixXd k = cross.map().topRows(points_)(Eigen::all, far_reaching);
+  const MatrixXd k = cross.map().topRows(points)(Eigen::all, far_reaching);
   const MatrixXd explained = explained_[output] * k;
   const std::vector<PosteriorVariance> own = outputs_[output].variance(q(far_reaching, Eigen::all));
   for (std::size_t i = 0; i < far_reaching.size(); ++i) {
@@ -241,7 +277,6 @@ CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const Matrix
 
 std::vector<Index> CoupledPosterior::near_poses(const double* k, std::size_t output) const {
   std::vector<Index> near;
-  if (inverse_[output].empty()) return near;
   const double most = passed_over_[output] * passed_over_[output];  // sum of squares
   double passed = 0;
   std::vector<std::pair<double, Index>> smallest_first;

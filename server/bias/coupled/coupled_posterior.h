@@ -29,10 +29,6 @@ class CoupledPosterior {
   /// 0.003 of its noise variance (bound: DECISIONS.md).
   [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
                                                        const std::vector<Eigen::MatrixXd>& columns) const;
-  /// As GaussianProcess has it.
-  void prepare(const std::function<bool()>& go_on) const {
-    for (const GaussianProcess& output : outputs_) output.prepare(go_on);
-  }
   /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
@@ -53,13 +49,15 @@ class CoupledPosterior {
  private:
   CoupledPosterior() = default;
   void leave_out(const CoupledSolution& solution, const CoupledData& data);
+  /// Takes `explained_` of an output from few of its points, where these stand for all.
+  void explain_by_few(std::size_t output, const Eigen::VectorXd& noise);
   /// What one output contributes at some targets.
   struct Part {
     Eigen::MatrixXd R;      // p x M: R_dᵀ
     Eigen::VectorXd known;  // k_d** - k_dᵀ M_d⁻¹ k_d
     Eigen::VectorXd prior;  // of both parts
   };
-  // The poses whose covariance matters, rising; empty where no inverse is kept.
+  // The poses whose covariance matters, rising.
   [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
   [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
   // R A⁻¹ Rᵀ of target i.
@@ -73,10 +71,15 @@ class CoupledPosterior {
   std::vector<GpHyperparameters> hyperparameters_;
   std::vector<GaussianProcess> outputs_;  // of y_d - H_d ŵ
   std::vector<AlignedMatrix> features_;
-  std::vector<Eigen::MatrixXd> explained_;    // D: Hᵀ M⁻¹, p x N
-  std::vector<std::vector<double>> inverse_;  // D: M⁻¹, lower triangle row after row; empty: not needed
-  std::vector<double> passed_over_;           // D: root sum of squares of the covariances that do not matter
-  AlignedMatrix packed_root_;                 // L⁻¹ of A = L Lᵀ, as Numerics packs it
+  struct FewPoints {
+    AlignedMatrix features;
+    Eigen::Index size = 0;
+  };
+  std::vector<std::optional<FewPoints>> few_;  // D: u; empty: all points
+  std::vector<Eigen::MatrixXd> explained_;     // D: Hᵀ M⁻¹, p x N; of few points Hᵀ M⁻¹ R_xu R_uu⁻¹
+  std::vector<std::vector<double>> inverse_;   // D: M⁻¹, lower triangle row after row; empty: not needed
+  std::vector<double> passed_over_;            // D: root sum of squares of the covariances that do not matter
+  AlignedMatrix packed_root_;                  // L⁻¹ of A = L Lᵀ, as Numerics packs it
   Eigen::VectorXd column_scale_;
   Eigen::VectorXd weights_;
   double log_likelihood_ = 0;

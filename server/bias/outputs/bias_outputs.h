@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -62,9 +61,6 @@ class BiasOutputs {
       const Eigen::MatrixXd& /*y*/, const std::vector<Eigen::Index>& /*points*/) const {
     return std::nullopt;
   }
-
-  /// Works out ahead what predictions would work out when they need it, while `go_on` says so.
-  virtual void prepare(const std::function<bool()>& /*go_on*/) const {}
 
   /// With more points, or without some (rising indices); null where the outputs must be conditioned anew.
   [[nodiscard]] virtual std::shared_ptr<const BiasOutputs> with(const OutputData& /*more*/) const { return nullptr; }

@@ -72,7 +72,6 @@ class CoupledOutputs final : public BiasOutputs {
     return predictions;
   }
 
-  void prepare(const std::function<bool()>& go_on) const override { posterior_.prepare(go_on); }
   MatrixXd nearby_mean(const MatrixXd& q) const override { return posterior_.own_mean(q); }
 
   VectorXd parameter_weights() const override { return parameter_weights_; }

@@ -86,10 +86,6 @@ class IndependentOutputs final : public BiasOutputs {
     return error;
   }
 
-  void prepare(const std::function<bool()>& go_on) const override {
-    for (const LocalExperts& output : outputs_) output.prepare(go_on);
-  }
-
   BiasOutputsPtr with(const OutputData& more) const override {
     std::vector<LocalExperts> grown;
     for (Index d = 0; d < count(); ++d) {

@@ -8,6 +8,7 @@
 #include "server/base/check.h"
 #include "server/bias/process/inducing_points.h"
 #include "server/numerics/numerics.h"
+#include "server/numerics/seeded_random.h"
 
 namespace trammel {
 namespace {
@@ -20,16 +21,45 @@ constexpr double kSmallestSignal = 1e-9;  // m; keeps log σ_f finite for an out
 constexpr double kLeastLogRatio = -20.0;  // of η: with less noise thousands of smooth points are not positive definite
 
 // The compressed variance.
-constexpr double kUnexplained = 1e-3;      // of the noise variance, at any training point: far below what anybody sees
-constexpr double kMostKept = 0.75;         // of the points: with more, little time would be saved
-constexpr Index kMostKeptPoints = 2000;    // finding them takes time with the square of their number
-constexpr Index kMostBeforeRegions = 400;  // with more, regions are faster
-constexpr double kClosely = 0.01;          // of the standard deviation of a measurement
-constexpr double kRoughly = 0.03;
+constexpr double kUnexplained = 1e-3;     // of the noise variance, at any training point: far below what anybody sees
+constexpr double kMostKept = 0.75;        // of the points: with more, little time would be saved
+constexpr Index kMostKeptPoints = 2000;   // finding them takes time with the square of their number
 constexpr Index kFewestToCompress = 200;  // below that the exact variance is fast enough
 
-bool is_by_regions(VarianceForm form) {
-  return form == VarianceForm::kRegional || form == VarianceForm::kRegionalOnly || form == VarianceForm::kRough;
+// The variance that is served.
+constexpr Index kMostServedPoints = 400;  // with more, all points in single precision are nearly as fast
+constexpr double kFewTell = 0.02;         // of the variance: what few points may leave out
+constexpr Index kLeftOutPoints = 128;     // of the points, that near ones are tried at
+constexpr Index kAsked = 64;              // joint vectors between the points, that few points are tried at
+// What few points may be too small by beside the places that were tried: measured 0.2 % of a standard deviation, and
+// 1e-5 of the noise variance.
+constexpr double kFewSlack = 1.004;
+constexpr double kFewSlackOfNoise = 1e-4;
+// Of the smallest noise's root: five standard deviations of 2 tᵀδ, δ what rounding to single precision (6e-8) makes of
+// t.
+constexpr double kRounded = 3.5e-7;
+constexpr double kMostRounding = 1e-3;  // of the variance of a measurement
+
+bool is_served(VarianceForm form) {
+  return form == VarianceForm::kServed || form == VarianceForm::kServedAsPart || form == VarianceForm::kLearned;
+}
+
+// Joint vectors as they may be asked for: on the way from a training pose to another, and anywhere in their range.
+MatrixXd asked_for(const MatrixXd& q) {
+  SeededRandom random(1);
+  const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(q.rows())); };
+  const Eigen::RowVectorXd low = q.colwise().minCoeff();
+  const Eigen::RowVectorXd high = q.colwise().maxCoeff();
+  MatrixXd asked(kAsked, q.cols());
+  for (Index i = 0; i < kAsked; ++i) {
+    if (i % 2 == 0) {
+      const Index from = any();
+      asked.row(i) = q.row(from) + random.uniform(0, 1) * (q.row(any()) - q.row(from));
+    } else {
+      for (Index j = 0; j < q.cols(); ++j) asked(i, j) = random.uniform(low[j], high[j]);
+    }
+  }
+  return asked;
 }
 
 // [R + η diag(w), Yᵀ; Y, 0], lower triangle, padding zero.
@@ -167,8 +197,8 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   gp.kernel_ = std::move(kernel);
   gp.parameters_ = hyperparameters.kernel;
   gp.size_ = n;
-  gp.features_ = feature_table(*gp.kernel_, q);
-  gp.kernel_->features(gp.parameters_, q, gp.features_.data(), gp.features_.rows());
+  gp.features_ = std::make_shared<AlignedMatrix>(feature_table(*gp.kernel_, q));
+  gp.kernel_->features(gp.parameters_, q, gp.features_->data(), gp.features_->rows());
   gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
   gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
   const double ratio = gp.noise_variance_ / gp.signal_variance_;
@@ -177,19 +207,17 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
 
   AlignedMatrix matrix = augmented_storage(n, 1);
   AlignedMatrix work(numerics().work_size(n + 1), 1);
-  assemble_augmented(*gp.kernel_, gp.parameters_, gp.features_, ratio, noise_shape, y, &matrix);
+  assemble_augmented(*gp.kernel_, gp.parameters_, *gp.features_, ratio, noise_shape, y, &matrix);
   if (!numerics().inverse_root(n, 1, matrix.data(), matrix.rows(), work.data(), &gp.log_det_)) return std::nullopt;
 
   gp.weights_ = {padded_rows(n), 1};
   gp.weights_.map().col(0).head(n) = -matrix.map().row(n).head(n).transpose();
   gp.inverse_diagonal_.resize(n);  // of M⁻¹ = L⁻ᵀ L⁻¹
   for (Index i = 0; i < n; ++i) gp.inverse_diagonal_[i] = matrix.map().col(i).segment(i, n - i).squaredNorm();
-  gp.exact_ = VarianceTable(gp.features_.copy(), n, std::move(matrix));
+  gp.exact_ = VarianceTable(gp.features_, n, std::move(matrix));
   gp.finish(form);
-  if (is_by_regions(form) && !gp.compressed_ && n >= kFewestToCompress) {
-    const double tolerance = form == VarianceForm::kRough ? kRoughly : kClosely;
-    gp.regional_ = std::make_shared<RegionalVariance>(gp.kernel_, gp.parameters_, q, gp.noise_, tolerance);
-  }
+  if (is_served(form)) gp.make_served(asked_for(q), form == VarianceForm::kServedAsPart);
+  if (form != VarianceForm::kLearned && is_served(form) && (gp.near_ > 0 || gp.compressed_)) gp.exact_ = {};
   return gp;
 }
 
@@ -198,34 +226,33 @@ void GaussianProcess::finish(VarianceForm form) {
   log_likelihood_ = -0.5 * (y_.dot(weights) / signal_variance_ + log_det_ +
                             static_cast<double>(size_) * (std::log(signal_variance_) + kLogTwoPi));
   VectorXd prior(size_);
-  kernel_->diagonal(parameters_, rows_of(features_, 0, size_), prior.data());
+  kernel_->diagonal(parameters_, rows_of(*features_, 0, size_), prior.data());
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
   leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
-  if (form != VarianceForm::kExact) compress(is_by_regions(form) ? kMostBeforeRegions : kMostKeptPoints);
-  const bool only = form != VarianceForm::kCompressed && form != VarianceForm::kRegional;
-  if (only && compressed_) exact_ = {};
+  if (form == VarianceForm::kCompressed || form == VarianceForm::kCompressedOnly) compress(kMostKeptPoints);
+  if (form == VarianceForm::kCompressedOnly && compressed_) exact_ = {};
 }
 
 std::vector<double> GaussianProcess::root_rows(Index more) const {
   if (exact_.size() == size_) return exact_.rows(more);
   AlignedMatrix matrix = augmented_storage(size_, 1);
   AlignedMatrix work(numerics().work_size(size_ + 1), 1);
-  assemble_augmented(*kernel_, parameters_, features_, 1.0, noise_, y_, &matrix);
+  assemble_augmented(*kernel_, parameters_, *features_, 1.0, noise_, y_, &matrix);
   double log_det = 0;
   const bool positive = numerics().inverse_root(size_, 1, matrix.data(), matrix.rows(), work.data(), &log_det);
   TRAMMEL_CHECK(positive);  // it was before
-  return VarianceTable(features_.copy(), size_, std::move(matrix)).rows(more);
+  return VarianceTable(features_, size_, std::move(matrix)).rows(more);
 }
 
 void GaussianProcess::compress(Index at_most) {
   if (size_ < kFewestToCompress) return;
   const Index most = std::min(at_most, static_cast<Index>(kMostKept * static_cast<double>(size_)));
   const double tolerance = kUnexplained * noise_.minCoeff();
-  const std::vector<Index> points = spanning_points(*kernel_, parameters_, features_, size_, tolerance, most);
+  const std::vector<Index> points = spanning_points(*kernel_, parameters_, *features_, size_, tolerance, most);
   if (static_cast<Index>(points.size()) == most) return;
-  auto few = InducingPoints::at(*kernel_, parameters_, features_, points);
+  auto few = InducingPoints::at(*kernel_, parameters_, *features_, points);
   if (!few) return;
-  const FeatureBlock all = rows_of(features_, 0, size_);
+  const FeatureBlock all = rows_of(*features_, 0, size_);
   few->learn(*kernel_, parameters_, all, noise_, y_);
   auto posterior = few->posterior();
   if (!posterior) return;
@@ -238,9 +265,72 @@ void GaussianProcess::compress(Index at_most) {
   compressed_ = std::move(posterior->variance);
 }
 
+NearPoints GaussianProcess::near_points(Index count) const {
+  return {*kernel_, parameters_, *features_, noise_, count};
+}
+
+VectorXd GaussianProcess::at_most(const VectorXd& left, bool as_part) const {
+  const double noise = noise_.mean();
+  VectorXd most = (1 + kFewTell) * left;
+  if (as_part) {
+    most.array() += kFewTell * noise;
+  } else {
+    most += kFewTell * left.cwiseMin(noise);
+  }
+  return most;
+}
+
+bool GaussianProcess::near_is_enough(Index count, const VectorXd& most_of_points, const FeatureBlock& asked,
+                                     const VectorXd& most) const {
+  const NearPoints near = near_points(count);
+  double prior = 0;
+  for (Index i = 0; i < size_; i += (size_ + kLeftOutPoints - 1) / kLeftOutPoints) {
+    const FeatureBlock point = rows_of(*features_, i, 1);
+    kernel_->diagonal(parameters_, point, &prior);
+    if (near.left_of(point, prior, i) > most_of_points[i]) return false;
+  }
+  for (Index i = 0; i < asked.rows; ++i) {
+    const FeatureBlock target = {asked.data + i, 1, asked.ld};
+    kernel_->diagonal(parameters_, target, &prior);
+    if (near.left_of(target, prior) > most[i]) return false;
+  }
+  return true;
+}
+
+void GaussianProcess::make_served(const MatrixXd& q, bool as_part) {
+  if (size_ < kFewestToCompress) return;
+  const MatrixXd targets = target_features(*kernel_, parameters_, q);
+  const FeatureBlock asked = rows_of(targets, 0, q.rows());
+  VectorXd left(q.rows());
+  VectorXd prior(q.rows());
+  exact_.shares(*kernel_, parameters_, asked, left.data(), prior.data());
+  const VectorXd most = at_most(left, as_part);
+  const VectorXd most_of_points = at_most(inverse_diagonal_.cwiseInverse() - noise_, as_part);
+  for (const Index count : {NearPoints::kMost / 2, NearPoints::kMost}) {
+    if (!near_is_enough(count, most_of_points, asked, most)) continue;
+    near_ = count;
+    return;
+  }
+  compress(kMostServedPoints);
+  if (compressed_) {
+    VectorXd few(q.rows());
+    compressed_->shares(*kernel_, parameters_, asked, few.data(), prior.data());
+    const double factor = kFewSlack * std::max(1.0, left.cwiseQuotient(few).maxCoeff());
+    const double more = kFewSlackOfNoise * noise_.minCoeff();
+    if ((factor * few.array() + more <= at_most(left, true).array()).all()) {
+      compressed_->widen(factor, more);
+      return;
+    }
+    compressed_.reset();
+  }
+  const double rounding = kRounded * prior.maxCoeff() / std::sqrt(noise_.minCoeff());
+  if (rounding <= kMostRounding * (left.minCoeff() + noise_.mean())) compressed_ = exact_.in_single_precision(rounding);
+}
+
 void GaussianProcess::mean(const MatrixXd& q, double* out) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
-  kernel_->weighted_sum(parameters_, rows_of(features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(), out);
+  kernel_->weighted_sum(parameters_, rows_of(*features_, 0, size_), rows_of(targets, 0, q.rows()), weights_.data(),
+                        out);
 }
 
 std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) const {
@@ -248,8 +338,10 @@ std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) cons
   VectorXd posterior(q.rows());
   VectorXd prior(q.rows());
   const FeatureBlock asked = rows_of(targets, 0, q.rows());
-  if (regional_) {
-    regional_->shares(exact_, asked, posterior.data(), prior.data());
+  if (near_ > 0) {
+    kernel_->diagonal(parameters_, asked, prior.data());
+    const NearPoints near = near_points(near_);
+    for (Index i = 0; i < q.rows(); ++i) posterior[i] = near.left_of(rows_of(targets, i, 1), prior[i]);
   } else {
     const VarianceTable& table = compressed_ ? *compressed_ : exact_;
     table.shares(*kernel_, parameters_, asked, posterior.data(), prior.data());

@@ -2,14 +2,13 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <vector>
 
 #include "server/bias/kernels/kernel.h"
-#include "server/bias/process/regional_variance.h"
+#include "server/bias/process/near_points.h"
 #include "server/bias/process/variance_table.h"
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/bfgs.h"
@@ -80,19 +79,19 @@ struct GpHyperparameters {
 enum class VarianceForm {
   /// From a few of its points, where few are enough: several times faster. At the data it is never below the exact
   /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to be at most 0.2 %
-  /// too
-  /// small (bound: DECISIONS.md). Exact where many points would be needed.
+  /// too small (bound: DECISIONS.md). Exact where many points would be needed.
   kCompressed,
-  /// The same where 400 points are enough. Else from a few directions for each region of joint space
-  /// (regional_variance.h), some ten times faster for a single target. Then it is nowhere below the exact variance, and
-  /// above it by so much that the standard deviation of a measurement is too large by less than 1 % at most targets,
-  /// and
-  /// by 2 % where it is noticed: there the exact variance takes over.
-  kRegional,
-  /// As kRegional, and as kCompressedOnly where it is compressed.
-  kRegionalOnly,
-  /// As kRegionalOnly with 3 % and 6 %: for figures that decide nothing.
-  kRough,
+  /// What a model is served with. From the 24 or 48 points nearest to a target, where these say as much as all: mostly
+  /// of a signal below the noise. Else from at most 400 points that stand for all. Else from all points, in single
+  /// precision where the noise allows it. Never below the exact variance; above it by less than 2 % at every training
+  /// point when it is left out, mostly by far less. Nothing else is kept: what is for with(), without() and
+  /// left_out_error() alone is computed anew when one of them is called.
+  kServed,
+  /// The same variances, and all is kept.
+  kLearned,
+  /// As kServed, and less than 2 % is of the variance of a measurement: where what the process leaves is one part of
+  /// what is uncertain.
+  kServedAsPart,
   kExact,
   /// As kCompressed, and where it is compressed nothing else is kept: what grows with the square of the points and is
   /// for with(), without() and left_out_error() alone is computed anew when one of them is called.
@@ -127,11 +126,9 @@ class GaussianProcess {
 
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
 
-  /// How many points the variance is computed from, where it is the same for all targets.
-  [[nodiscard]] Eigen::Index variance_points() const { return compressed_ ? compressed_->size() : size_; }
-  /// Works out all regions before targets ask for them, while `go_on` says so.
-  void prepare(const std::function<bool()>& go_on) const {
-    for (std::size_t i = 0; regional_ && i < regional_->regions() && go_on(); ++i) regional_->prepare(exact_, i);
+  /// How many points the variance of a target is computed from.
+  [[nodiscard]] Eigen::Index variance_points() const {
+    return near_ > 0 ? near_ : compressed_ ? compressed_->size() : size_;
   }
   [[nodiscard]] double signal_variance() const { return signal_variance_; }
   [[nodiscard]] double noise_variance() const { return noise_variance_; }
@@ -150,24 +147,32 @@ class GaussianProcess {
   GaussianProcess() = default;
   // With the same kernel and hyperparameters, and room for `size` points.
   [[nodiscard]] GaussianProcess like(Eigen::Index size) const;
-  // Computes what follows from data, weights, inverse diagonal and root; not VarianceForm::kRegional.
+  // Computes what follows from data, weights, inverse diagonal and root.
   void finish(VarianceForm form);
   void compress(Eigen::Index at_most);
+  // Chooses what variances are served from, by what it makes of the points left out and at the rows of `q`.
+  void make_served(const Eigen::MatrixXd& q, bool as_part);
+  [[nodiscard]] NearPoints near_points(Eigen::Index count) const;
+  // The most that few points may leave where all leave `left`.
+  [[nodiscard]] Eigen::VectorXd at_most(const Eigen::VectorXd& left, bool as_part) const;
+  // Whether so many near points leave at most this at the points when they are left out, and at the rows of `asked`.
+  [[nodiscard]] bool near_is_enough(Eigen::Index count, const Eigen::VectorXd& most_of_points,
+                                    const FeatureBlock& asked, const Eigen::VectorXd& most) const;
   // Of the exact variance table; VarianceTable::rows().
   [[nodiscard]] std::vector<double> root_rows(Eigen::Index more) const;
 
   std::shared_ptr<const Kernel> kernel_;
   Eigen::VectorXd parameters_;
   Eigen::Index size_ = 0;
-  AlignedMatrix features_;
+  std::shared_ptr<AlignedMatrix> features_;
   Eigen::VectorXd y_;
   Eigen::VectorXd noise_;             // relative to σ_f²
   AlignedMatrix weights_;             // M⁻¹ y
   Eigen::VectorXd inverse_diagonal_;  // of M⁻¹
   double log_det_ = 0;                // of M
-  VarianceTable exact_;               // of all points; empty where only the compressed one is kept
+  VarianceTable exact_;               // of all points; empty where only what variances are computed from is kept
   std::optional<VarianceTable> compressed_;
-  std::shared_ptr<const RegionalVariance> regional_;
+  Eigen::Index near_ = 0;  // points that a target's variance is computed from; 0: not from near ones
   double signal_variance_ = 0;
   double noise_variance_ = 0;
   double log_likelihood_ = 0;

@@ -21,7 +21,7 @@ GaussianProcess GaussianProcess::like(Index size) const {
   gp.noise_variance_ = noise_variance_;
   gp.log_det_ = log_det_;
   gp.size_ = size;
-  gp.features_ = {padded_rows(size), features_.cols()};
+  gp.features_ = std::make_shared<AlignedMatrix>(padded_rows(size), features_->cols());
   gp.weights_ = {padded_rows(size), 1};
   gp.y_.resize(size);
   gp.noise_.resize(size);
@@ -34,18 +34,18 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   TRAMMEL_CHECK(y.size() == q.rows() && noise_shape.size() == q.rows());
   const Index size = size_ + q.rows();
   GaussianProcess gp = like(size);
-  gp.features_.map().topRows(size_) = features_.map().topRows(size_);
-  kernel_->features(parameters_, q, gp.features_.data() + size_, gp.features_.rows());
+  gp.features_->map().topRows(size_) = features_->map().topRows(size_);
+  kernel_->features(parameters_, q, gp.features_->data() + size_, gp.features_->rows());
   gp.y_ << y_, y;
   gp.noise_ << noise_, noise_variance_ / signal_variance_ * noise_shape;
   gp.weights_.map().topRows(size_) = weights_.map().topRows(size_);
   gp.inverse_diagonal_.head(size_) = inverse_diagonal_;
 
   InverseRoot root(root_rows(q.rows()), size_);
-  AlignedMatrix covariance(gp.features_.rows(), 1);
+  AlignedMatrix covariance(gp.features_->rows(), 1);
   for (Index i = size_; i < size; ++i) {
-    const FeatureBlock before = {gp.features_.data(), i, gp.features_.rows()};
-    const FeatureBlock fresh = {gp.features_.data() + i, 1, gp.features_.rows()};
+    const FeatureBlock before = {gp.features_->data(), i, gp.features_->rows()};
+    const FeatureBlock fresh = {gp.features_->data() + i, 1, gp.features_->rows()};
     double variance = 0;
     kernel_->diagonal(parameters_, fresh, &variance);
     kernel_->tile(parameters_, before, fresh, covariance.data(), covariance.rows());
@@ -55,7 +55,7 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
     gp.inverse_diagonal_.head(i + 1) += row->cwiseAbs2();
     gp.log_det_ -= 2.0 * std::log((*row)[i]);
   }
-  gp.exact_ = VarianceTable(gp.features_.copy(), size, root.rows());
+  gp.exact_ = VarianceTable(gp.features_, size, root.rows());
   gp.finish(form);
   return gp;
 }
@@ -103,13 +103,13 @@ GaussianProcess GaussianProcess::without(const std::vector<Index>& points, Varia
   }
   const Index size = root.size();
   GaussianProcess gp = like(size);
-  gp.features_.map().topRows(size) = features_.map()(kept, Eigen::all);
+  gp.features_->map().topRows(size) = features_->map()(kept, Eigen::all);
   gp.y_ = y_(kept);
   gp.noise_ = noise_(kept);
   gp.weights_.map().col(0).head(size) = weights;
   gp.inverse_diagonal_ = inverse_diagonal;
   gp.log_det_ = log_det;
-  gp.exact_ = VarianceTable(gp.features_.copy(), size, root.rows());
+  gp.exact_ = VarianceTable(gp.features_, size, root.rows());
   gp.finish(form);
   return gp;
 }

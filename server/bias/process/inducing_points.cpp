@@ -171,7 +171,7 @@ std::optional<InducingPoints::Posterior> InducingPoints::posterior() const {
   AlignedMatrix multiply_work(numerics().multiply_work_size(r, r), 1);
   numerics().multiply_transposed(r, r, r, 1.0, s.data(), s.rows(), w_transposed.data(), w_transposed.rows(), true,
                                  root.data(), root.rows(), multiply_work.data());
-  posterior.variance = VarianceTable(features_.copy(), r, std::move(root));
+  posterior.variance = VarianceTable(std::make_shared<AlignedMatrix>(features_.copy()), r, std::move(root));
   return posterior;
 }
 

@@ -49,6 +49,8 @@ class InducingPoints {
 
   [[nodiscard]] Eigen::Index size() const { return size_; }
   [[nodiscard]] const AlignedMatrix& features() const { return features_; }
+  /// W, zero above the diagonal and in the padding.
+  [[nodiscard]] const AlignedMatrix& root() const { return root_; }
 
  private:
   InducingPoints() = default;

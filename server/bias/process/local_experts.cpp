@@ -23,8 +23,8 @@ constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the pre
 
 VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
   if (experts == 1) return wanted;
-  if (wanted == VarianceForm::kRegionalOnly || wanted == VarianceForm::kRough) return VarianceForm::kCompressedOnly;
-  return wanted == VarianceForm::kRegional ? VarianceForm::kCompressed : wanted;
+  if (wanted == VarianceForm::kServed || wanted == VarianceForm::kServedAsPart) return VarianceForm::kCompressedOnly;
+  return wanted == VarianceForm::kLearned ? VarianceForm::kCompressed : wanted;
 }
 
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {

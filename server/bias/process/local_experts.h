@@ -20,7 +20,7 @@ class LocalExperts {
                                                              const Eigen::MatrixXd& q, const Eigen::VectorXd& y,
                                                              const Eigen::VectorXd& noise_shape,
                                                              const GpHyperparameters& hyperparameters,
-                                                             VarianceForm form = VarianceForm::kRegional);
+                                                             VarianceForm form = VarianceForm::kLearned);
 
   /// As GaussianProcess has them, in m² operations for each point. with() gives each point to the expert that knows it
   /// best. without() takes points out of their experts, and drops an expert without points.
@@ -36,10 +36,6 @@ class LocalExperts {
   }
 
   void mean(const Eigen::MatrixXd& q, double* out) const;
-  /// As GaussianProcess has it.
-  void prepare(const std::function<bool()>& go_on) const {
-    for (const GaussianProcess& expert : experts_) expert.prepare(go_on);
-  }
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
 
   [[nodiscard]] double signal_variance() const { return experts_.front().signal_variance(); }

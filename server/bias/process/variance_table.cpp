@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/base/check.h"
 #include "server/numerics/numerics.h"
 
 namespace trammel {
@@ -11,7 +12,7 @@ using Eigen::Index;
 
 // The last rows first. Columns to the right of a row are not needed for the rows above, and their memory is given back:
 // there is never more than one matrix and one triangle.
-VarianceTable::VarianceTable(AlignedMatrix features, Index size, AlignedMatrix root)
+VarianceTable::VarianceTable(PointFeatures features, Index size, AlignedMatrix root)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
   const Numerics& n = numerics();
   for (Index first = (size - 1) / n.packed_rows * n.packed_rows; first >= 0; first -= n.packed_rows) {
@@ -20,17 +21,41 @@ VarianceTable::VarianceTable(AlignedMatrix features, Index size, AlignedMatrix r
   }
 }
 
-VarianceTable::VarianceTable(AlignedMatrix features, Index size, const std::vector<double>& rows)
+VarianceTable::VarianceTable(PointFeatures features, Index size, const std::vector<double>& rows)
     : features_(std::move(features)), size_(size), packed_root_(numerics().packed_size(size), 1) {
   numerics().pack_triangle(size, rows.data(), packed_root_.data());
 }
 
+VarianceTable VarianceTable::in_single_precision(double rounding) const {
+  TRAMMEL_CHECK(!is_single_);
+  const Index length = numerics().packed_size(size_);
+  VarianceTable table;
+  table.features_ = features_;
+  table.size_ = size_;
+  table.packed_root_ = {(length + 1) / 2, 1};
+  table.is_single_ = true;
+  table.factor_ = factor_;
+  table.added_ = added_ + rounding;
+  auto* singles = reinterpret_cast<float*>(table.packed_root_.data());
+  for (Index i = 0; i < length; ++i) singles[i] = static_cast<float>(packed_root_.data()[i]);
+  return table;
+}
+
 std::vector<double> VarianceTable::rows(Index more) const {
+  TRAMMEL_CHECK(!is_single_);
   std::vector<double> rows;
   rows.reserve(static_cast<std::size_t>((size_ + more) * (size_ + more + 1) / 2));
   rows.resize(static_cast<std::size_t>(size_ * (size_ + 1) / 2));
   numerics().unpack_triangle(size_, packed_root_.data(), rows.data());
   return rows;
+}
+
+void VarianceTable::square_norms(Index count, const double* k, double* out) const {
+  if (is_single_) {
+    numerics().square_norms_single(size_, reinterpret_cast<const float*>(packed_root_.data()), count, k, out);
+  } else {
+    numerics().square_norms(size_, packed_root_.data(), count, k, out);
+  }
 }
 
 void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& parameters, const FeatureBlock& targets,
@@ -42,14 +67,13 @@ void VarianceTable::shares(const Kernel& kernel, const Eigen::VectorXd& paramete
   kernel.diagonal(parameters, targets, prior);
   for (Index first = 0; first < targets.rows; first += block) {
     const Index count = std::min(block, targets.rows - first);
-    kernel.tile(parameters, {features_.data(), size_, features_.rows()}, {targets.data + first, count, targets.ld},
-                cross.data(), ld);
+    kernel.tile(parameters, rows_of(*features_, 0, size_), {targets.data + first, count, targets.ld}, cross.data(), ld);
     interleaved = cross.map().topRows(size_);
     double explained[kTargetBlock];
-    numerics().square_norms(size_, packed_root_.data(), block, interleaved.data(), explained);
+    square_norms(block, interleaved.data(), explained);
     for (Index j = 0; j < count; ++j) {
       const double k = prior[first + j];
-      posterior[first + j] = std::clamp(factor_ * (k - explained[j]), 0.0, k);
+      posterior[first + j] = std::clamp(factor_ * (k - explained[j]) + added_, 0.0, k);
     }
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <memory>
 #include <vector>
 
 #include "server/bias/kernels/kernel.h"
@@ -14,12 +15,20 @@ struct PosteriorVariance {
   double prior;
 };
 
+/// Features of points, padded; shared by all that computes with these points.
+using PointFeatures = std::shared_ptr<const AlignedMatrix>;
+
 /// The variance that some points leave: prior - |G k(points, x)|², G lower triangular.
 class VarianceTable {
  public:
   VarianceTable() = default;
-  /// `features` of `size` points, padded; `root` holds G in its lower triangle.
-  VarianceTable(AlignedMatrix features, Eigen::Index size, AlignedMatrix root);
+  /// `features` of `size` points; `root` holds G in its lower triangle.
+  VarianceTable(PointFeatures features, Eigen::Index size, AlignedMatrix root);
+  /// The same, G row after row, row i of i + 1 entries.
+  VarianceTable(PointFeatures features, Eigen::Index size, const std::vector<double>& rows);
+  /// The same with G rounded to single precision: half the memory, and half the time. Each variance is larger by
+  /// `rounding` (in units of σ_f²), so that it is not below the exact one.
+  [[nodiscard]] VarianceTable in_single_precision(double rounding) const;
 
   /// For each row of `targets` (features) the variance left and the prior k(x, x), both in units of σ_f² and
   /// targets.rows long.
@@ -27,18 +36,23 @@ class VarianceTable {
               double* prior) const;
 
   [[nodiscard]] Eigen::Index size() const { return size_; }
-  /// The same, G row after row, row i of i + 1 entries.
-  VarianceTable(AlignedMatrix features, Eigen::Index size, const std::vector<double>& rows);
-  /// G row after row, with room for `more` rows.
+  /// G row after row, with room for `more` rows; not of a table in single precision.
   [[nodiscard]] std::vector<double> rows(Eigen::Index more) const;
-  /// Multiplies every posterior variance by `factor`, up to the prior.
-  void widen(double factor) { factor_ *= factor; }
+  /// Multiplies every posterior variance by `factor` and adds `more` (in units of σ_f²), up to the prior.
+  void widen(double factor, double more = 0.0) {
+    factor_ *= factor;
+    added_ = factor * added_ + more;
+  }
 
  private:
-  AlignedMatrix features_;
+  void square_norms(Eigen::Index count, const double* k, double* out) const;
+
+  PointFeatures features_;
   Eigen::Index size_ = 0;
-  AlignedMatrix packed_root_;
+  AlignedMatrix packed_root_;  // as Numerics packs it; floats where is_single_
+  bool is_single_ = false;
   double factor_ = 1.0;
+  double added_ = 0.0;
 };
 
 }  // namespace trammel

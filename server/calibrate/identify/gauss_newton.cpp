@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "server/calibrate/identify/weighted_pose.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -14,6 +15,10 @@ constexpr double kSettledStep = 0.05;       // standard deviations: a smaller st
 constexpr double kFirstSettledStep = 1;     // the same as long as residuals only serve to find the discrepancy
 constexpr double kNoRise = 1e-6;            // of the cost, which has thousands of terms: rounding
 constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together: they stay in the cache
+
+constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step leads uphill
+constexpr double kMostDamping = 1e9;
+constexpr double kNoDamping = 1e-6;
 
 /// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it stay.
 Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
@@ -30,6 +35,62 @@ Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, cons
   return (x + curvature.llt().solve(downhill)).cwiseMax(lower) - x;
 }
 
+/// The normal equations, filled row by row: a chunk of rows at a time, always of one session.
+class Normals {
+ public:
+  Normals(Expansion& at, std::size_t sessions)
+      : at_(at),
+        jacobians_(at.gradient.size(), 6 * kPosesAtATime),
+        motions_(6, sessions > 1 ? 6 * kPosesAtATime : 0),
+        residuals_(6 * kPosesAtATime),
+        newest_(static_cast<int>(sessions) - 1) {
+    if (sessions < 2) return;
+    at_.sessions.resize(sessions - 1);
+    for (SessionBlock& block : at_.sessions) block.cross = Eigen::MatrixXd::Zero(6, at.gradient.size());
+  }
+  /// Where the next pose of that session writes its residuals and their derivatives.
+  void begin(int session) {
+    if (session != session_ || filled_ + 6 > residuals_.size()) add_filled();
+    session_ = session;
+  }
+  [[nodiscard]] double* residuals() { return residuals_.data() + filled_; }
+  [[nodiscard]] double* jacobian() { return jacobians_.col(filled_).data(); }
+  [[nodiscard]] auto residuals(Eigen::Index count) { return residuals_.segment(filled_, count); }
+  [[nodiscard]] bool moves() const { return session_ < newest_; }
+  void set_motion(const Eigen::Matrix<double, 6, Eigen::Dynamic>& columns) {
+    motions_.middleCols(filled_, columns.cols()) = columns;
+  }
+  void weigh(Eigen::Index count, double root_weight) {
+    residuals_.segment(filled_, count) *= root_weight;
+    jacobians_.middleCols(filled_, count) *= root_weight;
+    if (moves()) motions_.middleCols(filled_, count) *= root_weight;
+  }
+  void end(Eigen::Index count) { filled_ += count; }
+  void add_filled() {
+    if (filled_ == 0) return;  // Eigen's rank update divides by the number of columns
+    const auto J = jacobians_.leftCols(filled_);
+    const auto r = residuals_.head(filled_);
+    at_.gradient.noalias() += J * r;
+    at_.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
+    if (moves()) {
+      const auto D = motions_.leftCols(filled_);
+      SessionBlock& block = at_.sessions[static_cast<std::size_t>(session_)];
+      block.gradient.noalias() += D * r;
+      block.curvature.noalias() += D * D.transpose();
+      block.cross.noalias() += D * J.transpose();
+    }
+    filled_ = 0;
+  }
+
+ private:
+  Expansion& at_;
+  Eigen::MatrixXd jacobians_;  // one column an equation
+  Eigen::MatrixXd motions_;
+  Eigen::VectorXd residuals_;
+  int newest_ = 0, session_ = 0;
+  Eigen::Index filled_ = 0;
+};
+
 }  // namespace
 
 Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights, bool robust,
@@ -37,34 +98,27 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
   const Eigen::Index P = s.scale.size();
   const Eigen::VectorXd from_prior = x - s.prior;
   Expansion at{0.5 * from_prior.squaredNorm(), from_prior, Eigen::MatrixXd::Zero(P, P)};
-  Eigen::MatrixXd jacobians(P, 6 * kPosesAtATime);  // one column an equation
-  Eigen::VectorXd residuals(6 * kPosesAtATime);
-  Eigen::Index filled = 0;
-  const auto add_filled = [&] {
-    if (filled == 0) return;  // Eigen's rank update divides by the number of columns
-    const auto J = jacobians.leftCols(filled);
-    at.gradient.noalias() += J * residuals.head(filled);
-    at.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
-    filled = 0;
-  };
+  const std::size_t sessions = problem.batch.sessions.size();
+  Normals normals(at, sessions);
   for (const Measurement& m : problem.batch.measurements) {
     const WeightedPose pose(problem.model, s, m, weights);
-    const bool finite = pose.evaluate(x.data(), residuals.data() + filled, jacobians.col(filled).data());
-    auto r = residuals.segment(filled, pose.size());
-    const double norm = finite ? r.norm() : std::numeric_limits<double>::infinity();
+    normals.begin(sessions > 1 ? m.session : 0);
+    const bool finite = pose.evaluate(x.data(), normals.residuals(), normals.jacobian());
+    const double norm = finite ? normals.residuals(pose.size()).norm() : std::numeric_limits<double>::infinity();
     const double limit = pose.huber_limit();
+    if (normals.moves()) {
+      normals.set_motion(
+          motion_columns(m, problem.model.X_WB.translation(), pose.inverse_sigma(), pose.inverse_rotation_sigma()));
+    }
     if (robust && norm > limit) {
-      const double root_weight = std::sqrt(limit / norm);
-      r *= root_weight;
-      jacobians.middleCols(filled, pose.size()) *= root_weight;
+      normals.weigh(pose.size(), std::sqrt(limit / norm));
       at.cost += limit * (norm - 0.5 * limit);
     } else {
       at.cost += 0.5 * norm * norm;
     }
-    filled += pose.size();
-    if (filled + 6 > residuals.size()) add_filled();
+    normals.end(pose.size());
   }
-  add_filled();
+  normals.add_filled();
   at.information = Eigen::MatrixXd(at.information.selfadjointView<Eigen::Lower>());
   return at;
 }
@@ -89,6 +143,97 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
     }
   }
   return now;
+}
+
+namespace {
+
+/// Where the search stands: the parameters, and the measurements as the instruments are believed to have stood.
+struct Standing {
+  Eigen::VectorXd x;
+  CalibrationProblem problem;
+  std::vector<Pose> moved;
+  Expansion at;
+};
+
+void move_sessions(Standing& standing, const std::vector<SessionMotion>& motions) {
+  std::vector<Pose> by;
+  for (const SessionMotion& motion : motions) {
+    by.push_back(measured_by(motion, standing.problem.model.X_WB.translation()));
+    standing.moved[by.size() - 1] = by.back() * standing.moved[by.size() - 1];
+  }
+  for (Measurement& m : standing.problem.batch.measurements) {
+    const auto session = static_cast<std::size_t>(m.session);
+    if (session >= by.size()) continue;
+    m.p_W = by[session] * m.p_W;
+    if (m.R_WT) m.R_WT = (by[session].linear() * *m.R_WT).eval();
+  }
+}
+
+/// A step of everything, and how long it is.
+struct JointStep {
+  Eigen::VectorXd parameters;
+  std::vector<SessionMotion> motions;
+  double in_standard_deviations = 0;
+};
+
+JointStep joint_step(const Standing& from, const Eigen::VectorXd& lower, double damping) {
+  Expansion reduced{from.at.cost, from.at.gradient, from.at.information};
+  reduced.information.diagonal() *= 1 + damping;
+  eliminate(from.at.sessions, reduced.information, reduced.gradient, damping);
+  JointStep step{bounded_step(reduced, from.x, lower), {}, 0};
+  double square = step.parameters.dot(from.at.information * step.parameters) + step.parameters.squaredNorm();
+  for (const SessionBlock& block : from.at.sessions) {
+    const SessionMotion motion = block.motion(step.parameters, damping);
+    square += motion.dot(block.curvature * motion) + 2 * motion.dot(block.cross * step.parameters);
+    step.motions.push_back(motion);
+  }
+  step.in_standard_deviations = std::sqrt(std::max(0.0, square));
+  return step;
+}
+
+Minimum minimum_at(const Standing& standing, std::vector<double> costs) {
+  Minimum found{standing.x, standing.at.information, std::move(costs), false, "too many steps", standing.moved};
+  Eigen::VectorXd gradient = standing.at.gradient;
+  eliminate(standing.at.sessions, found.information, gradient);
+  return found;
+}
+
+}  // namespace
+
+Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
+                              const CalibrateOptions& options, const Eigen::VectorXd& start) {
+  const Eigen::VectorXd lower = s.lower();
+  const bool robust = is_robust(options, weights);
+  Standing now{start.cwiseMax(lower), problem, std::vector<Pose>(problem.batch.sessions.size(), Pose::Identity()), {}};
+  now.at = expand(now.problem, s, weights, robust, now.x);
+  std::vector<double> costs = {now.at.cost};
+  double damping = 0;
+  for (int k = 0; k < std::max(1, options.max_iterations); ++k) {
+    if (!std::isfinite(now.at.cost)) break;
+    const JointStep step = joint_step(now, lower, damping);
+    Standing next = now;
+    next.x += step.parameters;
+    move_sessions(next, step.motions);
+    next.at = expand(next.problem, s, weights, robust, next.x);
+    const bool settled =
+        damping == 0 && step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
+    const bool uphill = !std::isfinite(next.at.cost) || next.at.cost > now.at.cost * (1 + 1e-12) + kNoRise;
+    if (uphill && !settled) {
+      damping = std::max(10 * damping, kFirstDamping);
+      if (damping > kMostDamping) break;
+      continue;
+    }
+    if (!uphill) now = std::move(next);
+    costs.push_back(now.at.cost);
+    damping = damping < kNoDamping ? 0 : damping / 10;
+    if (!settled) continue;
+    Minimum found = minimum_at(now, std::move(costs));
+    found.converged = true;
+    found.message = fmt::format("last step {:.1e} standard deviations", step.in_standard_deviations);
+    return found;
+  }
+  if (!std::isfinite(now.at.cost)) return refused("calibration of batch {}: the solver failed", problem.batch.id);
+  return minimum_at(now, std::move(costs));
 }
 
 }  // namespace trammel

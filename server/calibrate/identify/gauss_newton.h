@@ -7,6 +7,7 @@
 
 #include "server/calibrate/identify/scaled_parameters.h"
 #include "server/calibrate/identify/weighting.h"
+#include "server/calibrate/sessions/session_blocks.h"
 
 /// The most probable parameters in few steps. All vectors are of size P, in units of the priors.
 namespace trammel {
@@ -15,7 +16,8 @@ namespace trammel {
 struct Expansion {
   double cost = 0;
   Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;  ///< P x P, second derivative without that of the priors
+  Eigen::MatrixXd information;              ///< P x P, second derivative without that of the priors
+  std::vector<SessionBlock> sessions = {};  ///< of several: of all but the newest, in whose world all stand
 };
 
 /// About `x`; `robust`: with Huber's loss on every pose.
@@ -29,6 +31,7 @@ struct Minimum {
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;
+  std::vector<Pose> moved = {};  ///< of several sessions: what moves the measurements of each into W
 };
 
 /// Whether Huber's loss is used: not before the discrepancy is known, since nothing can be called an outlier then.
@@ -38,5 +41,12 @@ struct Minimum {
 [[nodiscard]] std::optional<Minimum> full_steps(const CalibrationProblem& problem, const ScaledParameters& s,
                                                 const Weights& weights, const CalibrateOptions& options,
                                                 const Eigen::VectorXd& start);
+
+/// Of a batch of several sessions: steps of the parameters and of where each instrument stood, damped where a full one
+/// leads uphill. The information is that of the parameters with the sessions eliminated. Refuses where nothing leads
+/// downhill and it is not the minimum.
+[[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s,
+                                            const Weights& weights, const CalibrateOptions& options,
+                                            const Eigen::VectorXd& start);
 
 }  // namespace trammel

@@ -6,6 +6,8 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/identify/minimise.h"
+#include "server/calibrate/identify/own_noise.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -95,30 +97,63 @@ struct Identified {
   Minimum minimum;
   Residuals residuals;
   Weights weights;
+  std::vector<SessionSetting> sessions;
 };
+
+/// The measurements in W as the minimum has it, every session with the noise that is its own.
+void take_over_sessions(const MeasurementBatch& given, Identified& now, MeasurementBatch& batch,
+                        const Tracker& tracker) {
+  if (now.sessions.empty()) return;
+  for (std::size_t s = 0; s < now.sessions.size(); ++s)
+    now.sessions[s].X_WS = now.minimum.moved[s] * now.sessions[s].X_WS;
+  batch = moved(given, now.sessions, tracker.sigma, tracker.sigma_rotation);
+}
+
+/// How many numbers the sessions took from the data.
+double freedom_of_sessions(const MeasurementBatch& batch) {
+  return has_sessions(batch) ? 6.0 * static_cast<double>(batch.sessions.size() - 1) : 0.0;
+}
+
+/// Gives each session the noise that it has beyond the others, and the residuals the sigmas that follow. False where
+/// that has changed.
+bool estimate_own_noise(Identified& now, double freedom, const MeasurementBatch& given, MeasurementBatch& batch,
+                        const Tracker& tracker) {
+  std::vector<SessionSetting> sessions = now.sessions;
+  set_own_noise(now.residuals, freedom, now.weights, batch, sessions);
+  const bool same = are_as_noisy(sessions, now.sessions, tracker);
+  now.sessions = std::move(sessions);
+  batch = moved(given, now.sessions, tracker.sigma, tracker.sigma_rotation);
+  set_sigmas(batch, tracker, now.residuals);
+  return same;
+}
 
 /// Minimises and estimates the discrepancy in turns until neither changes; adds the iterations to `result`.
 Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOptions& options, const ScaledParameters& s,
                           CalibrationResult& result) {
   const Tracker& tracker = problem.model.cell->tracker;
+  CalibrationProblem working = problem;
   Identified now;
+  now.sessions = settings_of(problem.batch);
   now.minimum.x = problem.model.values.cwiseQuotient(s.scale);
   now.minimum.converged = s.scale.size() == 0;
   now.minimum.message = "nothing to identify";
   for (int round = 0; round < kMostReweightings; ++round) {
     double freedom = 0;
     if (s.scale.size() > 0) {
-      Result<Minimum> found = minimise(problem, s, now.weights, options, now.minimum.x);
+      Result<Minimum> found = minimise(working, s, now.weights, options, now.minimum.x);
       if (!found) return tl::make_unexpected(found.error());
       now.minimum = std::move(*found);
       result.iterations += static_cast<int>(now.minimum.costs.size());
       result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(), now.minimum.costs.end());
-      freedom = freedom_of(now.minimum.information);
+      freedom = freedom_of(now.minimum.information) + freedom_of_sessions(problem.batch);
+      take_over_sessions(problem.batch, now, working.batch, tracker);
     }
-    now.residuals = residuals_of(problem.model, problem.batch, now.minimum.x.cwiseProduct(s.scale));
+    now.residuals = residuals_of(problem.model, working.batch, now.minimum.x.cwiseProduct(s.scale));
+    const bool same_noise =
+        now.sessions.empty() || estimate_own_noise(now, freedom, problem.batch, working.batch, tracker);
     const Weights before = now.weights;
-    now.weights = estimated_weights(now.residuals, freedom, before, is_robust(options, before), tracker.sigma_rotation);
-    if (are_settled(now.weights, before, tracker)) break;
+    now.weights = estimated_weights(now.residuals, freedom, before, is_robust(options, before));
+    if (same_noise && are_settled(now.weights, before, tracker)) break;
   }
   return now;
 }
@@ -136,10 +171,11 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.model.values = found->minimum.x.cwiseProduct(s.scale);
   result.discrepancy = found->weights.discrepancy;
   result.discrepancy_rotation = found->weights.discrepancy_rotation;
-  result.log_likelihood = log_likelihood(r, found->weights, problem.model.cell->tracker.sigma_rotation);
+  result.log_likelihood = log_likelihood(r, found->weights);
   result.suspects = suspects_of(problem.batch, r, found->weights);
   result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
   result.converged = found->minimum.converged;
+  result.sessions = found->sessions;
   result.message = found->minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/calibrate/identify/weighted_pose.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -84,6 +85,7 @@ Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledPar
 
 Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
                          const CalibrateOptions& options, const Eigen::VectorXd& start) {
+  if (has_sessions(problem.batch)) return session_steps(problem, s, weights, options, start);
   if (std::optional<Minimum> found = full_steps(problem, s, weights, options, start)) return std::move(*found);
   return guarded_steps(problem, s, weights, options, start);
 }

@@ -28,7 +28,7 @@ WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s
       held_(s.held),
       measurement_(measurement),
       inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
-      inverse_rotation_sigma_(1 / std::hypot(model.cell->tracker.sigma_rotation, weights.discrepancy_rotation)) {}
+      inverse_rotation_sigma_(1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
 
 bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
   const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(x, scale_.size()).cwiseProduct(scale_);

@@ -18,6 +18,8 @@ class WeightedPose {
   [[nodiscard]] int size() const { return measurement_.R_WT ? 6 : 3; }
   /// At `x` (P): `residuals` (size()), and `jacobian` (size() x P by rows) unless it is null. False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;
+  [[nodiscard]] double inverse_sigma() const { return inverse_sigma_; }                    ///< 1/m
+  [[nodiscard]] double inverse_rotation_sigma() const { return inverse_rotation_sigma_; }  ///< 1/rad
   /// The norm of the residuals that 1 in 1000 good poses exceeds.
   [[nodiscard]] double huber_limit() const;
 

@@ -37,7 +37,7 @@ double sigmas_of(const Residuals& r, Eigen::Index i, const Weights& weights) {
 
 /// The positions that are no suspects; rotations stay.
 Residuals without_suspects(const Residuals& r, const Weights& weights) {
-  Residuals kept{r.position, r.rotation, r.sigma};
+  Residuals kept{r.position, r.rotation, r.sigma, r.sigma_rotation};
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
     if (sigmas_of(r, i, weights) > kSuspect) continue;
@@ -53,29 +53,35 @@ Residuals without_suspects(const Residuals& r, const Weights& weights) {
 
 double position_sigma(const Measurement& m, const Cell& cell) { return m.sigma.value_or(cell.tracker.sigma); }
 
+double rotation_sigma(const Measurement& m, const Cell& cell) {
+  return m.sigma_rotation.value_or(cell.tracker.sigma_rotation);
+}
+
 Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch, const Eigen::VectorXd& values) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Residuals r{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n)};
+  Residuals r{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
   Eigen::Index turned = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
     const Pose X_WT = model.pose_W(m.context, values, nullptr);
     r.position.col(i) = m.p_W - X_WT.translation();
     r.sigma(i) = position_sigma(m, *model.cell);
-    if (m.R_WT) r.rotation.col(turned++) = rotation_log(*m.R_WT * X_WT.linear().transpose());
+    if (!m.R_WT) continue;
+    r.sigma_rotation(turned) = rotation_sigma(m, *model.cell);
+    r.rotation.col(turned++) = rotation_log(*m.R_WT * X_WT.linear().transpose());
   }
   r.rotation.conservativeResize(3, turned);
+  r.sigma_rotation.conservativeResize(turned);
   return r;
 }
 
-Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects,
-                          double sigma_rotation) {
+Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects) {
   const double positions = 3.0 * static_cast<double>(r.position.cols());
   const double rotations = 3.0 * static_cast<double>(r.rotation.cols());
   const double share = std::max(0.0, 1 - freedom / (positions + rotations));
   const Residuals trusted = drop_suspects ? without_suspects(r, before) : r;
   return {surplus(trusted.position, trusted.sigma, 3.0 * static_cast<double>(trusted.position.cols()) * share),
-          surplus(r.rotation, Eigen::VectorXd::Constant(r.rotation.cols(), sigma_rotation), rotations * share), true};
+          surplus(r.rotation, r.sigma_rotation, rotations * share), true};
 }
 
 bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker) {
@@ -97,7 +103,7 @@ std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residu
   return suspects;
 }
 
-double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation) {
+double log_likelihood(const Residuals& r, const Weights& weights) {
   double sum = 0;
   const auto add = [&](const auto& residual, double sigma, double discrepancy) {
     const double variance = sigma * sigma + discrepancy * discrepancy;
@@ -106,7 +112,7 @@ double log_likelihood(const Residuals& r, const Weights& weights, double sigma_r
   };
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) add(r.position.col(i), r.sigma(i), weights.discrepancy);
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {
-    add(r.rotation.col(i), sigma_rotation, weights.discrepancy_rotation);
+    add(r.rotation.col(i), r.sigma_rotation(i), weights.discrepancy_rotation);
   }
   return sum;
 }

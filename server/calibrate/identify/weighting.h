@@ -17,12 +17,15 @@ struct Weights {
 
 /// Standard deviation of one axis of the measured position, m: the measurement's own, else the tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
+/// The same of the measured orientation, rad.
+[[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
 /// Measured - predicted in W, SI.
 struct Residuals {
-  Eigen::Matrix3Xd position;  ///< 3 x N
-  Eigen::Matrix3Xd rotation;  ///< 3 x M, rotation vectors of the poses that have an orientation
-  Eigen::VectorXd sigma;      ///< N, of the measured positions
+  Eigen::Matrix3Xd position;       ///< 3 x N
+  Eigen::Matrix3Xd rotation;       ///< 3 x M, rotation vectors of the poses that have an orientation
+  Eigen::VectorXd sigma;           ///< N, of the measured positions
+  Eigen::VectorXd sigma_rotation;  ///< M, of the measured orientations
 };
 
 /// At the parameter `values` instead of the model's own.
@@ -31,8 +34,7 @@ struct Residuals {
 
 /// The discrepancies under which the residuals are as large as expected after `freedom` parameters were fitted to them.
 /// `drop_suspects`: positions that are suspects under `before` do not count.
-[[nodiscard]] Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects,
-                                        double sigma_rotation);
+[[nodiscard]] Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects);
 /// Whether measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
@@ -41,6 +43,6 @@ struct Residuals {
                                                    const Weights& weights);
 
 /// Nat. A suspect counts as if it were just at the limit: one bad pose is no proof against a model.
-[[nodiscard]] double log_likelihood(const Residuals& r, const Weights& weights, double sigma_rotation);
+[[nodiscard]] double log_likelihood(const Residuals& r, const Weights& weights);
 
 }  // namespace trammel

@@ -137,6 +137,19 @@ Status check_ranges(const ModelParts& parts) {
   return {};
 }
 
+Status check_sessions(const ModelParts& parts) {
+  for (const Change& change : parts.changes) {
+    if (change.session >= parts.sessions.size())
+      return refused("model: a change since session {}, it has {}", change.session + 1, parts.sessions.size())
+          .of("changes")
+          .beyond(change.session + 1, parts.sessions.size());
+  }
+  const auto finite = [](const SessionSetting& session) { return session.X_WS.matrix().allFinite(); };
+  if (!std::all_of(parts.sessions.begin(), parts.sessions.end(), finite))
+    return refused("model: where a session stood is not finite").of("sessions");
+  return {};
+}
+
 }  // namespace
 
 Status check_parts(const ModelParts& parts) {
@@ -145,6 +158,7 @@ Status check_parts(const ModelParts& parts) {
   if (fine) fine = check_size(parts.covariance, P);
   if (fine) fine = check_parameters(parts);
   if (fine) fine = check_ranges(parts);
+  if (fine) fine = check_sessions(parts);
   if (fine && parts.bias) fine = check_bias(*parts.bias);
   if (fine && parts.rotation_bias) fine = check_bias(*parts.rotation_bias);
   if (fine) fine = check_covariance(parts.covariance);

@@ -97,6 +97,36 @@ RefitRecord refit_from(const Json& json) {
           .poses = count_from(json, "poses")};
 }
 
+SessionSetting session_from(const Json& json) {
+  SessionSetting session;
+  session.id = json.at("id");
+  session.first = whole_from<int>(json, "first");
+  session.first_pose = json.at("first_pose");
+  session.poses = count_from(json, "poses");
+  session.X_WS = pose_from(json.at("X_WS"));
+  session.own_noise = number_if(json, "own_noise_m").value_or(0);
+  session.own_noise_rotation = number_if(json, "own_noise_rad").value_or(0);
+  return session;
+}
+
+void read_sessions(const Json& content, ModelParts& parts) {
+  if (content.contains("sessions")) {
+    for (const Json& session : list_from(content.at("sessions"))) parts.sessions.push_back(session_from(session));
+  }
+  if (content.contains("changes")) {
+    for (const Json& change : list_from(content.at("changes"))) {
+      parts.changes.push_back({.source = change.at("source"),
+                               .session = static_cast<std::size_t>(count_from(change, "session")),
+                               .gain = number_from(change, "gain"),
+                               .p_value = number_from(change, "p_value"),
+                               .could_also_be = change.at("could_also_be").get<std::vector<std::string>>()});
+    }
+  }
+  if (!content.contains("sessions_left_out")) return;
+  for (const Json& session : list_from(content.at("sessions_left_out")))
+    parts.sessions_left_out.push_back({session.at("id"), session.at("why")});
+}
+
 /// The physics of this cell with the frames and values that a file gives.
 Result<PhysicalModel> physics_from(const Json& json, const std::shared_ptr<const Cell>& cell) {
   Result<PhysicalModel> physics = make_physical_model(cell, json.at("error_sources").get<std::vector<std::string>>());
@@ -133,6 +163,11 @@ Status read_parameters(const Json& content, const std::string& where, ModelParts
                                 .value = number_from(one, "value"),
                                 .stddev = number_from(one, "stddev"),
                                 .identified = truth_from(one.at("identified"))});
+    if (!one.contains("prior")) continue;
+    parts.parameters.back().parameter.prior = number_from(one, "prior");
+    parts.parameters.back().parameter.prior_scale = number_from(one, "prior_stddev");
+    if (!(parts.parameters.back().parameter.prior_scale > 0))
+      return refused("a prior of no width").in(where).of("parameters").with_text(known[i].name);
   }
   return {};
 }
@@ -156,6 +191,7 @@ Status read_calibration(const Json& content, const std::string& where, ModelPart
   }
   parts.cost_record = numbers_from(content.at("cost_record"));
   parts.discrepancy = number_from(content, "discrepancy_m");
+  read_sessions(content, parts);
   return {};
 }
 

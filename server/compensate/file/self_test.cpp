@@ -81,11 +81,14 @@ Difference worst_of(const ErrorPrediction& now, const Json& stated) {
     return difference.allFinite() ? difference.cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
   };
   const double of_error = kErrorShare * now.error_B.norm() + kSelfTestMetres;
-  const std::array<Difference, 3> all = {
+  const Vector3 above = now.stddev_B - vector3_from(stated.at("stddev_m"));
+  if (!above.allFinite()) return {std::numeric_limits<double>::infinity(), 0};
+  const auto of_stddev = [&](double share) { return share * now.stddev_B.norm() + kSelfTestMetres; };
+  const std::array<Difference, 4> all = {
       {{largest(now.X_BT_predicted.matrix() - pose_from(stated.at("X_BT")).matrix()), of_error},
        {largest(now.error_B - vector3_from(stated.at("error_m"))), of_error},
-       {largest(now.stddev_B - vector3_from(stated.at("stddev_m"))),
-        kStddevShare * now.stddev_B.norm() + kSelfTestMetres}}};
+       {largest(above.cwiseMax(0.0)), of_stddev(kStddevShare)},
+       {largest(above.cwiseMin(0.0)), of_stddev(kStatedMoreShare)}}};
   return *std::max_element(all.begin(), all.end(), [](const Difference& one, const Difference& other) {
     return one.off / one.limit < other.off / other.limit;
   });

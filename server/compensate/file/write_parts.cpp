@@ -93,6 +93,27 @@ Json json_of(const SuspectPose& pose) {
   return {{"pose_id", pose.pose_id}, {"row", pose.row}, {"distance_m", pose.distance}, {"sigmas", pose.sigmas}};
 }
 
+Json json_of(const SessionSetting& session) {
+  Json json = {{"id", session.id},
+               {"first", session.first},
+               {"first_pose", session.first_pose},
+               {"poses", session.poses},
+               {"X_WS", pose_json(session.X_WS)}};
+  if (session.own_noise > 0) json["own_noise_m"] = session.own_noise;
+  if (session.own_noise_rotation > 0) json["own_noise_rad"] = session.own_noise_rotation;
+  return json;
+}
+
+Json json_of(const Change& change) {
+  return {{"source", change.source},
+          {"session", change.session},
+          {"gain", change.gain},
+          {"p_value", change.p_value},
+          {"could_also_be", change.could_also_be}};
+}
+
+Json json_of(const LeftOutSession& session) { return {{"id", session.id}, {"why", session.why}}; }
+
 template <typename Thing>
 Json list_of(const std::vector<Thing>& things) {
   Json list = Json::array();
@@ -136,6 +157,13 @@ Json json_of(const ModelProvenance& provenance) {
 void add_calibration(const ModelParts& parts, Json& content) {
   content["covariance"] = matrix_json(parts.covariance);
   content["parameters"] = list_of(parts.parameters);
+  const std::vector<Parameter> drawn = parts.physics.parameters();
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    const Parameter& used = parts.parameters[k].parameter;
+    if (!(used.prior_scale < drawn[k].prior_scale)) continue;  // as its source has it, or wider
+    content["parameters"][k]["prior"] = used.prior;
+    content["parameters"][k]["prior_stddev"] = used.prior_scale;
+  }
   content["unidentifiable"] = list_of(parts.unidentifiable);
   content["rank"] = parts.rank;
   content["condition_number"] = parts.condition_number;
@@ -143,6 +171,9 @@ void add_calibration(const ModelParts& parts, Json& content) {
   content["suspects"] = list_of(parts.suspects);
   content["cost_record"] = parts.cost_record;
   content["discrepancy_m"] = parts.discrepancy;
+  if (!parts.sessions.empty()) content["sessions"] = list_of(parts.sessions);
+  if (!parts.changes.empty()) content["changes"] = list_of(parts.changes);
+  if (!parts.sessions_left_out.empty()) content["sessions_left_out"] = list_of(parts.sessions_left_out);
 }
 
 /// Where the training poses lie.

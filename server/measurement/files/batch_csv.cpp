@@ -24,7 +24,7 @@ const std::vector<std::string> kQuaternionColumns = {"qw", "qx", "qy", "qz"};
 struct BatchColumns {
   PoseColumns pose;
   std::vector<std::size_t> position, quaternion, extra;
-  std::optional<std::size_t> sigma, set;
+  std::optional<std::size_t> sigma, set, session;
 };
 
 Result<BatchColumns> find_columns(const CsvTable& table) {
@@ -33,7 +33,8 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   if (const Status has_joints = pose->require_joints(table); !has_joints) {
     return tl::make_unexpected(has_joints.error());
   }
-  BatchColumns columns{std::move(*pose), {}, {}, {}, table.find("sigma_mm"), table.find("set")};
+  BatchColumns columns{std::move(*pose),        {}, {}, {}, table.find("sigma_mm"), table.find("set"),
+                       table.find("session_id")};
   for (const std::string& name : kPositionColumns) {
     const Result<std::size_t> column = table.require(name);
     if (!column) return tl::make_unexpected(column.error());
@@ -47,7 +48,7 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   for (const std::size_t column : columns.pose.used()) used[column] = true;
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
-  for (const auto& column : {columns.sigma, columns.set}) {
+  for (const auto& column : {columns.sigma, columns.set, columns.session}) {
     if (column) used[*column] = true;
   }
   for (std::size_t column = 0; column < used.size(); ++column) {
@@ -101,6 +102,7 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   const Result<MeasurementSet> set = read_set(table, row, columns.set);
   if (!set) return tl::make_unexpected(set.error());
   measurement.set = *set;
+  if (columns.session) measurement.session_id = table.field(row, *columns.session);
   for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
   return measurement;
 }
@@ -189,6 +191,7 @@ void add_circumstance_columns(const MeasurementBatch& batch, std::vector<Written
                          return j < m.context.direction.size() ? fmt::format("{}", m.context.direction[j]) : "";
                        }});
   }
+  columns.push_back({"session_id", [](const Measurement& m) { return csv_field(m.session_id); }});
   columns.push_back(
       {"set", [](const Measurement& m) {
          return m.set == MeasurementSet::kUnassigned ? "" : m.set == MeasurementSet::kTrain ? "train" : "validation";

@@ -2,7 +2,6 @@
 
 #include "server/numerics/builds/covariance.h"
 #include "server/numerics/builds/factorisations.h"
-#include "server/numerics/builds/panels.h"
 #include "server/numerics/builds/products.h"
 #include "server/numerics/builds/triangles.h"
 
@@ -22,10 +21,8 @@ const Numerics& TRAMMEL_NUMERICS_BUILD() {
                                  .pack_lower = pack_lower,
                                  .pack_triangle = pack_triangle,
                                  .unpack_triangle = unpack_triangle,
-                                 .square_norms = square_norms,
-                                 .panel_size = panel_size,
-                                 .pack_panels = pack_panels,
-                                 .panel_product = panel_product,
+                                 .square_norms = square_norms<double>,
+                                 .square_norms_single = square_norms<float>,
                                  .radial_tile = radial_tile,
                                  .radial_gradient = radial_gradient,
                                  .radial_weighted_sum = radial_weighted_sum,

@@ -44,8 +44,8 @@ void unpack_triangle(Index n, const double* packed, double* triangle) {
   }
 }
 
-template <Index kCount>
-void square_norms_of(Index n, const double* packed, const double* k, double* out) {
+template <Index kCount, typename Number>
+void square_norms_of(Index n, const Number* packed, const double* k, double* out) {
   Vec square[kCount] = {};
   for (Index i = 0; i < n; i += kTileRows) {
     const Index depth = least(n, i + kTileRows);
@@ -68,7 +68,8 @@ void square_norms_of(Index n, const double* packed, const double* k, double* out
   for (Index j = 0; j < kCount; ++j) out[j] = sum(square[j]);
 }
 
-void square_norms(Index n, const double* packed, Index count, const double* k, double* out) {
+template <typename Number>
+void square_norms(Index n, const Number* packed, Index count, const double* k, double* out) {
   if (count == 1) {
     square_norms_of<1>(n, packed, k, out);
   } else {

@@ -20,7 +20,10 @@ typedef double Vec __attribute__((vector_size(kLanes * sizeof(double))));
 typedef double Loose __attribute__((vector_size(kLanes * sizeof(double)), aligned(8), may_alias));
 typedef long long Bits __attribute__((vector_size(kLanes * sizeof(double))));
 
+typedef float Single __attribute__((vector_size(kLanes * sizeof(float)), aligned(4), may_alias));
+
 inline Vec load(const double* p) { return *reinterpret_cast<const Loose*>(p); }
+inline Vec load(const float* p) { return __builtin_convertvector(*reinterpret_cast<const Single*>(p), Vec); }
 inline void store(double* p, Vec v) { *reinterpret_cast<Loose*>(p) = v; }
 inline Vec broadcast(double x) { return Vec{} + x; }
 // Masked: the plain AVX-512 intrinsics make GCC 12 warn of an operand that they leave undefined.

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "server/base/units.h"
 #include "server/compensate/known_rows.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -359,9 +361,53 @@ double misfit(const CompensatedModel& model, const JudgingSession& session) {
 
 }  // namespace
 
+namespace {
+
+/// The names of the sessions before the last change that the model knows of; none where it knows of none.
+std::set<std::string> before_last_change(const CompensatedModel& model) {
+  const CompensatedModel::Parts& parts = model.parts();
+  std::size_t last = 0;
+  for (const Change& change : parts.changes) last = std::max(last, change.session);
+  std::set<std::string> names;
+  for (std::size_t s = 0; s < last; ++s) names.insert(parts.sessions[s].id);
+  return names;
+}
+
+/// What was measured since the arm changed for the last time, by either model: rows before it do not judge.
+std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
+  std::set<std::string> before = before_last_change(question.candidate);
+  if (question.in_force != nullptr) before.merge(before_last_change(question.in_force->model));
+  std::vector<JudgingSession> since;
+  for (const JudgingSession& session : question.sessions) {
+    JudgingSession later = session;
+    const auto is_before = [&](const std::string& name) {
+      return before.contains(name) || before.contains(session.batch_id + "/" + name);
+    };
+    if (!has_sessions(session.judges)) {
+      if (is_before(session.batch_id)) {
+        since.clear();  // what came before it in time is older still
+        continue;
+      }
+    } else {
+      std::erase_if(later.judges.measurements, [&](const Measurement& m) {
+        return is_before(session.judges.sessions[static_cast<std::size_t>(m.session)]);
+      });
+      if (later.judges.measurements.empty()) {
+        since.clear();
+        continue;
+      }
+    }
+    since.push_back(std::move(later));
+  }
+  return since.empty() ? question.sessions : since;
+}
+
+}  // namespace
+
 std::vector<JudgingSession> sessions_of_today(const GateQuestion& question) {
-  const std::vector<JudgingSession>& all = question.sessions;
-  if (question.in_force == nullptr) return all;
+  const std::vector<JudgingSession> since = since_last_change(question);
+  if (since.size() < question.sessions.size() || question.in_force == nullptr) return since;
+  const std::vector<JudgingSession>& all = since;
   std::vector<bool> strange;
   for (const JudgingSession& s : all) strange.push_back(misfit(question.in_force->model, s) > kStillFits);
   std::size_t first = all.size();

@@ -61,7 +61,8 @@ struct GateVerdict {
 
 [[nodiscard]] GateVerdict judge(const GateQuestion& question, const GateOptions& options);
 
-/// The sessions that speak about today's arm, by the model in force. A session is strange where its median judge is
+/// The sessions that speak about today's arm. Where one of the models knows of a dated change, only what was measured
+/// since counts. Else by the model in force. A session is strange where its median judge is
 /// twice as far off as that model expects. Where the newest ones are strange and came after the model, the arm has
 /// changed: only they count. Else a strange session counts nothing and, where it was there before the model was
 /// trained, neither do those before it: they are of an arm that was.

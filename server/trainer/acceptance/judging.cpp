@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/compensate/known_rows.h"
+#include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
 #include "server/robot/rigid_fit.h"
 
@@ -182,7 +183,10 @@ CheckedBatch without_older_judges(const CheckedBatch& batch, const std::vector<J
   return batch.holding_out(copies);
 }
 
-LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession& session, JudgedLevel level) {
+namespace {
+
+/// Of one set-up of the instrument.
+LocatedErrors errors_of_one(const CompensatedModel& model, const JudgingSession& session, JudgedLevel level) {
   const auto N = static_cast<Eigen::Index>(session.judges.measurements.size());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   LocatedErrors located{Eigen::Matrix3Xd::Constant(3, N, nan), Eigen::Matrix3Xd::Constant(3, N, nan),
@@ -217,6 +221,26 @@ LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession
     ++oriented;
   }
   return located;
+}
+
+}  // namespace
+
+LocatedErrors located_errors(const CompensatedModel& model, const JudgingSession& session, JudgedLevel level) {
+  if (!has_sessions(session.judges)) return errors_of_one(model, session, level);
+  const auto N = static_cast<Eigen::Index>(session.judges.measurements.size());
+  LocatedErrors all{Eigen::Matrix3Xd(3, N), Eigen::Matrix3Xd(3, N), Eigen::VectorXd(N), Eigen::VectorXd(N)};
+  const std::vector<MeasurementBatch> training = by_session(session.training), judges = by_session(session.judges);
+  Eigen::Index at = 0;  // rows of one set-up stand together
+  for (std::size_t s = 0; s < judges.size(); ++s) {
+    const LocatedErrors one = errors_of_one(model, {session.batch_id, training[s], judges[s]}, level);
+    const Eigen::Index n = one.position.cols();
+    all.position.middleCols(at, n) = one.position;
+    all.rotation.middleCols(at, n) = one.rotation;
+    all.expected.segment(at, n) = one.expected;
+    all.expected_truth.segment(at, n) = one.expected_truth;
+    at += n;
+  }
+  return all;
 }
 
 double coverage(const std::vector<JointVector>& poses, const JointVector& q_min, const JointVector& q_max) {

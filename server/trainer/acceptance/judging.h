@@ -20,7 +20,8 @@ namespace trammel {
 /// Holds out each row that judges, each copy of one that does, and what its submitter holds out (`set`).
 [[nodiscard]] HoldOut held_out_by_service(double share, std::uint64_t seed);
 
-/// One stored batch as it judges. A tracker is set up anew each time, so a session has a base of its own.
+/// One stored batch as it judges. A tracker is set up anew each time, so a session has a base of its own, and each of
+/// several in one batch, too.
 struct JudgingSession {
   std::string batch_id;
   MeasurementBatch training;  ///< tells each model where the base of this session stands

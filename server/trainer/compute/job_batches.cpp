@@ -26,8 +26,9 @@ Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, con
   return check_against_cell(dated(std::move(*parsed), text.taken_in), cell, hold_out);
 }
 
-JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own)
-    : cell_(cell), hold_out_(std::move(hold_out)), own_ids_(std::move(own)) {}
+JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
+                       std::vector<std::string> earlier)
+    : cell_(cell), hold_out_(std::move(hold_out)), own_ids_(std::move(own)), earlier_ids_(std::move(earlier)) {}
 
 void JobBatches::add(const BatchText& text, bool judges) {
   auto batch = received_batch(text, cell_, hold_out_);
@@ -35,7 +36,8 @@ void JobBatches::add(const BatchText& text, bool judges) {
     sessions_.push_back(judging_session(*batch));
     judge_once_ = false;
   }
-  if (text.id.empty() || is_own(text.id)) own_.emplace(text.id, std::move(batch));
+  const bool earlier = std::find(earlier_ids_.begin(), earlier_ids_.end(), text.id) != earlier_ids_.end();
+  if (text.id.empty() || is_own(text.id) || earlier) own_.emplace(text.id, std::move(batch));
 }
 
 Result<CheckedBatch> JobBatches::first() const { return own(own_ids_.empty() ? "" : own_ids_.front()); }
@@ -48,12 +50,16 @@ Result<CheckedBatch> JobBatches::first_without_older_judges() {
 
 Result<CheckedBatch> JobBatches::to_learn_from() {
   std::vector<CheckedBatch> batches;
+  for (const std::string& id : earlier_ids_) {
+    const auto batch = own(id);
+    if (batch) batches.push_back(without_older_judges(*batch, judging_sessions()));
+  }
   for (const std::string& id : own_ids_) {
     const auto batch = own(id);
     if (!batch) return batch;
     batches.push_back(without_older_judges(*batch, judging_sessions()));
   }
-  return joined(batches, cell_);
+  return joined(std::move(batches));
 }
 
 const std::vector<JudgingSession>& JobBatches::judging_sessions() {

@@ -23,8 +23,9 @@ namespace trammel {
 /// once.
 class JobBatches {
  public:
-  /// `own`: the ids of those to work on; none: the one without an id. The cell outlives it.
-  JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own);
+  /// `own`: the ids of those to work on; none: the one without an id. `earlier`: those to learn from as well. The cell
+  /// outlives it.
+  JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own, std::vector<std::string> earlier = {});
 
   /// `judges`: it is one of those that judge, which come oldest first. One of these that does not fit the cell, which
   /// has changed since, does not count.
@@ -34,7 +35,7 @@ class JobBatches {
   [[nodiscard]] Result<CheckedBatch> first() const;
   /// The same without copies of rows that judge in older batches.
   [[nodiscard]] Result<CheckedBatch> first_without_older_judges();
-  /// All to work on together, without such copies.
+  /// All to work on together, and the earlier ones that still fit the cell, without such copies: sessions of one arm.
   [[nodiscard]] Result<CheckedBatch> to_learn_from();
   /// Those whose rows may judge what the job makes, oldest first.
   [[nodiscard]] const std::vector<JudgingSession>& judging_sessions();
@@ -51,8 +52,8 @@ class JobBatches {
 
   const Cell& cell_;
   const HoldOut hold_out_;
-  const std::vector<std::string> own_ids_;
-  std::map<std::string, Result<CheckedBatch>> own_;  // by id
+  const std::vector<std::string> own_ids_, earlier_ids_;
+  std::map<std::string, Result<CheckedBatch>> own_;  // by id, earlier ones among them
   std::vector<JudgingSession> sessions_;
   bool judge_once_ = false;  // sessions_ are as judge_once() leaves them
 };

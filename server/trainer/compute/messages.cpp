@@ -65,6 +65,28 @@ std::string kind_of(const Frame& frame) {
   return kind != frame.head.end() && kind->is_string() ? kind->get<std::string>() : "";
 }
 
+namespace {
+
+Json json_of(const std::optional<FleetPrior>& fleet) {
+  if (!fleet) return nullptr;
+  Json parameters = Json::array();
+  for (const FleetParameter& one : fleet->parameters)
+    parameters.push_back({{"name", one.name}, {"mean", one.mean}, {"spread", one.spread}, {"robots", one.robots}});
+  return {{"robot", fleet->robot}, {"robots", fleet->robots}, {"parameters", parameters}};
+}
+
+std::optional<FleetPrior> fleet_from(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  FleetPrior fleet;
+  fleet.robot = json.at("robot");
+  fleet.robots = json.at("robots");
+  for (const Json& one : json.at("parameters"))
+    fleet.parameters.push_back({one.at("name"), one.at("mean"), one.at("spread"), one.at("robots")});
+  return fleet;
+}
+
+}  // namespace
+
 std::vector<Frame> of_task(const ComputeTask& task) {
   std::vector<Frame> frames;
   frames.push_back(frame("cell", {}, task.cell->cell_yaml));
@@ -72,8 +94,11 @@ std::vector<Frame> of_task(const ComputeTask& task) {
   if (task.in_force) frames.push_back(frame("in_force", {{"version", task.in_force->version}}, task.in_force->text));
   frames.push_back(frame("task", {{"cell", task.cell->name},
                                   {"diagnose", task.kind == JobKind::kDiagnose},
+                                  {"check", task.kind == JobKind::kCheck},
                                   {"batch_ids", task.batch_ids},
+                                  {"earlier_ids", task.earlier_ids},
                                   {"level", task.level},
+                                  {"fleet", json_of(task.fleet)},
                                   {"bias", task.bias},
                                   {"apply", task.apply},
                                   {"hold_against_in_force", task.hold_against_in_force},
@@ -90,10 +115,14 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   if (!cell) return tl::make_unexpected(cell.error());
   ComputeTask task;
   task.cell = std::make_shared<const Cell>(std::move(*cell));
-  task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose : JobKind::kTrain;
+  task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose
+              : head.at("check").get<bool>()  ? JobKind::kCheck
+                                              : JobKind::kTrain;
   task.batch_ids = head.at("batch_ids").get<std::vector<std::string>>();
+  task.earlier_ids = head.at("earlier_ids").get<std::vector<std::string>>();
   task.level = head.at("level");
   task.bias = head.at("bias");
+  task.fleet = fleet_from(head.at("fleet"));
   task.apply = head.at("apply");
   task.hold_against_in_force = head.at("hold_against_in_force");
   task.in_force = std::move(texts.in_force);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/fleet/fleet_prior.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/verdict.h"
 
@@ -24,11 +25,14 @@ struct BatchText {
 struct ComputeTask {
   std::shared_ptr<const Cell> cell;
   JobKind kind = JobKind::kTrain;
-  std::vector<std::string> batch_ids;  ///< to learn from or to diagnose, together; none: the one that was sent
-  std::string level, bias;             ///< of a training; empty: as usual
-  bool apply = false;                  ///< of a diagnosis: train a model with the causes found
-  bool hold_against_in_force = false;  ///< look at the batch first, and learn nothing from one that is strange
+  std::vector<std::string> batch_ids;         ///< to learn from or to diagnose, together; none: the one that was sent
+  std::vector<std::string> earlier_ids = {};  ///< sessions of the same arm to learn from as well, oldest first
+  std::string level, bias;                    ///< of a training; empty: as usual
+                                              ///< `level` of a check: its tolerance in mm; empty: as the cell file says
+  bool apply = false;                         ///< of a diagnosis: train a model with the causes found
+  bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;
+  std::optional<FleetPrior> fleet;  ///< where the cell file says `prior: fleet`, and there are twins
   std::uint64_t seed = 1;
   double validation_share = 0.2;
   double accept_ratio = 1.02;

@@ -2,12 +2,17 @@
 
 #include <utility>
 
+#include "server/base/units.h"
+#include "server/calibrate/batch_check.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
 #include "server/diagnose/triage.h"
+#include "server/health/health_check.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
+#include "server/report/health_json.h"
+#include "server/robot/cell_rules.h"
 #include "server/trainer/acceptance/fits_cell.h"
 #include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/pipeline/extend.h"
@@ -33,6 +38,15 @@ std::shared_ptr<const Cell> as_served(const std::shared_ptr<const Cell>& cell, c
   return served;
 }
 
+Made nothing_applied(const std::string& why, const ServedModel& present) {
+  Made made;
+  made.outcome.verdict = JobVerdict::kNothingApplied;
+  made.outcome.why = why;
+  made.outcome.next = "submit the batch where it is good, and release it";
+  made.message = fmt::format("nothing applied: {}; version {} stays in force", why, present.version);
+  return made;
+}
+
 /// `; ` before each that says something.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
@@ -43,14 +57,14 @@ std::string joined_by_semicolons(const std::vector<std::string>& parts) {
 }
 
 HoldOut hold_out_of(const ComputeTask& task) {
-  return task.kind == JobKind::kDiagnose ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
-                                         : held_out_by_service(task.validation_share, task.seed);
+  return task.kind != JobKind::kTrain ? held_out_of_diagnosis(task.validation_share, task.seed, task.apply)
+                                      : held_out_by_service(task.validation_share, task.seed);
 }
 
 }  // namespace
 
 Workbench::Workbench(ComputeTask task)
-    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids) {}
+    : task_(std::move(task)), batches_(*task_.cell, hold_out_of(task_), task_.batch_ids, task_.earlier_ids) {}
 
 Status Workbench::take(const BatchText& batch, bool judges) {
   batches_.add(batch, judges);
@@ -58,19 +72,31 @@ Status Workbench::take(const BatchText& batch, bool judges) {
 }
 
 Result<Made> Workbench::make(const ComputeWatch& watch) {
-  return task_.kind == JobKind::kTrain ? trained(watch) : diagnosed(watch);
+  switch (task_.kind) {
+    case JobKind::kTrain:
+      return trained(watch);
+    case JobKind::kDiagnose:
+      return diagnosed(watch);
+    case JobKind::kCheck:
+      return checked(watch);
+  }
+  return trained(watch);
 }
 
 Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const auto in_force = this->in_force();
   if (!in_force) return tl::make_unexpected(in_force.error());
   std::string seen;
-  if (task_.hold_against_in_force && *in_force) {
+  if (task_.hold_against_in_force) {
     const auto batch = batches_.first();
     if (!batch) return tl::make_unexpected(batch.error());
-    const Triage triaged = triage((*in_force)->model, *batch);
-    if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
-    if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+    if (const auto doubt = *in_force ? std::nullopt : batch_doubt(batch->rows(), *task_.cell))
+      return Made{std::nullopt, "", sentence(*doubt)};
+    if (*in_force) {
+      const Triage triaged = triage((*in_force)->model, *batch);
+      if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
+      if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+    }
   }
   const auto batch = batches_.to_learn_from();
   if (!batch) return tl::make_unexpected(batch.error());
@@ -80,12 +106,42 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
 }
 
+Result<Made> Workbench::checked(const ComputeWatch& watch) {
+  const auto batch = batches_.first();
+  if (!batch) return tl::make_unexpected(batch.error());
+  const auto present = in_force();
+  if (!present) return tl::make_unexpected(present.error());
+  if (!*present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
+  const auto rules = rules_of(*task_.cell);
+  if (!rules) return tl::make_unexpected(rules.error());
+  HealthOptions options;
+  options.tolerance = rules->tolerance.value_or(kUsualTolerance);
+  if (!task_.level.empty()) options.tolerance = std::stod(task_.level) * from_mm(1);
+  const auto health = check_health((*present)->model, *batch, options);
+  if (!health) return tl::make_unexpected(health.error());
+  const auto& rows = batch->rows().measurements;
+  const auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
+  const Status stored =
+      watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", "");
+  if (!stored) return tl::make_unexpected(stored.error());
+  Made made;
+  made.outcome.verdict = JobVerdict::kDiagnosed;
+  made.outcome.why = health->sentence;
+  made.message = to_string(health->verdict);
+  return made;
+}
+
 Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   // What is to judge an extended model must not have been looked at.
   const auto batch = task_.apply ? batches_.first_without_older_judges() : batches_.first();
   if (!batch) return tl::make_unexpected(batch.error());
   const auto present = in_force();
   if (!present) return tl::make_unexpected(present.error());
+  if (task_.apply && task_.batch_ids.empty() && *present) {
+    // What was sent with the question goes through the same door as what is submitted.
+    const Triage triaged = triage((*present)->model, *batch);
+    if (!triaged.learn) return nothing_applied(triaged.sentence, **present);
+  }
   DiagnoseOptions options;
   options.seed = task_.seed;
   options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage, double share) {
@@ -136,8 +192,10 @@ TrainOptions Workbench::train_options(const ComputeWatch& watch) const {
     options.level = level_with_additions(*task_.cell, in_force_->model);
   }
   if (!task_.bias.empty()) options.bias = task_.bias;
+  options.fleet = task_.fleet;
   options.seed = task_.seed;
   options.trained_at = task_.now;
+  options.looked_at = true;  // by this job, or by whoever asked for a training from batches that he knows
   options.progress = watch.progress;
   return options;
 }

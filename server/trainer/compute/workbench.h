@@ -26,6 +26,7 @@ class Workbench : public Computing {
 
  private:
   [[nodiscard]] Result<Made> trained(const ComputeWatch& watch);
+  [[nodiscard]] Result<Made> checked(const ComputeWatch& watch);
   [[nodiscard]] Result<Made> diagnosed(const ComputeWatch& watch);
   /// With what the diagnosis of `batch` beside the sources `own` found.
   [[nodiscard]] Result<Made> extended(const CheckedBatch& batch, const std::vector<std::string>& own,

@@ -43,6 +43,7 @@ std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics, const 
   for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
     const Measurement& m = batch.measurements[i];
     if (!m.R_WT) return std::nullopt;
+    if (m.sigma_rotation) rotation.sigma(static_cast<Eigen::Index>(i)) = *m.sigma_rotation;
     const Vector3 turn_W = rotation_log(*m.R_WT * physics.pose_W(m.context).linear().transpose());
     rotation.residual_B.row(static_cast<Eigen::Index>(i)) = (R_BW * turn_W).transpose();
   }

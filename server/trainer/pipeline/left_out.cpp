@@ -49,7 +49,8 @@ LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) 
     residual_.segment<3>(6 * i) = (m.p_W - X_WT.translation()) / sigma_(i);
     J_.middleRows<3>(6 * i) = J_W.topRows<3>() / sigma_(i);
     if (!m.R_WT) continue;
-    const double turn = std::hypot(model.cell->tracker.sigma_rotation, found.discrepancy_rotation);
+    const double turn =
+        std::hypot(m.sigma_rotation.value_or(model.cell->tracker.sigma_rotation), found.discrepancy_rotation);
     residual_.segment<3>(6 * i + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose()) / turn;
     J_.middleRows<3>(6 * i + 3) = J_W.bottomRows<3>() / turn;
   }

@@ -14,9 +14,10 @@ namespace {
 
 /// 3 x N, m: what the sources, identified on `train`, leave of `judges`.
 Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
-                                 const MeasurementBatch& train, const MeasurementBatch& judges) {
+                                 const MeasurementBatch& train, const MeasurementBatch& judged_by) {
   const Result<CalibrationResult> identified = calibrate(cell, with_unknown_tool(sources, *cell), train, {});
   if (!identified) return tl::make_unexpected(identified.error());
+  const MeasurementBatch judges = aligned(judged_by, identified->sessions, cell->tracker);
   Eigen::Matrix3Xd left(3, static_cast<Eigen::Index>(judges.measurements.size()));
   for (Eigen::Index i = 0; i < left.cols(); ++i) {
     const Measurement& m = judges.measurements[static_cast<std::size_t>(i)];

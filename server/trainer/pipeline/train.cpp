@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/calibrate/batch_check.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/orientation_check.h"
+#include "server/compensate/world.h"
 #include "server/measurement/repeats.h"
+#include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
+#include "server/trainer/pipeline/among_twins.h"
 #include "server/trainer/pipeline/bias_learning.h"
 #include "server/trainer/pipeline/extrapolation.h"
 #include "server/trainer/pipeline/given_up.h"
 #include "server/trainer/pipeline/left_out.h"
 #include "server/trainer/pipeline/refitted.h"
+#include "server/trainer/pipeline/train_sessions.h"
 
 namespace trammel {
 
@@ -30,14 +35,6 @@ Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions
       options.level ? parse_level(*options.level) : Result<std::vector<std::string>>(cell.model.error_sources);
   if (!names) return names;
   return with_unknown_tool(std::move(*names), cell);
-}
-
-/// The physics, identified anew.
-Result<CalibrationResult> identify(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
-                                   const TrainOptions& options) {
-  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
-  if (!sources) return tl::make_unexpected(sources.error());
-  return calibrate(cell, *sources, batch, {});
 }
 
 /// What to take the arm's temperature for where a request does not say it.
@@ -120,14 +117,22 @@ Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainO
 
 /// train() from another model.
 Result<CompensatedModel> train_from(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
-                                    const CheckedBatch& batch, const BatchSplit& split, const TrainOptions& options,
+                                    const CheckedBatch& batch, BatchSplit split, const TrainOptions& options,
                                     const Report& report) {
+  std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
+  for (MeasurementBatch* rows : {&split.train, &split.validation}) {
+    if (!has_sessions(*rows)) continue;
+    Result<InWorld> placed = in_world_of(from, *rows);
+    if (!placed) return tl::make_unexpected(placed.error());
+    *rows = std::move(placed->batch);
+  }
   Result<Refitted> refit = refitted(from, cell, batch, split.train, options.refit);
   if (!refit) return tl::make_unexpected(refit.error());
   if (options.bias) {
     if (const Status learned = add_bias_anew(*refit, *options.bias, options, report); !learned)
       return tl::make_unexpected(learned.error());
   }
+  refit->parts.sessions_left_out = std::move(unplaced);
   if (!report("validating", 0.9)) return given_up();
   record_stamp(refit->parts, batch, options);
   return validated(std::move(refit->parts), split);
@@ -145,24 +150,56 @@ CompensatedModel::Parts calibrated_parts(CalibrationResult calibration, const Le
   parts.condition_number = calibration.condition_number;
   parts.observability_index = calibration.observability_index;
   parts.suspects = std::move(calibration.suspects);
+  parts.sessions = std::move(calibration.sessions);
   parts.cost_record = std::move(calibration.cost_record);
   parts.discrepancy = calibration.discrepancy;
   return parts;
 }
 
+/// The physics, identified anew; `split` comes into its world.
+Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
+                                      const TrainOptions& options, const Report& report) {
+  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
+  if (!sources) return tl::make_unexpected(sources.error());
+  const Identify identify = [&](const std::vector<std::string>& names) {
+    return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
+                         : calibrate(cell, names, split.train, {});
+  };
+  auto found = identify_sessions(identify, *sources, split.train, [&](double share) {
+    return report("asking what changed between the sessions", 0.3 * share);
+  });
+  if (!found) return found;
+  split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
+  split.validation = aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);
+  return found;
+}
+
 /// train() from nothing but the measurements.
 Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                                    const BatchSplit& split, const TrainOptions& options, const Report& report) {
-  Result<CalibrationResult> calibration = identify(cell, split.train, options);
-  if (!calibration) return tl::make_unexpected(calibration.error());
-  const LeftOut left_out(*calibration, split.train);
-  CompensatedModel::Parts parts = calibrated_parts(std::move(*calibration), left_out);
+                                    BatchSplit split, const TrainOptions& options, const Report& report) {
+  std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
+  Result<IdentifiedSessions> found = identified(cell, split, options, report);
+  if (!found) return tl::make_unexpected(found.error());
+  const LeftOut left_out(found->calibration, split.train);
+  CompensatedModel::Parts parts = calibrated_parts(std::move(found->calibration), left_out);
+  parts.changes = std::move(found->changes);
+  parts.sessions_left_out = std::move(unplaced);
   const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), left_out, options.seed,
                                   [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return tl::make_unexpected(learned.error());
   if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
   return validated(std::move(parts), split);
+}
+
+/// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell file.
+Status check_read(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
+  const Cell known = options.from ? with_known_tools(cell, *options.from, options.refit) : cell;
+  if (options.looked_at) return check_orientations(batch, known);
+  if (!options.from) return check_batch(batch, known);
+  auto doubt = reading_doubt(batch, known);
+  if (!doubt) return {};
+  return Failure(std::move(*doubt)).in("batch " + batch.id);
 }
 
 }  // namespace
@@ -176,9 +213,7 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
     const Status fits = check_may_start_from(*options.from, *cell, batch.rows(), options.refit);
     if (!fits) return tl::make_unexpected(fits.error());
   }
-  const Status oriented =
-      check_orientations(batch.rows(), options.from ? with_known_tools(*cell, *options.from, options.refit) : *cell);
-  if (!oriented) return tl::make_unexpected(oriented.error());
+  if (const Status read = check_read(batch.rows(), *cell, options); !read) return tl::make_unexpected(read.error());
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
   if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
 
@@ -194,20 +229,23 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Ch
   const Cell& cell = calibrated.cell();
   if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
     return tl::make_unexpected(oriented.error());
+  const Result<InWorld> here = in_world_of(calibrated, batch.rows());
+  if (!here) return tl::make_unexpected(here.error());
+  const MeasurementBatch& rows = here->batch;
   CompensatedModel::Parts parts = calibrated.parts();
   if (calibrated.provenance().batch_hash != batch.hash()) parts.suspects.clear();  // of other poses
   CalibrationResult as_it_is;
   as_it_is.model = parts.physics;
   as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());
   as_it_is.suspects = parts.suspects;
-  const LeftOut left_out(as_it_is, batch.rows());
+  const LeftOut left_out(as_it_is, rows);
   parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
   const Status learned =
-      add_bias(parts, batch.rows(), options.bias.value_or(cell.model.bias), left_out, options.seed,
+      add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
                [&](double share) { return !options.progress || options.progress("learning the bias", share); });
   if (!learned) return tl::make_unexpected(learned.error());
-  record_training(parts, batch, batch.rows(), options);
-  return validated(std::move(parts), {batch.rows(), {}});
+  record_training(parts, batch, rows, options);
+  return validated(std::move(parts), {rows, {}});
 }
 
 }  // namespace trammel

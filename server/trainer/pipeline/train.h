@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/fleet/fleet_prior.h"
 #include "server/measurement/checked_batch.h"
 
 namespace trammel {
@@ -17,15 +18,20 @@ struct TrainOptions {
   /// A model of this robot to start from: only `refit` is identified anew, and a bias only where `bias` names one.
   std::optional<CompensatedModel> from;
   std::vector<std::string> refit = {"base", "tool"};
+  /// What robots of this type have in common: the prior of the arm's parameters, but for those in which this robot is
+  /// unlike its twins. Empty: the drawing alone.
+  std::optional<FleetPrior> fleet = {};
   std::uint64_t seed = 1;
   std::int64_t trained_at = 0;  ///< Unix time, s, as recorded
+  /// Somebody who knows the batch has looked at it: positions are learned from as they are read.
+  bool looked_at = false;
   /// What is being done and the share done of all in [0, 1]; return false to give up.
   std::function<bool(const std::string& stage, double share)> progress;
 };
 
 /// CheckedBatch -> calibrate -> fit bias -> CompensatedModel, learned from the training rows and validated on those
-/// held out. `batch` is checked against `cell`. Refuses orientations that do not follow the joints, and what
-/// calibrate() and BiasModel::fit() refuse.
+/// held out. `batch` is checked against `cell`. Refuses positions and orientations that do not follow the joints
+/// (batch_doubt()), and what calibrate() and BiasModel::fit() refuse.
 [[nodiscard]] Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBatch& batch,
                                              const TrainOptions& options);
 

@@ -1,0 +1,390 @@
+#include "clients/cam/fanuc/fanuc.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdlib>
+#include <set>
+
+#include "clients/cam/scan.h"
+#include "clients/cam/sites.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "W", "P", "R"};
+constexpr std::array<const char*, 6> kJoints = {"J1", "J2", "J3", "J4", "J5", "J6"};
+
+using Pieces = std::vector<Piece>;
+
+/// Values of one motion group of a position.
+struct Group {
+  std::map<std::string, Piece> values;
+  std::string frame, tool, config;
+};
+
+struct Position {
+  std::size_t begin = 0;
+  int line = 1;
+  std::string name;  ///< `P[3]`
+  std::map<int, Group> groups;
+  std::string changed;
+};
+
+/// PR[m] as far as the program sets it: by elements.
+struct Register {
+  std::array<std::optional<double>, 6> elements;
+  std::string changed;  ///< why it is not constant
+};
+
+double number(const Piece& piece) {
+  const auto written = read_number(piece.text);
+  return written ? written->value : 0;
+}
+
+class File {
+ public:
+  File(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
+      : index_(index), program_(program), sites_(sites), options_(options), text_(program.files[index].text) {}
+
+  void read() {
+    const auto pieces = [&](const Part& part) {
+      return pieces_of(text_, part.begin, part.end, part.line, {"", "'\""});
+    };
+    const Part motions = part_of("/MN"), positions = part_of("/POS");
+    program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
+    read_positions(pieces(positions));
+    statements_ = statements(pieces(motions));
+    for (const Pieces& statement : statements_) note_setting(statement);
+    for (const Pieces& statement : statements_) motion(statement);
+    finish();
+  }
+
+  std::string describe(const Site& site, ProgramTarget& target) const {
+    const Position& position = positions_.at(site.begin);
+    target.line = position.line;
+    if (!position.changed.empty()) return position.changed;
+    const auto robot = position.groups.find(1);
+    if (robot == position.groups.end()) return "it has no group 1";
+    const Group& group = robot->second;
+    for (const auto& [number_of_group, other] : position.groups) note_external(number_of_group, other, target);
+    const bool joints = group.values.contains("J1");
+    if (joints && options_.keep_joints) return "joint targets are kept (--keep-joints)";
+    target.coordinates = joints ? Coordinates::kJoints : Coordinates::kAnglesXyz;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const char* name = joints ? kJoints[k] : kPose[k];
+      const auto value = group.values.find(name);
+      const auto written = value == group.values.end() ? std::nullopt : read_number(value->second.text);
+      if (!written) return fmt::format("it does not say {}", name);
+      target.numbers.push_back(written->value);
+      target.rewrites.push_back({{value->second.begin, value->second.end}, {}, {{k, written->style}}});
+    }
+    if (!joints) target.configuration = configuration_of(group.config);
+    return "";
+  }
+
+ private:
+  struct Part {
+    std::size_t begin = 0, end = 0;
+    int line = 1;
+  };
+
+  /// What stands between a line that is `head` and the next that begins with `/`.
+  [[nodiscard]] Part part_of(const std::string& head) const {
+    Part part{text_.size(), text_.size(), 1};
+    bool inside = false;
+    int line = 1;
+    for (std::size_t at = 0; at < text_.size(); ++line) {
+      const std::size_t end = std::min(text_.find('\n', at), text_.size() - 1) + 1;
+      const std::size_t first = text_.find_first_not_of(" \t", at);
+      if (first < end && text_[first] == '/') {
+        if (inside) {
+          part.end = at;
+          return part;
+        }
+        const std::size_t stop = text_.find_first_of(" \t\r\n", first);
+        inside = text_.substr(first, std::min(stop, end) - first) == head;
+        if (inside) part = {end, text_.size(), line + 1};
+      }
+      at = end;
+    }
+    return part;
+  }
+
+  /// `P[3:"hole"]{ GP1: UF : 1, UT : 2, CONFIG : 'N U T, 0, 0, 0', X = 1.000 mm, ... };`
+  void read_positions(const Pieces& pieces) {
+    for (std::size_t at = 0; at + 3 < pieces.size(); ++at) {
+      if (!pieces[at].is("P") || !pieces[at + 1].is("[") || pieces[at + 2].kind != Piece::Kind::kNumber) continue;
+      Position position;
+      position.begin = pieces[at].begin;
+      position.line = pieces[at].line;
+      position.name = fmt::format("P[{}]", pieces[at + 2].text);
+      while (at < pieces.size() && !pieces[at].is("{")) ++at;
+      const std::size_t begin = at;
+      while (at < pieces.size() && !pieces[at].is("}")) ++at;
+      read_groups(pieces, begin, at, position);
+      by_name_[position.name] = position.begin;
+      positions_[position.begin] = std::move(position);
+    }
+  }
+
+  static void read_groups(const Pieces& pieces, std::size_t begin, std::size_t end, Position& position) {
+    int group = 1;
+    for (std::size_t at = begin; at + 2 < end; ++at) {
+      const std::string word(pieces[at].text);
+      if (pieces[at].kind != Piece::Kind::kWord) continue;
+      Group& now = position.groups[group];
+      if (word.starts_with("GP") && pieces[at + 1].is(":")) {
+        group = std::atoi(word.c_str() + 2);
+        continue;
+      }
+      if (pieces[at + 1].is("=")) {
+        if (pieces[at + 2].kind == Piece::Kind::kNumber) now.values[word] = pieces[at + 2];
+      } else if (pieces[at + 1].is(":")) {
+        if (word == "UF") now.frame = std::string(pieces[at + 2].text);
+        if (word == "UT") now.tool = std::string(pieces[at + 2].text);
+        if (word == "CONFIG") now.config = std::string(pieces[at + 2].text);
+      }
+    }
+    if (position.groups.contains(1) && position.groups[1].values.empty() && position.groups.size() > 1 &&
+        position.groups[1].frame.empty())
+      position.groups.erase(1);
+  }
+
+  /// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers.
+  static std::vector<Pieces> statements(const Pieces& pieces) {
+    std::vector<Pieces> all(1);
+    for (const Piece& piece : pieces) {
+      if (piece.is(";")) {
+        all.emplace_back();
+        continue;
+      }
+      all.back().push_back(piece);
+    }
+    for (Pieces& one : all) {
+      while (!one.empty() && (one[0].kind == Piece::Kind::kNumber || one[0].is(":"))) one.erase(one.begin());
+    }
+    return all;
+  }
+
+  static std::string indexed(const Pieces& pieces, std::size_t at) {
+    if (at + 3 >= pieces.size() || !pieces[at + 1].is("[")) return "";
+    if (pieces[at + 2].kind != Piece::Kind::kNumber) return fmt::format("{}[*]", pieces[at].text);
+    return fmt::format("{}[{}]", pieces[at].text, pieces[at + 2].text);
+  }
+
+  /// `UFRAME_NUM=1`, `UTOOL[2]=PR[5]`, `PR[5,1]=100`, `PR[5]=LPOS`, `P[1]=...`
+  void note_setting(const Pieces& statement) {
+    if (statement.size() < 3) return;
+    std::size_t equals = 0;
+    while (equals < statement.size() && !statement[equals].is("=")) ++equals;
+    if (equals + 1 >= statement.size()) return;
+    const std::string word(statement[0].text);
+    const std::string name = indexed(statement, 0);
+    const std::string where = fmt::format("{} line {}", program_.files[index_].name, statement[0].line);
+    if (word == "PR" && !name.empty()) return note_register(statement, equals, name, where);
+    if ((word == "UFRAME" || word == "UTOOL") && !name.empty()) {
+      const std::string from = indexed(statement, equals + 1);
+      const bool twice = !set_from_.emplace(name, from).second;
+      if (twice && set_from_[name] != from) changed_[name] = fmt::format("{} is set at run time ({})", name, where);
+    } else if (word == "P" && name.starts_with("P[")) {
+      const auto position = by_name_.find(name);
+      const std::string why = fmt::format("{} is set at run time ({})", name, where);
+      if (position != by_name_.end()) positions_[position->second].changed = why;
+      if (name == "P[*]") {
+        for (auto& [begin, any] : positions_) any.changed = why;
+      }
+    }
+  }
+
+  void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where) {
+    Register& set = registers_[name];
+    const bool element = equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
+    const bool constant = equals + 2 == statement.size() && statement[equals + 1].kind == Piece::Kind::kNumber;
+    const int index = element ? static_cast<int>(number(statement[4])) : 0;
+    if (!element || !constant || index < 1 || index > 6) {
+      set.changed = fmt::format("{} is set at run time ({})", name, where);
+      return;
+    }
+    std::optional<double>& value = set.elements[static_cast<std::size_t>(index - 1)];
+    const double now = number(statement[equals + 1]);
+    if (value && *value != now) set.changed = fmt::format("{} is set several times ({})", name, where);
+    value = now;
+  }
+
+  /// The value of UFRAME[n] or UTOOL[n]; else why it is not known.
+  std::optional<Pose> setting(const std::string& name, std::string& why) const {
+    if (const auto given = options_.frames.find(name); given != options_.frames.end()) return given->second;
+    const auto from = set_from_.find(name);
+    if (from == set_from_.end()) {
+      why = fmt::format("{} is not in the files handed over: --frames tells its value", name);
+      return std::nullopt;
+    }
+    if (const auto set = changed_.find(name); set != changed_.end()) {
+      why = set->second;
+      return std::nullopt;
+    }
+    const auto set = registers_.find(from->second);
+    std::vector<double> numbers;
+    for (std::size_t k = 0; set != registers_.end() && set->second.changed.empty() && k < 6; ++k) {
+      if (set->second.elements[k]) numbers.push_back(*set->second.elements[k]);
+    }
+    if (numbers.size() == 6) return pose_of(Coordinates::kAnglesXyz, numbers);
+    why = fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(from->second));
+    return std::nullopt;
+  }
+
+  std::size_t frame_of(const std::string& number_text) {
+    ProgramFrame frame;
+    frame.name = fmt::format("UFRAME[{}]", number_text);
+    if (number_text != "0") {
+      if (const auto X = setting(frame.name, frame.why_not)) frame.X_BO = *X;
+    }
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      if (program_.frames[k].name == frame.name && program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12)) return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+
+  std::size_t tool_of(const std::string& number_text) {
+    ProgramTool tool;
+    tool.name = fmt::format("UTOOL[{}]", number_text);
+    std::string why;
+    if (number_text == "0") {
+      tool.X_FT = Pose::Identity();
+    } else if (const auto X = setting(tool.name, why)) {
+      tool.X_FT = *X;
+      tool.file = program_.files[index_].name;
+      tool.rotation_rounding = from_deg(0.001);
+    }
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      if (program_.tools[k].name == tool.name && program_.tools[k].file == tool.file) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
+  void leave(const Pieces& statement, const std::string& name, const std::string& why) {
+    program_.left.push_back({name, index_, statement[0].line, std::string(statement[0].text), why});
+  }
+
+  /// `J P[1] 100% FINE`, `L PR[3] ... Offset,PR[1]`, `C P[4] P[5] ...`, `A P[6] ...`
+  void motion(const Pieces& statement) {
+    static const std::set<std::string_view> kMotions = {"J", "L", "C", "A", "S"};
+    if (statement.size() < 4 || !kMotions.contains(statement[0].text)) return;
+    if (!statement[1].is("P") && !statement[1].is("PR")) return;
+    program_.moves.push_back({index_, statement[0].line, {}, false});
+    std::string why;
+    for (const Piece& piece : statement) {
+      if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") || piece.is("TOOL_OFFSET") ||
+          piece.is("VOFFSET") || piece.is("INC"))
+        why = fmt::format("{} displaces it at run time", piece.text);
+      if (piece.is("Skip") || piece.is("SKIP")) why = "a sensor may end the motion (Skip)";
+    }
+    for (std::size_t at = 1; at + 2 < statement.size(); ++at) {
+      if ((!statement[at].is("P") && !statement[at].is("PR")) || !statement[at + 1].is("[")) continue;
+      if (at > 1 && statement[at - 1].is(",")) continue;  // the register of an offset
+      const std::string name = indexed(statement, at);
+      if (statement[at].is("PR")) {
+        leave(statement, name, "it is a register, which any program may set");
+      } else if (!why.empty()) {
+        leave(statement, name, why);
+      } else {
+        use(statement, name);
+      }
+      if (!statement[0].is("C")) return;
+    }
+  }
+
+  void use(const Pieces& statement, const std::string& name) {
+    bool any = false;
+    for (const auto& [known, begin] : by_name_) {
+      if (known != name && name != "P[*]") continue;
+      any = true;
+      const Position& position = positions_.at(begin);
+      const auto group = position.groups.find(1);
+      const Group empty;
+      const Group& robot = group == position.groups.end() ? empty : group->second;
+      const bool joint = statement[0].is("J");
+      sites_.add(index_, begin, known,
+                 {tool_of(robot.tool.empty() ? "?" : robot.tool), frame_of(robot.frame.empty() ? "?" : robot.frame),
+                  std::string(statement[0].text), index_, statement[0].line, program_.moves.size() - 1, !joint});
+      used_.insert(begin);
+    }
+    if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
+  }
+
+  void finish() {
+    for (const auto& known : positions_) {
+      const auto& [begin, position] = known;
+      const std::string& name = position.name;
+      const bool listed = std::any_of(program_.left.begin(), program_.left.end(), [&](const LeftAlone& left) {
+        return left.file == index_ && left.name == name;
+      });
+      if (!used_.contains(begin) && !listed)
+        program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});
+    }
+  }
+
+  /// Groups beyond the first, and E1 to E3 of the first.
+  static void note_external(int group, const Group& values, ProgramTarget& target) {
+    for (int k = 1; k <= 6; ++k) {
+      const auto extended = values.values.find(fmt::format("E{}", k));
+      if (group == 1 && extended != values.values.end()) target.external[k - 1] = number(extended->second);
+      const auto joint = values.values.find(fmt::format("J{}", k));
+      if (group > 1 && joint != values.values.end()) target.external[6 * (group - 1) + k - 1] = number(joint->second);
+    }
+  }
+
+  /// `'N U T, 0, 0, 0'`: wrist not flipped, elbow up, toward the front; turns of joints 1, 4, 6.
+  static Configuration configuration_of(const std::string& text) {
+    Configuration said;
+    const std::size_t comma = text.find(',');
+    for (const char c : text.substr(0, comma)) {
+      if (c == 'N' || c == 'F') said.bends_down = c == 'N';
+      if (c == 'U' || c == 'D') said.elbow_up = c == 'U';
+      if (c == 'T' || c == 'B') said.behind_axis_1 = c == 'B';
+    }
+    said.turns.resize(6);
+    std::size_t at = comma;
+    for (const std::size_t joint : {std::size_t{0}, std::size_t{3}, std::size_t{5}}) {
+      if (at == std::string::npos) break;
+      said.turns[joint] = std::atoi(text.c_str() + at + 1);
+      at = text.find(',', at + 1);
+    }
+    return said;
+  }
+
+  std::size_t index_;
+  Program& program_;
+  Sites& sites_;
+  const ReadOptions& options_;
+  const std::string& text_;
+  std::map<std::size_t, Position> positions_;  ///< by their first byte
+  std::map<std::string, std::size_t> by_name_;
+  std::vector<Pieces> statements_;
+  std::map<std::string, Register> registers_;
+  std::map<std::string, std::string> set_from_, changed_;
+  std::set<std::size_t> used_;
+};
+
+}  // namespace
+
+Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options) {
+  Program program;
+  program.dialect = "fanuc";
+  program.files = std::move(files);
+  Sites sites;
+  std::vector<File> read;
+  read.reserve(program.files.size());
+  for (std::size_t f = 0; f < program.files.size(); ++f) read.emplace_back(f, program, sites, options).read();
+  sites.finish(program,
+               [&](const Site& site, ProgramTarget& target) { return read[site.file].describe(site, target); });
+  return program;
+}
+
+}  // namespace trammel::cam

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "clients/cam/program.h"
+
+namespace trammel::cam {
+
+/// Reads FANUC TP programs (.ls). Positions are those of /POS, poses or joints, with the user frame and tool that they
+/// say. The values of UFRAME[n] and UTOOL[n] come from `UFRAME[n]=PR[m]` with a constant PR[m], or from the user. The
+/// world frame is taken as the robot's base.
+[[nodiscard]] Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options);
+
+}  // namespace trammel::cam

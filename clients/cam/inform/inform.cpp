@@ -1,0 +1,195 @@
+#include "clients/cam/inform/inform.h"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "clients/cam/scan.h"
+#include "clients/cam/sites.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+struct Position {
+  std::size_t begin = 0;
+  int line = 1;
+  std::string kind, tool, user;  ///< as POSTYPE, TOOL, USER stood above it
+  std::vector<int> conf;         ///< RCONF
+  std::vector<Piece> numbers;
+};
+
+class Job {
+ public:
+  Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
+      : index_(index), program_(program), sites_(sites), options_(options), text_(program.files[index].text) {}
+
+  void read() {
+    program_.mark_places.push_back({text_.size(), "'", "", true});
+    bool instructions = false;
+    std::size_t begin = 0;
+    for (int number = 1; begin < text_.size(); ++number) {
+      const std::size_t end = std::min(text_.find('\n', begin), text_.size());
+      const std::string_view line = std::string_view(text_).substr(begin, end - begin);
+      if (line.starts_with("//INST")) instructions = true;
+      if (line.starts_with("NOP") && instructions && program_.mark_places[index_].at == text_.size())
+        program_.mark_places[index_].at = std::min(end + 1, text_.size());
+      if (instructions)
+        instruction(begin, end, number);
+      else
+        header(line, begin, end, number);
+      begin = end + 1;
+    }
+    for (const auto& [name, position] : positions_) {
+      if (!used_.contains(name))
+        program_.left.push_back({name, index_, position.line, "", "no motion in this job goes to it"});
+    }
+  }
+
+  std::string describe(const Site& site, ProgramTarget& target) const {
+    const Position& position = positions_.at(site.name);
+    target.line = position.line;
+    if (position.kind == "PULSE") return "it is in pulses, which need the robot's gear data";
+    if (position.numbers.size() < 6) return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
+    target.coordinates = Coordinates::kAnglesXyz;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto written = read_number(position.numbers[k].text);
+      if (!written) return "it holds what is no number";
+      target.numbers.push_back(written->value);
+      target.rewrites.push_back({{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
+    }
+    target.configuration = configuration_of(position.conf);
+    return "";
+  }
+
+ private:
+  static std::string value_behind(std::string_view line) {
+    const std::size_t at = line.find(' ');
+    if (at == std::string_view::npos) return "";
+    const std::size_t end = line.find_last_not_of(" \t\r");
+    return std::string(line.substr(at + 1, end - at));
+  }
+
+  void header(std::string_view line, std::size_t begin, std::size_t end, int number) {
+    if (line.starts_with("///TOOL")) now_.tool = value_behind(line);
+    if (line.starts_with("///USER")) now_.user = value_behind(line);
+    if (line.starts_with("///POSTYPE")) now_.kind = value_behind(line);
+    if (line.starts_with("///RCONF")) {
+      now_.conf.clear();
+      for (const Piece& piece : pieces_of(text_, begin + 8, end, number, {})) {
+        if (const auto written = read_number(piece.text)) now_.conf.push_back(static_cast<int>(written->value));
+      }
+    }
+    const std::size_t equals = line.find('=');
+    if (line.empty() || line[0] != 'C' || equals == std::string_view::npos || equals < 2) return;
+    Position position = now_;
+    position.begin = begin;
+    position.line = number;
+    for (const Piece& piece : pieces_of(text_, begin + equals + 1, end, number, {})) {
+      if (piece.kind == Piece::Kind::kNumber) position.numbers.push_back(piece);
+    }
+    positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
+  }
+
+  std::size_t tool_of(const Position& position) {
+    ProgramTool tool;
+    tool.name = fmt::format("TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
+    if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      if (program_.tools[k].name == tool.name) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
+  std::size_t frame_of(const Position& position) {
+    ProgramFrame frame;
+    frame.name = position.kind;
+    if (position.kind == "USER") {
+      frame.name = fmt::format("USER[{}]", position.user);
+      if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
+        frame.X_BO = given->second;
+      } else {
+        frame.why_not = fmt::format("{} is not in the job: --frames tells its value", shown(frame.name));
+      }
+    } else if (position.kind != "BASE" && position.kind != "ROBOT" && position.kind != "PULSE") {
+      frame.why_not = fmt::format("frame {} is not known", shown(position.kind));
+    }
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      if (program_.frames[k].name == frame.name) return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+
+  void instruction(std::size_t begin, std::size_t end, int number) {
+    const std::vector<Piece> pieces = pieces_of(text_, begin, end, number, {"'", "\""});
+    if (pieces.empty()) return;
+    const std::string word(pieces[0].text);
+    if (word == "SFTON") shifted_ = fmt::format("SFTON displaces it (line {})", number);
+    if (word == "SFTOF") shifted_.clear();
+    static const std::set<std::string> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
+    if (!kMotions.contains(word) || pieces.size() < 2) return;
+    program_.moves.push_back({index_, number, {}, false});
+    const std::string name(pieces[1].text);
+    const auto leave = [&](const std::string& why) {
+      used_.insert(name);
+      program_.left.push_back({name, index_, number, word, why});
+    };
+    for (const Piece& piece : pieces) {
+      if (piece.is("UNTIL")) return leave("a sensor may end the motion (UNTIL)");
+    }
+    if (word == "IMOV") return leave("it is relative to where the robot is");
+    if (!shifted_.empty()) return leave(shifted_);
+    const auto position = positions_.find(name);
+    if (position == positions_.end()) return leave("it is a variable, which any job may set");
+    used_.insert(name);
+    sites_.add(index_, position->second.begin, name,
+               {tool_of(position->second), frame_of(position->second), word, index_, number, program_.moves.size() - 1,
+                word != "MOVJ"});
+  }
+
+  /// `1,0,0,0,0,0`: wrist not flipped, upper arm, front; R, T, S below 180 deg.
+  static Configuration configuration_of(const std::vector<int>& conf) {
+    Configuration said;
+    if (conf.size() < 3) return said;
+    said.bends_down = conf[0] == 1;
+    said.elbow_up = conf[1] == 0;
+    said.behind_axis_1 = conf[2] == 1;
+    said.turns.resize(6);
+    constexpr std::array<std::size_t, 3> kTurning = {3, 5, 0};
+    for (std::size_t k = 0; k < 3 && k + 3 < conf.size(); ++k) {
+      if (conf[k + 3] == 0) said.turns[kTurning[k]] = 0;
+    }
+    return said;
+  }
+
+  std::size_t index_;
+  Program& program_;
+  Sites& sites_;
+  const ReadOptions& options_;
+  const std::string& text_;
+  Position now_;
+  std::map<std::string, Position> positions_;
+  std::set<std::string> used_;
+  std::string shifted_;
+};
+
+}  // namespace
+
+Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
+  Program program;
+  program.dialect = "inform";
+  program.files = std::move(files);
+  Sites sites;
+  std::vector<Job> jobs;
+  jobs.reserve(program.files.size());
+  for (std::size_t f = 0; f < program.files.size(); ++f) jobs.emplace_back(f, program, sites, options).read();
+  sites.finish(program,
+               [&](const Site& site, ProgramTarget& target) { return jobs[site.file].describe(site, target); });
+  return program;
+}
+
+}  // namespace trammel::cam

@@ -1,0 +1,695 @@
+#include "clients/cam/krl/krl.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <tl/expected.hpp>
+
+#include "clients/cam/krl/lines.h"
+#include "clients/cam/sites.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+using krl::Line;
+using krl::Token;
+using krl::TokenKind;
+using krl::Value;
+
+template <typename T>
+using Told = tl::expected<T, std::string>;
+tl::unexpected<std::string> because(std::string why) { return tl::make_unexpected(std::move(why)); }
+
+constexpr int kDeepest = 20;  // calls within calls, names that stand for names
+constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "A", "B", "C"};
+constexpr std::array<const char*, 6> kAxes = {"A1", "A2", "A3", "A4", "A5", "A6"};
+
+/// Of a number that the program did not write.
+const NumberStyle kThreeDecimals = [] {
+  NumberStyle style;
+  style.decimals = 3;
+  return style;
+}();
+
+/// A value that a line gives to a name.
+struct Assigned {
+  std::size_t file = 0, line = 0;
+  std::vector<Value> operands;
+};
+
+struct Variable {
+  std::vector<Assigned> values;
+  std::string changed;  ///< why its value is decided at run time
+};
+
+struct Routine {
+  std::string name;
+  std::size_t file = 0, first = 0, last = 0;  ///< lines
+};
+
+/// What the controller has set when a motion comes.
+struct State {
+  std::size_t tool = 0, frame = 0;
+  std::string fixed_tool;  ///< why the robot does not hold the tool; empty: it does
+  auto operator<=>(const State&) const = default;
+};
+
+std::string upper(std::string text) {
+  for (char& c : text) {
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  }
+  return text;
+}
+
+std::string stem_of(const std::string& name) { return upper(name.substr(0, name.rfind('.'))); }
+
+/// `XP[3].X` -> `XP[3]`
+std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
+
+bool is_motion(const std::string& word) {
+  static const std::set<std::string> kMotions = {"PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL"};
+  return kMotions.contains(word);
+}
+bool is_relative(const std::string& word) {
+  return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
+}
+
+class Reader {
+ public:
+  Reader(std::vector<SourceFile> files, const ReadOptions& options) : options_(options) {
+    program_.dialect = "krl";
+    program_.files = std::move(files);
+    program_.frames.push_back({"$BASE", Pose::Identity(), "no $BASE is set before it"});
+    program_.frames.push_back({"$NULLFRAME", Pose::Identity(), ""});
+    program_.tools.push_back({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "no $TOOL is set before it"});
+  }
+
+  Program read() {
+    for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
+    std::set<std::string> called;
+    for (const Routine& routine : routines_) note_calls(routine, called);
+    for (std::size_t r = 0; r < routines_.size(); ++r) {
+      if (!called.contains(routines_[r].name)) run(r, {}, 0);
+    }
+    for (std::size_t r = 0; r < routines_.size(); ++r) {
+      if (!ran_.contains(r)) run(r, {}, 0);
+    }
+    sites_.finish(program_, [this](const Site& site, ProgramTarget& target) { return describe(site, target); });
+    list_unused();
+    return std::move(program_);
+  }
+
+ private:
+  // First pass: lines, routines, names.
+
+  void collect(std::size_t f) {
+    lines_.push_back(krl::lines_of(program_.files[f].text));
+    int open = -1;  // the routine that the line is in
+    MarkPlace mark{program_.files[f].text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "; "};
+    const std::vector<Line>& lines = lines_[f];
+    bool any = false;
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      note_tool_name(lines[k]);
+      const std::vector<Token>& tokens = lines[k].tokens;
+      const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
+      if (tokens.size() > first + 1 &&
+          (tokens[first].text == "DEF" || tokens[first].text == "DEFFCT" || tokens[first].text == "DEFDAT")) {
+        const std::size_t name = first + (tokens[first].text == "DEFFCT" && tokens.size() > first + 2 ? 2 : 1);
+        if (!any) mark.at = k + 1 < lines.size() ? lines[k + 1].begin : mark.at;
+        any = true;
+        if (tokens[first].text == "DEFDAT") continue;
+        routines_.push_back({tokens[name].text, f, k + 1, lines.size()});
+        open = static_cast<int>(routines_.size()) - 1;
+      } else if (!tokens.empty() && (tokens[0].text == "END" || tokens[0].text == "ENDFCT") && open >= 0) {
+        routines_[static_cast<std::size_t>(open)].last = k;
+        open = -1;
+      } else {
+        note_value(f, k);
+      }
+    }
+    if (!any) routines_.push_back({"", f, 0, lines.size()});
+    program_.mark_places.push_back(mark);
+  }
+
+  /// `;FOLD PTP P1 ... Tool[1]:spindle Base[2]:panel;...`
+  void note_tool_name(const Line& line) {
+    if (!line.comment.starts_with("FOLD")) return;
+    const std::size_t at = line.comment.find("Tool[");
+    const std::size_t close = line.comment.find("]:", at == std::string_view::npos ? line.comment.size() : at);
+    if (at == std::string_view::npos || close == std::string_view::npos) return;
+    const std::size_t end = line.comment.find_first_of(" ;,\t\r", close + 2);
+    const std::string number(line.comment.substr(at + 5, close - at - 5));
+    tool_names_.emplace(number, std::string(line.comment.substr(close + 2, end - close - 2)));
+  }
+
+  /// A declaration or assignment: behind `DECL` and a type, or bare.
+  void note_value(std::size_t f, std::size_t k) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
+                                                 "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
+    std::size_t at = 0;
+    bool declared = false;
+    while (at < tokens.size() &&
+           (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
+      declared |= tokens[at].text == "DECL";
+      ++at;
+    }
+    if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
+        tokens[at + 1].kind == TokenKind::kWord)
+      ++at;
+    if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
+    std::size_t next = at;
+    const std::vector<Value> name = krl::operands_at(tokens, at, &next);
+    if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
+    if (next >= tokens.size() || tokens[next].text != "=") return;
+    std::size_t end = next;
+    std::vector<Value> operands = krl::operands_at(tokens, next + 1, &end);
+    const std::string root = root_of(name[0].name);
+    const auto key = std::pair(stem_of(program_.files[f].name), root);
+    Variable& variable = variables_[key];
+    if (root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
+      variable.changed = set_at(root, f, k);
+      return;
+    }
+    variable.values.push_back({f, k, std::move(operands)});
+    if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
+  }
+
+  std::string set_at(const std::string& name, std::size_t f, std::size_t k) const {
+    return fmt::format("{} is set at run time ({})", shown(name), place(f, k));
+  }
+  std::string place(std::size_t f, std::size_t k) const {
+    return fmt::format("{} line {}", program_.files[f].name, lines_[f][k].number);
+  }
+
+  /// The variable of a file's own data list, else of any.
+  [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const {
+    const auto own = variables_.find({stem_of(program_.files[f].name), name});
+    if (own != variables_.end()) return &own->second;
+    for (const auto& [key, variable] : variables_) {
+      if (key.second == name) return &variable;
+    }
+    return nullptr;
+  }
+
+  /// The only value of a name.
+  Told<const Assigned*> value_of(const std::string& name, std::size_t f) const {
+    const Variable* variable = find(root_of(name), f);
+    if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
+    // One element of an array is changed where any may be.
+    const std::string any = name.substr(0, name.find('[')) + "[*]";
+    const Variable* all = name.find('[') == std::string::npos ? nullptr : find(any, f);
+    if (all != nullptr && !all->changed.empty()) return because(all->changed);
+    if (!variable->changed.empty()) return because(variable->changed);
+    if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
+    return &variable->values[0];
+  }
+
+  // Values.
+
+  Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const {
+    if (operands.empty() || depth > kDeepest) return because("it is not constant");
+    Pose X = Pose::Identity();
+    for (const Value& operand : operands) {
+      const Told<Pose> one = frame_of(operand, f, depth);
+      if (!one) return one;
+      X = X * *one;
+    }
+    return X;
+  }
+
+  Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const {
+    if (value.kind == Value::Kind::kAggregate) {
+      const Told<std::vector<double>> numbers = numbers_of(value, kPose);
+      if (!numbers) return because(numbers.error());
+      return pose_of(Coordinates::kAnglesZyx, *numbers);
+    }
+    if (value.kind != Value::Kind::kName) return because("it is not constant");
+    if (value.name == "$NULLFRAME" || value.name == "$WORLD" || value.name == "$ROBROOT") return Pose::Identity();
+    if (value.name.starts_with("$")) return because(fmt::format("{} decides it", shown(value.name)));
+    const Told<const Assigned*> assigned = value_of(value.name, f);
+    if (!assigned) return because(assigned.error());
+    return frame_of((*assigned)->operands, (*assigned)->file, depth + 1);
+  }
+
+  static Told<std::vector<double>> numbers_of(const Value& value, const std::array<const char*, 6>& fields) {
+    std::vector<double> numbers;
+    for (const char* name : fields) {
+      const Value* field = value.field(name);
+      if (field == nullptr) return because(fmt::format("it does not say {}", name));
+      if (field->kind != Value::Kind::kNumber) return because(fmt::format("{} is not a constant number", name));
+      numbers.push_back(field->number);
+    }
+    return numbers;
+  }
+
+  // Tools and bases.
+
+  std::size_t add_tool(ProgramTool tool) {
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      const ProgramTool& known = program_.tools[k];
+      if (known.name == tool.name && known.file == tool.file && known.line == tool.line) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+  std::size_t add_frame(ProgramFrame frame) {
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      const ProgramFrame& known = program_.frames[k];
+      if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12))
+        return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+
+  std::size_t tool_numbered(int number, std::size_t f) {
+    if (number == 0) return add_tool({"TOOL_DATA[0]", "", 0, Pose::Identity(), std::nullopt, 0, ""});
+    const std::string data = fmt::format("TOOL_DATA[{}]", number);
+    ProgramTool tool;
+    const auto named = tool_names_.find(std::to_string(number));
+    tool.name = named == tool_names_.end() ? data : named->second;
+    if (const auto given = options_.frames.find(data); given != options_.frames.end()) {
+      tool.X_FT = given->second;
+    } else if (const Variable* variable = find(data, f)) {
+      if (!variable->changed.empty())
+        tool.why_not = variable->changed;
+      else if (!variable->values.empty())
+        fill(variable->values[0], tool);
+    }
+    if (const Variable* load = find(fmt::format("LOAD_DATA[{}]", number), f); load != nullptr && !load->values.empty())
+      tool.load = load_of(load->values[0].operands);
+    return add_tool(std::move(tool));
+  }
+
+  void fill(const Assigned& assigned, ProgramTool& tool) const {
+    tool.file = program_.files[assigned.file].name;
+    tool.line = lines_[assigned.file][assigned.line].number;
+    const Told<Pose> X_FT = frame_of(assigned.operands, assigned.file);
+    if (!X_FT) {
+      tool.why_not = fmt::format("tool {}: {}", shown(tool.name), X_FT.error());
+      return;
+    }
+    tool.X_FT = *X_FT;
+    tool.rotation_rounding = from_deg(0.001);
+  }
+
+  static std::optional<StatedLoad> load_of(const std::vector<Value>& operands) {
+    if (operands.size() != 1) return std::nullopt;
+    const Value* mass = operands[0].field("M");
+    const Value* centre = operands[0].field("CM");
+    if (mass == nullptr || mass->kind != Value::Kind::kNumber || centre == nullptr) return std::nullopt;
+    StatedLoad load;
+    load.mass = mass->number;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const Value* number = centre->field(kPose[static_cast<std::size_t>(k)]);
+      if (number == nullptr || number->kind != Value::Kind::kNumber) return std::nullopt;
+      load.p_F(k) = from_mm(number->number);
+    }
+    return load;
+  }
+
+  /// `$TOOL = ...`
+  std::size_t tool_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
+    const std::string data = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "";
+    if (data == "$NULLFRAME") return tool_numbered(0, f);
+    if (data.starts_with("TOOL_DATA[") && data.find('*') == std::string::npos)
+      return tool_numbered(std::atoi(data.c_str() + 10), f);
+    ProgramTool tool;
+    tool.name = data.empty() ? "$TOOL" : data;
+    if (!data.empty() && find(data, f) == nullptr) return add_tool(std::move(tool));
+    fill({f, k, operands}, tool);
+    return add_tool(std::move(tool));
+  }
+
+  std::size_t base_numbered(int number, std::size_t f) {
+    if (number == 0) return 1;
+    const std::string data = fmt::format("BASE_DATA[{}]", number);
+    if (const auto given = options_.frames.find(data); given != options_.frames.end())
+      return add_frame({data, given->second, ""});
+    Value name;
+    name.kind = Value::Kind::kName;
+    name.name = data;
+    return base_set({name}, f);
+  }
+
+  /// `$BASE = ...`
+  std::size_t base_set(const std::vector<Value>& operands, std::size_t f) {
+    if (operands.size() == 1 && operands[0].name.starts_with("BASE_DATA[") &&
+        options_.frames.contains(operands[0].name))
+      return add_frame({operands[0].name, options_.frames.at(operands[0].name), ""});
+    const Told<Pose> X_BO = frame_of(operands, f);
+    std::string name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
+    if (X_BO) return add_frame({std::move(name), *X_BO, ""});
+    return add_frame({name, Pose::Identity(), fmt::format("base {}: {}", shown(name), X_BO.error())});
+  }
+
+  /// FDAT of an inline form: `{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,...}`
+  void apply_fdat(const std::string& name, std::size_t f, State& state) {
+    const Told<const Assigned*> assigned = value_of(name, f);
+    const Value* tool =
+        assigned && (*assigned)->operands.size() == 1 ? (*assigned)->operands[0].field("TOOL_NO") : nullptr;
+    const Value* base = tool == nullptr ? nullptr : (*assigned)->operands[0].field("BASE_NO");
+    if (tool == nullptr || base == nullptr) {
+      const std::string why = assigned ? fmt::format("{} has no tool or base", shown(name)) : assigned.error();
+      state.tool = add_tool({name, "", 0, std::nullopt, std::nullopt, 0, why});
+      state.frame = add_frame({name, Pose::Identity(), why});
+      return;
+    }
+    state.tool = tool_numbered(static_cast<int>(tool->number), f);
+    state.frame = base_numbered(static_cast<int>(base->number), f);
+    const Value* frame = (*assigned)->operands[0].field("IPO_FRAME");
+    const std::string& text = program_.files[(*assigned)->file].text;
+    const bool fixed = frame != nullptr && upper(text.substr(frame->begin, 4)) == "#TCP";
+    state.fixed_tool = fixed ? "the tool stands and the robot holds the work piece" : "";
+  }
+
+  // Second pass: what happens, in the order of the text.
+
+  void note_calls(const Routine& routine, std::set<std::string>& called) const {
+    for (std::size_t k = routine.first; k < routine.last; ++k) {
+      const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
+      if (tokens.size() > 1 && tokens[1].text == "(") called.insert(tokens[0].text);
+    }
+  }
+
+  State run(std::size_t r, const State& begin, int depth) {
+    const auto key = std::pair(r, begin);
+    if (const auto known = ends_.find(key); known != ends_.end()) return known->second;
+    ends_[key] = begin;
+    ran_.insert(r);
+    State state = begin;
+    struct Branch {
+      State entry;
+      std::vector<State> ends;
+    };
+    std::vector<Branch> open;
+    const Routine routine = routines_[r];
+    for (std::size_t k = routine.first; k < routine.last; ++k) {
+      const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
+      if (tokens.empty()) continue;
+      const std::string& word = tokens[0].text;
+      if (word == "IF" || word == "SWITCH") {
+        open.push_back({state, {}});
+      } else if (!open.empty() && (word == "ELSE" || word == "CASE" || word == "DEFAULT")) {
+        open.back().ends.push_back(state);
+        state = open.back().entry;
+      } else if (!open.empty() && (word == "ENDIF" || word == "ENDSWITCH")) {
+        for (const State& end : open.back().ends) join(state, end);
+        join(state, open.back().entry);
+        open.pop_back();
+      } else {
+        line(routine.file, k, state, depth);
+      }
+    }
+    return ends_[key] = state;
+  }
+
+  /// Where branches come together, what they set differently is not known.
+  void join(State& state, const State& other) {
+    const std::string why = "a branch of the program decides it";
+    if (state.tool != other.tool)
+      state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+    if (state.frame != other.frame) state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    if (state.fixed_tool != other.fixed_tool) state.fixed_tool = why;
+  }
+
+  void line(std::size_t f, std::size_t k, State& state, int depth) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const std::string& word = tokens[0].text;
+    const bool assigns = tokens.size() > 2 && tokens[1].text == "=";
+    std::size_t end = 0;
+    if (is_motion(word) || is_relative(word)) {
+      motion(f, k, state);
+    } else if (word == "$TOOL" && assigns) {
+      state.tool = tool_set(krl::operands_at(tokens, 2, &end), f, k);
+    } else if (word == "$BASE" && assigns) {
+      state.frame = base_set(krl::operands_at(tokens, 2, &end), f);
+    } else if ((word == "$TOOL" || word == "$BASE") && tokens.size() > 1) {
+      const std::string why = fmt::format("a part of {} is set ({})", word, place(f, k));
+      if (word == "$TOOL") state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
+      if (word == "$BASE") state.frame = add_frame({"$BASE", Pose::Identity(), why});
+    } else if (word == "$IPO_MODE" && assigns) {
+      state.fixed_tool = tokens.back().text == "TCP" ? "the tool stands and the robot holds the work piece" : "";
+    } else if (word == "FDAT_ACT" && assigns && tokens[2].kind == TokenKind::kWord) {
+      apply_fdat(tokens[2].text, f, state);
+    } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
+      set_by_bas(tokens, f, k, state);
+    } else if (tokens.size() > 1 && tokens[1].text == "(" && depth < kDeepest) {
+      for (std::size_t r = 0; r < routines_.size(); ++r) {
+        if (routines_[r].name != word) continue;
+        state = run(r, state, depth + 1);
+        break;
+      }
+    }
+  }
+
+  /// `BAS(#TOOL,1)`, `BAS(#BASE,2)`
+  void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) {
+    const bool constant = tokens[5].kind == TokenKind::kNumber;
+    const int number = constant ? std::atoi(tokens[5].text.c_str()) : 0;
+    const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), place(f, k));
+    if (tokens[3].text == "TOOL" || tokens[3].text == "EX_TOOL") {
+      state.tool = constant ? tool_numbered(number, f)
+                            : add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+    } else if (tokens[3].text == "BASE") {
+      state.frame = constant ? base_numbered(number, f) : add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    }
+  }
+
+  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion alone.
+  void apply_with(std::size_t f, std::size_t k, State& state) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    for (std::size_t at = 0; at + 2 < tokens.size(); ++at) {
+      if (tokens[at + 1].text != "=" || (tokens[at].text != "$TOOL" && tokens[at].text != "$BASE")) continue;
+      const bool by_fdat =
+          at + 4 < tokens.size() && tokens[at + 3].text == "(" && tokens[at + 4].kind == TokenKind::kWord;
+      std::size_t end = 0;
+      State one = state;
+      if (by_fdat) apply_fdat(tokens[at + 4].text, f, one);
+      if (tokens[at].text == "$TOOL") {
+        state.tool = by_fdat ? one.tool : tool_set(krl::operands_at(tokens, at + 2, &end), f, k);
+      } else {
+        state.frame = by_fdat ? one.frame : base_set(krl::operands_at(tokens, at + 2, &end), f);
+      }
+    }
+  }
+
+  void leave(std::size_t f, std::size_t k, const std::string& name, const std::string& why) {
+    const Line& line = lines_[f][k];
+    if (left_.emplace(f, line.number, name).second)
+      program_.left.push_back({name, f, line.number, line.tokens[0].text, why});
+  }
+
+  std::size_t move_at(std::size_t f, std::size_t k) {
+    const auto [entry, is_new] = moves_.emplace(std::pair(f, k), program_.moves.size());
+    if (is_new) program_.moves.push_back({f, lines_[f][k].number, {}, false});
+    return entry->second;
+  }
+
+  void motion(std::size_t f, std::size_t k, State state) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const std::string& word = tokens[0].text;
+    const std::size_t move = move_at(f, k);
+    if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
+    apply_with(f, k, state);
+    std::size_t next = 1;
+    const int count = word == "CIRC" || word == "SCIRC" ? 2 : 1;
+    for (int target = 0; target < count; ++target) {
+      const std::vector<Value> operands = krl::operands_at(tokens, next, &next);
+      if (operands.empty()) return leave(f, k, "", "it has no target");
+      use(f, k, operands, state, move);
+      if (next >= tokens.size() || tokens[next].text != ",") break;
+      ++next;
+    }
+  }
+
+  std::string text_of(std::size_t f, const std::vector<Token>& tokens, std::size_t from) const {
+    if (from >= tokens.size()) return "";
+    return program_.files[f].text.substr(tokens[from].begin, tokens.back().end - tokens[from].begin);
+  }
+
+  void use(std::size_t f, std::size_t k, const std::vector<Value>& operands, const State& state, std::size_t move) {
+    const std::string name =
+        program_.files[f].text.substr(operands.front().begin, operands.back().end - operands.front().begin);
+    if (!state.fixed_tool.empty()) return leave(f, k, name, state.fixed_tool);
+    const SiteUse use{state.tool,
+                      state.frame,
+                      lines_[f][k].tokens[0].text,
+                      f,
+                      lines_[f][k].number,
+                      move,
+                      lines_[f][k].tokens[0].text.find("PTP") == std::string::npos};
+    if (operands.size() > 1 || operands[0].kind == Value::Kind::kAggregate) {
+      places_[{f, operands[0].begin}] = {f, k, operands};
+      return sites_.add(f, operands[0].begin, name, use);
+    }
+    if (operands[0].kind != Value::Kind::kName) return leave(f, k, name, "an expression decides it");
+    const std::string& wanted = operands[0].name;
+    if (wanted.starts_with("$")) return leave(f, k, name, fmt::format("{} decides it", shown(wanted)));
+    if (wanted.find("[*]") == std::string::npos) return use_named(f, k, wanted, name, use);
+    const std::string beginning = wanted.substr(0, wanted.find("[*]") + 1);
+    bool any = false;
+    for (const auto& [key, variable] : variables_) {
+      if (!key.second.starts_with(beginning) || key.second == wanted) continue;
+      any = true;
+      use_named(f, k, key.second, key.second, use);
+    }
+    if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
+  }
+
+  void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name, const SiteUse& use) {
+    const Told<const Assigned*> assigned = value_of(wanted, f);
+    if (!assigned) return leave(f, k, name, assigned.error());
+    const Assigned& at = **assigned;
+    if (at.operands.empty()) return leave(f, k, name, "it is not constant");
+    places_[{at.file, at.operands[0].begin}] = at;
+    sites_.add(at.file, at.operands[0].begin, name, use);
+  }
+
+  // Targets.
+
+  std::string describe(const Site& site, ProgramTarget& target) const {
+    const Assigned& place = places_.at({site.file, site.begin});
+    target.line = lines_[place.file][place.line].number;
+    const Value& first = place.operands[0];
+    if (place.operands.size() == 1 && first.kind == Value::Kind::kAggregate) {
+      if (first.field("A1") != nullptr) return describe_axes(first, target);
+      const Told<std::vector<double>> numbers = numbers_of(first, kPose);
+      if (!numbers) return numbers.error();
+      target.coordinates = Coordinates::kAnglesZyx;
+      target.numbers = *numbers;
+      rewrite(first, kPose, target);
+      note_rest(first, target);
+      return "";
+    }
+    const Told<Pose> pose = frame_of(place.operands, place.file);
+    if (!pose) return pose.error();
+    target.coordinates = Coordinates::kAnglesZyx;
+    target.numbers = cam::numbers_of(Coordinates::kAnglesZyx, *pose, std::vector<double>(6, 0.0));
+    const Value* last = &place.operands.back();
+    if (last->kind == Value::Kind::kName) {
+      const Told<const Assigned*> named = value_of(last->name, place.file);
+      last = named && (*named)->operands.size() == 1 ? &(*named)->operands[0] : nullptr;
+    }
+    if (last != nullptr) note_rest(*last, target);
+    fold(place, last, target);
+    return "";
+  }
+
+  std::string describe_axes(const Value& value, ProgramTarget& target) const {
+    if (options_.keep_joints) return "joint targets are kept (--keep-joints)";
+    const Told<std::vector<double>> numbers = numbers_of(value, kAxes);
+    if (!numbers) return numbers.error();
+    target.coordinates = Coordinates::kJoints;
+    target.numbers = *numbers;
+    rewrite(value, kAxes, target);
+    note_rest(value, target);
+    return "";
+  }
+
+  void rewrite(const Value& value, const std::array<const char*, 6>& fields, ProgramTarget& target) const {
+    const std::string& text = program_.files[target.file].text;
+    for (std::size_t k = 0; k < fields.size(); ++k) {
+      const Value& number = *value.field(fields[k]);
+      const auto written = read_number(std::string_view(text).substr(number.begin, number.end - number.begin));
+      target.rewrites.push_back({{number.begin, number.end}, {}, {{k, written ? written->style : kThreeDecimals}}});
+    }
+  }
+
+  /// The whole expression as one frame, with status, turns and external axes of its last operand.
+  void fold(const Assigned& place, const Value* last, ProgramTarget& target) const {
+    const std::string& text = program_.files[place.file].text;
+    target.folded = true;
+    Rewrite whole{{place.operands.front().begin, place.operands.back().end}, {"{X "}, {}};
+    for (std::size_t k = 0; k < kPose.size(); ++k) {
+      whole.slots.push_back({k, kThreeDecimals});
+      whole.texts.push_back(k + 1 < kPose.size() ? fmt::format(",{} ", kPose[k + 1]) : "");
+    }
+    if (last != nullptr && last->kind == Value::Kind::kAggregate) {
+      for (std::size_t k = 0; k < last->field_names.size(); ++k) {
+        const std::string& name = last->field_names[k];
+        if (name == "S" || name == "T" || (name.size() == 2 && name[0] == 'E'))
+          whole.texts.back() += fmt::format(",{} {}", name, last->field_values[k].number);
+      }
+    }
+    whole.texts.back() += "}";
+    target.comment_at = lines_[place.file][place.line].begin;
+    const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
+    target.comment = text.substr(target.comment_at, indent - target.comment_at) + "; trammel: was " +
+                     text.substr(whole.span.begin, whole.span.end - whole.span.begin);
+    target.rewrites.push_back(std::move(whole));
+  }
+
+  /// Status, turns and external axes.
+  static void note_rest(const Value& value, ProgramTarget& target) {
+    const auto number = [&](const char* name) -> std::optional<double> {
+      const Value* field = value.field(name);
+      const bool known = field != nullptr && (field->kind == Value::Kind::kNumber || field->kind == Value::Kind::kBits);
+      return known ? std::optional<double>(field->number) : std::nullopt;
+    };
+    for (int k = 0; k < 6; ++k) {
+      if (const auto axis = number(fmt::format("E{}", k + 1).c_str())) target.external[k] = *axis;
+    }
+    if (target.coordinates == Coordinates::kJoints) return;
+    Configuration& said = target.configuration;
+    if (const auto status = number("S"); status && *status >= 0) {
+      const auto bits = static_cast<unsigned>(*status);
+      said.behind_axis_1 = (bits & 1U) != 0;
+      said.larger_joint_3 = (bits & 2U) != 0;
+      said.signs.resize(6);
+      said.signs[4] = (bits & 4U) != 0 ? -1 : 1;
+    }
+    if (const auto turns = number("T"); turns && *turns >= 0) {
+      const auto bits = static_cast<unsigned>(*turns);
+      said.signs.resize(6);
+      for (std::size_t j = 0; j < 6; ++j) said.signs[j] = ((bits >> j) & 1U) != 0 ? -1 : 1;
+    }
+  }
+
+  /// Positions of data lists that nothing moves to.
+  void list_unused() {
+    for (const auto& one : variables_) {
+      const auto& [key, variable] = one;
+      const std::string& name = key.second;
+      const bool is_position = variable.values.size() == 1 && variable.values[0].operands.size() == 1 &&
+                               variable.values[0].operands[0].field("X") != nullptr &&
+                               variable.values[0].operands[0].field("S") != nullptr;
+      if (!is_position) continue;
+      const Assigned& at = variable.values[0];
+      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
+                                      [&](const LeftAlone& left) { return upper(left.name) == name; });
+      if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
+      program_.left.push_back(
+          {name, at.file, lines_[at.file][at.line].number, "", "no motion in these files goes to it"});
+    }
+  }
+
+  ReadOptions options_;
+  Program program_;
+  std::vector<std::vector<Line>> lines_;
+  std::vector<Routine> routines_;
+  std::map<std::pair<std::string, std::string>, Variable> variables_;
+  std::map<std::string, std::string> tool_names_;
+  std::map<std::pair<std::size_t, State>, State> ends_;
+  std::set<std::size_t> ran_;
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;
+  std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;
+  std::set<std::tuple<std::size_t, int, std::string>> left_;
+  Sites sites_;
+};
+
+}  // namespace
+
+Program read_krl(std::vector<SourceFile> files, const ReadOptions& options) {
+  return Reader(std::move(files), options).read();
+}
+
+}  // namespace trammel::cam

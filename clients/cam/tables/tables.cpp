@@ -1,0 +1,172 @@
+#include "clients/cam/tables/tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace trammel::cam {
+
+namespace {
+
+struct Field {
+  std::size_t begin = 0, end = 0;
+  std::string_view text;
+};
+
+struct Row {
+  std::size_t begin = 0;
+  int line = 1;
+  std::vector<Field> fields;
+};
+
+/// Which columns hold the numbers of a pose.
+struct Columns {
+  Coordinates coordinates = Coordinates::kAnglesXyz;
+  std::vector<std::size_t> at;
+};
+
+Field trimmed(const std::string& text, std::size_t begin, std::size_t end) {
+  while (begin < end && (text[begin] == ' ' || text[begin] == '\t' || text[begin] == '"')) ++begin;
+  while (end > begin &&
+         (text[end - 1] == ' ' || text[end - 1] == '\t' || text[end - 1] == '\r' || text[end - 1] == '"'))
+    --end;
+  return {begin, end, std::string_view(text).substr(begin, end - begin)};
+}
+
+/// `;` where a line has one, else a tab, else `,`.
+char separator_of(std::string_view line) {
+  for (const char c : {';', '\t'}) {
+    if (line.find(c) != std::string_view::npos) return c;
+  }
+  return ',';
+}
+
+std::vector<Row> rows_of(const std::string& text) {
+  std::vector<Row> rows;
+  std::size_t begin = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
+  for (int number = 1; begin < text.size(); ++number) {
+    const std::size_t newline = text.find('\n', begin);
+    const std::size_t end = newline == std::string::npos ? text.size() : newline;
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first != std::string_view::npos && line[first] != '#') {
+      Row& row = rows.emplace_back();
+      row.begin = begin;
+      row.line = number;
+      const char separator = separator_of(line);
+      for (std::size_t at = begin; at <= end;) {
+        const std::size_t stop = std::min(text.find(separator, at), end);
+        row.fields.push_back(trimmed(text, at, stop));
+        at = stop + 1;
+      }
+    }
+    begin = end + 1;
+  }
+  return rows;
+}
+
+std::string lower(std::string_view text) {
+  std::string made(text.substr(0, text.find_first_of("[( ")));
+  for (char& c : made) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  for (const char* unit : {"_mm", "_deg"}) {
+    if (made.ends_with(unit)) made.erase(made.size() - std::string_view(unit).size());
+  }
+  return made;
+}
+
+/// The columns that a header names; empty where it names no pose.
+std::optional<Columns> named_columns(const Row& header) {
+  const auto all = [&](std::initializer_list<const char*> names) {
+    std::vector<std::size_t> at;
+    for (const char* name : names) {
+      for (std::size_t k = 0; k < header.fields.size(); ++k) {
+        if (lower(header.fields[k].text) == name) {
+          at.push_back(k);
+          break;
+        }
+      }
+    }
+    return at.size() == names.size() ? at : std::vector<std::size_t>();
+  };
+  if (auto at = all({"x", "y", "z", "qw", "qx", "qy", "qz"}); !at.empty()) return Columns{Coordinates::kQuaternion, at};
+  if (auto at = all({"x", "y", "z", "a", "b", "c"}); !at.empty()) return Columns{Coordinates::kAnglesZyx, at};
+  if (auto at = all({"x", "y", "z", "rx", "ry", "rz"}); !at.empty()) return Columns{Coordinates::kAnglesXyz, at};
+  if (auto at = all({"x", "y", "z", "w", "p", "r"}); !at.empty()) return Columns{Coordinates::kAnglesXyz, at};
+  return std::nullopt;
+}
+
+class Tables {
+ public:
+  Tables(std::vector<SourceFile> files, const std::string& dialect, const std::string& frame, Columns bare,
+         const ReadOptions& options)
+      : bare_(std::move(bare)) {
+    program_.dialect = dialect;
+    program_.files = std::move(files);
+    program_.tools.emplace_back();
+    ProgramFrame& base = program_.frames.emplace_back();
+    base.name = "base";
+    if (const auto given = options.frames.find(frame); given != options.frames.end()) {
+      base.name = frame;
+      base.X_BO = given->second;
+    }
+  }
+
+  Program read() {
+    for (std::size_t f = 0; f < program_.files.size(); ++f) {
+      const std::string& text = program_.files[f].text;
+      program_.mark_places.push_back({text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
+      read_rows(f, rows_of(text));
+    }
+    return std::move(program_);
+  }
+
+ private:
+  void read_rows(std::size_t f, const std::vector<Row>& rows) {
+    Columns columns = bare_;
+    bool any = false;
+    for (const Row& row : rows) {
+      const auto header = any ? std::nullopt : named_columns(row);
+      if (header) columns = *header;
+      any |= !header && read_row(f, row, columns);
+    }
+  }
+
+  /// Whether the row holds a pose. A row that does not is left as it is: a header, a remark.
+  bool read_row(std::size_t f, const Row& row, const Columns& columns) {
+    ProgramTarget target;
+    for (std::size_t k = 0; k < columns.at.size(); ++k) {
+      if (columns.at[k] >= row.fields.size()) return false;
+      const Field& field = row.fields[columns.at[k]];
+      const auto written = read_number(field.text);
+      if (!written) return false;
+      target.numbers.push_back(written->value);
+      target.rewrites.push_back({{field.begin, field.end}, {}, {{k, written->style}}});
+    }
+    target.coordinates = columns.coordinates;
+    target.name = fmt::format("row {}", row.line);
+    target.file = f;
+    target.line = row.line;
+    target.used_at = {row.line};
+    target.linear = true;
+    program_.moves.push_back({f, row.line, {program_.targets.size()}, false});
+    program_.targets.push_back(std::move(target));
+    return true;
+  }
+
+  Program program_;
+  Columns bare_;
+};
+
+}  // namespace
+
+Program read_camrob(std::vector<SourceFile> files, const ReadOptions& options) {
+  return Tables(std::move(files), "camrob", "CAMROB", {Coordinates::kAnglesZyx, {1, 2, 3, 4, 5, 6}}, options).read();
+}
+
+Program read_robodk(std::vector<SourceFile> files, const ReadOptions& options) {
+  return Tables(std::move(files), "robodk", "ROBODK", {Coordinates::kAnglesXyz, {0, 1, 2, 3, 4, 5}}, options).read();
+}
+
+}  // namespace trammel::cam

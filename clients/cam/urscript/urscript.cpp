@@ -1,0 +1,306 @@
+#include "clients/cam/urscript/urscript.h"
+
+#include <fmt/format.h>
+
+#include <set>
+#include <tl/expected.hpp>
+
+#include "clients/cam/scan.h"
+#include "clients/cam/sites.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+template <typename T>
+using Told = tl::expected<T, std::string>;
+tl::unexpected<std::string> because(std::string why) { return tl::make_unexpected(std::move(why)); }
+
+constexpr int kDeepest = 20;
+
+/// Six numbers in brackets, a name, or a function of such.
+struct Value {
+  enum class Kind { kPose, kJoints, kName, kCall, kOther };
+  Kind kind = Kind::kOther;
+  std::size_t begin = 0, end = 0;
+  int line = 1;
+  std::string name;
+  std::vector<Piece> numbers;
+  std::vector<Value> arguments;
+};
+
+struct Variable {
+  Value value;
+  std::string changed;
+};
+
+class Script {
+ public:
+  Script(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
+      : index_(index),
+        program_(program),
+        sites_(sites),
+        options_(options),
+        text_(program.files[index].text),
+        pieces_(pieces_of(text_, text_.starts_with("\xEF\xBB\xBF") ? 3 : 0, text_.size(), 1, {"#", "\"'"})) {}
+
+  void read() {
+    program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
+    tool_ = unknown_tool();
+    for (std::size_t at = 0; at < pieces_.size(); ++at) note_assignment(at);
+    for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
+      if (pieces_[at].kind != Piece::Kind::kWord || !pieces_[at + 1].is("(")) continue;
+      if (pieces_[at].is("set_tcp")) set_tool(at);
+      if (pieces_[at].is("movel") || pieces_[at].is("movej") || pieces_[at].is("movep") || pieces_[at].is("movec"))
+        motion(at);
+      if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
+        leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
+    }
+  }
+
+  std::string describe(const Site& site, ProgramTarget& target) const {
+    const Value& value = values_.at(site.begin);
+    target.line = value.line;
+    if (value.kind == Value::Kind::kJoints) {
+      if (options_.keep_joints) return "joint targets are kept (--keep-joints)";
+      target.coordinates = Coordinates::kJointRadians;
+      return rewrite_numbers(value, target);
+    }
+    target.coordinates = Coordinates::kRotationVector;
+    if (value.kind == Value::Kind::kPose) return rewrite_numbers(value, target);
+    const Told<Pose> pose = pose_of_value(value, 0);
+    if (!pose) return pose.error();
+    target.numbers = numbers_of(Coordinates::kRotationVector, *pose, std::vector<double>(6, 0.0));
+    fold(value, target);
+    return "";
+  }
+
+ private:
+  std::size_t unknown_tool() {
+    ProgramTool tool;
+    tool.name = "tcp";
+    if (const auto given = options_.frames.find("TCP"); given != options_.frames.end()) tool.X_FT = given->second;
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
+  /// The value from a piece on; `at` is set behind it.
+  Value value_at(std::size_t& at, int depth = 0) const {
+    Value value;
+    if (at >= pieces_.size() || depth > kDeepest) return value;
+    value.begin = pieces_[at].begin;
+    value.line = pieces_[at].line;
+    const bool pose = pieces_[at].is("p") && at + 1 < pieces_.size() && pieces_[at + 1].is("[");
+    if (pose || pieces_[at].is("[")) {
+      at += pose ? 2 : 1;
+      value.kind = pose ? Value::Kind::kPose : Value::Kind::kJoints;
+      bool is_number_due = true;
+      for (; at < pieces_.size() && !pieces_[at].is("]"); ++at) {
+        const bool is_number = pieces_[at].kind == Piece::Kind::kNumber;
+        if (is_number != is_number_due || (!is_number && !pieces_[at].is(","))) value.kind = Value::Kind::kOther;
+        if (is_number) value.numbers.push_back(pieces_[at]);
+        is_number_due = !is_number_due;
+      }
+      if (value.numbers.size() != 6) value.kind = Value::Kind::kOther;
+      if (at < pieces_.size()) ++at;
+    } else if (pieces_[at].kind == Piece::Kind::kWord) {
+      value.kind = Value::Kind::kName;
+      value.name = std::string(pieces_[at++].text);
+      if (at < pieces_.size() && pieces_[at].is("(")) {
+        value.kind = Value::Kind::kCall;
+        ++at;
+        while (at < pieces_.size() && !pieces_[at].is(")")) {
+          if (pieces_[at].is(",")) {
+            ++at;
+            continue;
+          }
+          const std::size_t before = at;
+          value.arguments.push_back(value_at(at, depth + 1));
+          if (at == before) ++at;
+        }
+        if (at < pieces_.size()) ++at;
+      }
+    } else {
+      ++at;
+    }
+    value.end = at > 0 ? pieces_[at - 1].end : 0;
+    return value;
+  }
+
+  [[nodiscard]] bool ends_here(std::size_t at, int line) const {
+    return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") || pieces_[at].is(")");
+  }
+
+  /// `global p1 = p[...]`; what is set twice or in part is decided at run time.
+  void note_assignment(std::size_t at) {
+    if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
+    const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line || pieces_[at - 1].is("global") ||
+                       pieces_[at - 1].is("local");
+    if (!first) return;
+    const std::string name(pieces_[at].text);
+    std::size_t equals = at + 1;
+    if (pieces_[equals].is("[")) {
+      while (equals < pieces_.size() && !pieces_[equals].is("=") && pieces_[equals].line == pieces_[at].line) ++equals;
+    }
+    if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("=")) return;
+    Variable& variable = variables_[name];
+    const bool again = variable.value.end > 0 || equals != at + 1;
+    const std::string why =
+        fmt::format("{} is set at run time ({} line {})", shown(name), program_.files[index_].name, pieces_[at].line);
+    std::size_t next = equals + 1;
+    const Value value = value_at(next);
+    if (again) variable.changed = why;
+    variable.value = value;
+    if (next < pieces_.size() && pieces_[next].line == value.line && !ends_here(next, value.line))
+      variable.value.kind = Value::Kind::kOther;
+  }
+
+  Told<Value> resolved(const Value& value) const {
+    Value now = value;
+    for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
+      const auto variable = variables_.find(now.name);
+      if (variable == variables_.end()) return because(fmt::format("{} is not in the script", shown(now.name)));
+      if (!variable->second.changed.empty()) return because(variable->second.changed);
+      now = variable->second.value;
+    }
+    return now;
+  }
+
+  Told<Pose> pose_of_value(const Value& value, int depth) const {
+    const Told<Value> now = resolved(value);
+    if (!now) return because(now.error());
+    if (now->kind == Value::Kind::kPose) {
+      std::vector<double> numbers;
+      for (const Piece& piece : now->numbers)
+        numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
+      return pose_of(Coordinates::kRotationVector, numbers);
+    }
+    if (now->kind != Value::Kind::kCall || now->name != "pose_trans" || now->arguments.size() != 2 || depth > kDeepest)
+      return because(now->kind == Value::Kind::kCall ? fmt::format("the function {} decides it", shown(now->name))
+                                                     : std::string("it is not constant"));
+    const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1);
+    if (!left) return left;
+    const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1);
+    if (!right) return right;
+    return *left * *right;
+  }
+
+  void set_tool(std::size_t at) {
+    std::size_t next = at + 2;
+    const Told<Pose> X_FT = pose_of_value(value_at(next), 0);
+    ProgramTool tool;
+    tool.name = "tcp";
+    tool.file = program_.files[index_].name;
+    tool.line = pieces_[at].line;
+    tool.rotation_rounding = 2e-4;
+    if (X_FT)
+      tool.X_FT = *X_FT;
+    else
+      tool.why_not = fmt::format("set_tcp (line {}): {}", tool.line, X_FT.error());
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      const ProgramTool& known = program_.tools[k];
+      if (known.X_FT && tool.X_FT && known.X_FT->isApprox(*tool.X_FT, 1e-12)) {
+        tool_ = k;
+        return;
+      }
+    }
+    program_.tools.push_back(std::move(tool));
+    tool_ = program_.tools.size() - 1;
+  }
+
+  void leave(const Piece& motion, const std::string& name, const std::string& why) {
+    program_.left.push_back({name, index_, motion.line, std::string(motion.text), why});
+  }
+
+  void motion(std::size_t at) {
+    if (program_.frames.empty()) program_.frames.push_back({"base", Pose::Identity(), ""});
+    program_.moves.push_back({index_, pieces_[at].line, {}, false});
+    std::size_t next = at + 2;
+    const int count = pieces_[at].is("movec") ? 2 : 1;
+    for (int k = 0; k < count; ++k) {
+      Value value = value_at(next);
+      // The joints of a pose are those of the pose.
+      if (value.kind == Value::Kind::kCall && value.name == "get_inverse_kin" && !value.arguments.empty())
+        value = Value(value.arguments[0]);
+      else if (!ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
+        value.kind = Value::Kind::kOther;
+      use(at, value);
+      if (next < pieces_.size() && pieces_[next].is(",")) ++next;
+    }
+  }
+
+  void use(std::size_t at, const Value& value) {
+    const std::string name = text_.substr(value.begin, value.end - value.begin);
+    const Told<Value> now = resolved(value);
+    if (!now) return leave(pieces_[at], name, now.error());
+    const bool readable = now->kind == Value::Kind::kPose || now->kind == Value::Kind::kJoints ||
+                          (now->kind == Value::Kind::kCall && now->name == "pose_trans");
+    if (!readable) {
+      return leave(pieces_[at], name,
+                   now->kind == Value::Kind::kCall ? fmt::format("the function {} decides it", shown(now->name))
+                                                   : std::string("an expression decides it"));
+    }
+    values_[now->begin] = *now;
+    sites_.add(index_, now->begin, name,
+               {tool_, 0, std::string(pieces_[at].text), index_, pieces_[at].line, program_.moves.size() - 1,
+                !pieces_[at].is("movej")});
+  }
+
+  static std::string rewrite_numbers(const Value& value, ProgramTarget& target) {
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto written = read_number(value.numbers[k].text);
+      if (!written) return "it holds what is no number";
+      target.numbers.push_back(written->value);
+      target.rewrites.push_back({{value.numbers[k].begin, value.numbers[k].end}, {}, {{k, written->style}}});
+    }
+    return "";
+  }
+
+  void fold(const Value& value, ProgramTarget& target) const {
+    target.folded = true;
+    Rewrite whole{{value.begin, value.end}, {"p["}, {}};
+    for (std::size_t k = 0; k < 6; ++k) {
+      NumberStyle style;
+      style.decimals = 6;
+      whole.slots.push_back({k, style});
+      whole.texts.emplace_back(k < 5 ? ", " : "]");
+    }
+    target.comment_at = line_begin(text_, value.begin);
+    const std::size_t indent = text_.find_first_not_of(" \t", target.comment_at);
+    std::string original = text_.substr(value.begin, value.end - value.begin);
+    for (char& c : original) {
+      if (c == '\n' || c == '\r') c = ' ';
+    }
+    target.comment = text_.substr(target.comment_at, indent - target.comment_at) + "# trammel: was " + original;
+    target.rewrites.push_back(std::move(whole));
+  }
+
+  std::size_t index_;
+  Program& program_;
+  Sites& sites_;
+  const ReadOptions& options_;
+  const std::string& text_;
+  std::vector<Piece> pieces_;
+  std::size_t tool_ = 0;
+  std::map<std::string, Variable> variables_;
+  std::map<std::size_t, Value> values_;
+};
+
+}  // namespace
+
+Program read_urscript(std::vector<SourceFile> files, const ReadOptions& options) {
+  Program program;
+  program.dialect = "urscript";
+  program.files = std::move(files);
+  Sites sites;
+  std::vector<Script> scripts;
+  scripts.reserve(program.files.size());
+  for (std::size_t f = 0; f < program.files.size(); ++f) scripts.emplace_back(f, program, sites, options).read();
+  sites.finish(program,
+               [&](const Site& site, ProgramTarget& target) { return scripts[site.file].describe(site, target); });
+  return program;
+}
+
+}  // namespace trammel::cam

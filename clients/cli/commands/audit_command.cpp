@@ -1,0 +1,90 @@
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/audit_text.h"
+#include "server/store/audit_json.h"
+
+namespace trammel::cli {
+
+namespace {
+
+struct AuditArguments {
+  std::string cell, store, json;
+  std::int64_t since = 0;
+  std::size_t last = 0;
+  ServiceOptions service;
+};
+
+/// Of each server its own.
+Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArguments& arguments) {
+  std::vector<std::pair<std::string, AuditTrail>> all;
+  if (!arguments.store.empty()) {
+    auto trail = read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last});
+    if (!trail) return tl::make_unexpected(trail.error());
+    all.emplace_back(arguments.store, std::move(*trail));
+    return all;
+  }
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  const auto texts = (*session)->audit(arguments.cell, arguments.since, arguments.last);
+  if (!texts) return tl::make_unexpected(texts.error());
+  for (const client::AuditText& text : *texts) {
+    auto trail = audit_of_json(text.json);
+    if (!trail) return tl::make_unexpected(trail.error());
+    all.emplace_back("server " + text.server, std::move(*trail));
+  }
+  return all;
+}
+
+/// Every row that came is looked at here, too: a service may say what it likes.
+Status check_rows(const AuditTrail& trail) {
+  if (trail.broken) return tl::make_unexpected(*trail.broken);
+  const AuditRow* before = nullptr;
+  for (const AuditRow& row : trail.rows) {
+    const bool follows = before == nullptr || row.number != before->number + 1 || row.hash_before == before->hash;
+    if (row.hash != hash_of(row) || !follows) {
+      return failure(ErrorCode::kInternal, "audit row {}: its content is not what was written", row.number)
+          .at_row(row.number);
+    }
+    before = &row;
+  }
+  return {};
+}
+
+Status audit(const AuditArguments& arguments) {
+  const auto all = trails(arguments);
+  if (!all) return tl::make_unexpected(all.error());
+  std::string text;
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  std::optional<Error> broken;
+  for (const auto& [where, trail] : *all) {
+    text += audit_text(trail, where);
+    json.push_back(audit_json(trail));
+    json.back()["where"] = where;
+    if (const Status good = check_rows(trail); !good && !broken) broken = Failure(good.error()).in(where).value();
+  }
+  tell(text, {arguments.json});
+  if (const Status written = write_json(arguments.json, {{"trails", json}}); !written) return written;
+  return broken ? Status(tl::make_unexpected(*broken)) : Status();
+}
+
+}  // namespace
+
+void add_audit_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<AuditArguments>();
+  CLI::App* command = app.add_subcommand(
+      "audit", "Show who changed what and when, and verify that nothing of it was changed afterwards");
+  command->add_option("--store", arguments->store,
+                      "The file of a store, instead of asking a service; also while one runs");
+  command->add_option("--cell", arguments->cell, "Only what was changed of this cell");
+  command->add_option("--since", arguments->since, "Only what was changed since then, Unix time, s")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--last", arguments->last, "Only that many, the newest; left out: all");
+  add_json_option(*command, arguments->json);
+  add_options_of_service_command(*command, arguments->service);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return audit(*arguments); }; });
+}
+
+}  // namespace trammel::cli

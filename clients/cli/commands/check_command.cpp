@@ -1,0 +1,124 @@
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <optional>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/base/json_guard.h"
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/compensate/model_file.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/report/health_json.h"
+#include "server/robot/cell_rules.h"
+
+namespace trammel::cli {
+
+namespace {
+
+struct CheckArguments {
+  std::string model, batch, json;
+  std::optional<double> tolerance_mm;
+  bool new_tool = false;
+  ServiceOptions service;
+};
+
+Result<std::int64_t> ask(client::Session& session, const std::string& cell, const CheckArguments& arguments) {
+  const double tolerance = arguments.tolerance_mm.value_or(std::numeric_limits<double>::quiet_NaN());
+  if (!std::filesystem::exists(arguments.batch)) return session.check_health(cell, arguments.batch, "", tolerance);
+  return read_text_file(arguments.batch).and_then([&](const std::string& csv) {
+    return session.check_health(cell, "", csv, tolerance);
+  });
+}
+
+/// What the service found; its bytes come from outside.
+Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell, std::int64_t job) {
+  const auto found = session.diagnosis(cell, job, false);
+  if (!found) return tl::make_unexpected(found.error());
+  const std::string what = fmt::format("what job {} found", job);
+  if (const Status small = check_json_limits(found->findings_json, what); !small)
+    return tl::make_unexpected(small.error());
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(found->findings_json, nullptr, false);
+  const bool whole = json.is_object() && json.contains("verdict") && json["verdict"].is_string() &&
+                     json.contains("why") && json["why"].is_string();
+  if (!whole) return failure(ErrorCode::kInternal, "{} is no check", what);
+  return json;
+}
+
+Status check_at_service(const CheckArguments& arguments) {
+  if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
+  const Result<ModelReference> model = parse_model_reference(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  if (model->version != 0) {
+    return failure(ErrorCode::kUsage, "a service checks against the model in force")
+        .of("--model")
+        .next("name the cell alone");
+  }
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  const Result<std::int64_t> job = ask(**session, model->cell, arguments);
+  if (!job) return tl::make_unexpected(job.error());
+  const Result<client::JobStatus> end = [&] {
+    ProgressLine progress;
+    return (*session)->wait_for_job(*job, std::chrono::hours(1), [&](const client::JobStatus& status) {
+      progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
+    });
+  }();
+  if (!end) return tl::make_unexpected(end.error());
+  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job");
+  const auto json = found_by(**session, model->cell, *job);
+  if (!json) return tl::make_unexpected(json.error());
+  tell(fmt::format("{}: {}\n", json->at("verdict").get<std::string>(), json->at("why").get<std::string>()),
+       {arguments.json});
+  return write_json(arguments.json, *json);
+}
+
+Status check(const CheckArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  const Result<CheckedBatch> batch = read_batch(arguments.batch).and_then([&](MeasurementBatch read) {
+    return check_against_cell(std::move(read), model->cell());
+  });
+  if (!batch) return tl::make_unexpected(batch.error());
+  HealthOptions options;
+  const Result<CellRules> rules = rules_of(model->cell());
+  if (!rules) return tl::make_unexpected(rules.error());
+  options.tolerance = rules->tolerance.value_or(kUsualTolerance);
+  if (arguments.tolerance_mm) options.tolerance = *arguments.tolerance_mm * from_mm(1);
+  options.new_tool = arguments.new_tool;
+  const Result<HealthCheck> health = check_health(*model, *batch, options);
+  if (!health) return tl::make_unexpected(health.error());
+  const auto& rows = batch->rows().measurements;
+  tell(health_text(*health), {arguments.json});
+  return write_json(arguments.json, health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id}));
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<CheckArguments>();
+  CLI::App* command = app.add_subcommand("check", "Say by a few poses whether the robot still is as its model has it");
+  command->add_option("--model", arguments->model, "Model file; with --service a cell's id: its model in force")
+      ->required();
+  command
+      ->add_option("--batch", arguments->batch,
+                   "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check plans them; "
+                   "with --service also the id of a batch that the service has")
+      ->required();
+  command
+      ->add_option("--tolerance", arguments->tolerance_mm,
+                   "What the cell must hold, mm, instead of the cell file's tolerance_mm (0.1 where it says none)")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--new-tool", arguments->new_tool,
+                    "The tool was changed or mounted anew: where it sits is found with the base, and is no change");
+  add_json_option(*command, arguments->json);
+  add_service_options(*command, arguments->service);
+  command->callback([arguments, &chosen] {
+    chosen = [arguments] { return arguments->service.service ? check_at_service(*arguments) : check(*arguments); };
+  });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,159 @@
+#include "clients/cli/text/receipt_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "clients/cli/text/receipt_page_html.h"
+#include "server/base/units.h"
+#include "server/base/unix_time.h"
+#include "server/report/html.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using cam::CorrectedProgram;
+using cam::ReceiptRow;
+using nlohmann::ordered_json;
+
+constexpr double kSure = 0.95;
+constexpr std::size_t kMostRows = 2000;  // of the table; the CSV has all
+
+/// Probability that |e| <= r for e with a mean of this length and this stddev of each axis.
+double inside(double r, double mean, double stddev) {
+  if (stddev <= 0) return mean <= r ? 1 : 0;
+  const double a = (r - mean) / stddev, b = (r + mean) / stddev;
+  if (mean < 1e-6 * stddev) {
+    const double x = r / stddev;
+    return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
+  }
+  const double tail = std::exp(-0.5 * a * a) - std::exp(-0.5 * b * b);
+  return std::max(0.0, 0.5 * (std::erf(a / std::sqrt(2.0)) + std::erf(b / std::sqrt(2.0))) -
+                           stddev / (mean * std::sqrt(2 * kPi)) * tail);
+}
+
+/// Of an error with this rms.
+double share_inside(double tolerance, double rms, double sigma) {
+  const double mean = std::sqrt(std::max(0.0, rms * rms - 3 * sigma * sigma));
+  return inside(tolerance, mean, sigma);
+}
+
+std::string mm(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : ""; }
+
+std::string date_of(std::optional<std::int64_t> time) {
+  if (!time || *time == 0) return "not recorded";
+  const std::time_t seconds = static_cast<std::time_t>(*time);
+  std::tm utc{};
+  ::gmtime_r(&seconds, &utc);
+  const double days = static_cast<double>(unix_now() - *time) / 86400.0;
+  return fmt::format("{:04}-{:02}-{:02}, {:.0f} days ago", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday, days);
+}
+
+/// rms and largest of a column, over rows where it is known.
+std::string figures(const CorrectedProgram& program, double ReceiptRow::*column) {
+  double sum = 0, most = 0;
+  std::size_t count = 0;
+  for (const ReceiptRow& row : program.rows) {
+    if (!std::isfinite(row.*column)) continue;
+    sum += row.*column * (row.*column);
+    most = std::max(most, row.*column);
+    ++count;
+  }
+  if (count == 0) return "not known";
+  return fmt::format("{:.3f} mm rms, {:.3f} mm at most", std::sqrt(sum / static_cast<double>(count)), most);
+}
+
+std::string facts(const CorrectedProgram& program, double tolerance_mm) {
+  std::map<std::string, int> tools;
+  for (const ReceiptRow& row : program.rows) {
+    if (!row.tool.empty()) ++tools[row.tool];
+  }
+  std::vector<std::string> names;
+  for (const auto& [name, count] : tools) names.push_back(fmt::format("{} ({} targets)", html_text(name), count));
+  std::vector<HtmlRow> rows = {
+      {{"Model",
+        html_text(fmt::format("{} of cell {}, {}", program.model_id, program.model.cell, program.model.level))}},
+      {{"Newest measurement in it", date_of(program.model.measured_at_unix_s)}},
+      {{"Tools", fmt::format("{}", fmt::join(names, ", "))}},
+      {{"Motions", fmt::format("{}, {} to corrected targets", program.moves, program.moves_corrected)}},
+      {{"Targets", fmt::format("{}, {} left as they were", program.rows.size(), program.left_alone())}},
+      {{"Expected error before", figures(program, &ReceiptRow::error_before_mm)}},
+      {{"Expected error after", figures(program, &ReceiptRow::error_after_mm)}},
+  };
+  if (tolerance_mm > 0)
+    rows.push_back({{"Verdict", html_text(verdict_text(tolerance_verdict(program, tolerance_mm)))}, "verdict"});
+  for (const std::string& note : program.notes) rows.push_back({{"Note", html_text(note)}});
+  return html_table({"facts", {}, rows});
+}
+
+std::string targets(const CorrectedProgram& program) {
+  std::vector<HtmlRow> rows;
+  for (const ReceiptRow& row : program.rows) {
+    if (rows.size() == kMostRows) break;
+    const std::string said =
+        row.message + (row.suggestion.empty() ? "" : (row.message.empty() ? "" : "; ") + row.suggestion);
+    rows.push_back({{html_text(fmt::format("{}:{}", row.file, row.line)), html_text(row.name), html_text(row.motion),
+                     html_text(row.tool), html_text(row.frame), html_text(row.status), mm(row.error_before_mm),
+                     mm(row.error_after_mm), mm(row.sigma_mm), mm(row.rounding_mm), html_text(said)},
+                    row.corrected() ? row.status : "left"});
+  }
+  return html_table({"targets",
+                     {"place", "name", "motion", "tool", "frame", "status", "before, mm", "after, mm", "sigma, mm",
+                      "rounding, mm", ""},
+                     rows});
+}
+
+ordered_json points(const CorrectedProgram& program) {
+  const auto number = [](double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); };
+  std::vector<const ReceiptRow*> path;
+  for (const ReceiptRow& row : program.rows) {
+    if (std::isfinite(row.p_B.x())) path.push_back(&row);
+  }
+  std::stable_sort(path.begin(), path.end(),
+                   [](const ReceiptRow* a, const ReceiptRow* b) { return a->order < b->order; });
+  ordered_json all = ordered_json::array();
+  for (const ReceiptRow* one : path) {
+    const ReceiptRow& row = *one;
+    all.push_back({to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z()), number(row.error_before_mm),
+                   number(row.error_after_mm), row.status, fmt::format("{} {}:{}", row.name, row.file, row.line)});
+  }
+  return all;
+}
+
+}  // namespace
+
+ToleranceVerdict tolerance_verdict(const CorrectedProgram& program, double tolerance_mm) {
+  ToleranceVerdict verdict{tolerance_mm};
+  for (const ReceiptRow& row : program.rows) {
+    if (!std::isfinite(row.error_before_mm) || !std::isfinite(row.sigma_mm)) continue;
+    ++verdict.targets;
+    const double before = share_inside(tolerance_mm, row.error_before_mm, row.sigma_mm);
+    const double after = share_inside(tolerance_mm, row.error_after_mm, row.sigma_mm);
+    verdict.expected_before += before;
+    verdict.expected_after += after;
+    if (before >= kSure) ++verdict.before;
+    if (after >= kSure) ++verdict.after;
+  }
+  return verdict;
+}
+
+std::string verdict_text(const ToleranceVerdict& verdict) {
+  return fmt::format(
+      "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); {:.1f} are expected inside",
+      verdict.tolerance_mm, verdict.after, verdict.targets, verdict.before, verdict.expected_after);
+}
+
+std::string receipt_page(const CorrectedProgram& program, double tolerance_mm) {
+  std::string more;
+  if (program.rows.size() > kMostRows)
+    more = fmt::format("<p>The first {} of {} targets; the CSV receipt has all.</p>", kMostRows, program.rows.size());
+  return fill_in(kReceiptPage, {{"facts", facts(program, tolerance_mm)},
+                                {"targets", targets(program) + more},
+                                {"points", script_json(points(program))},
+                                {"tolerance", fmt::format("{}", tolerance_mm)}});
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,25 @@
+/PROG  DRILL
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "panel";
+LINE_COUNT	= 4;
+/APPL
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:J P[1] 100% FINE    ;
+   4:L P[2:"hole 2"] 250mm/sec FINE    ;
+/POS
+P[1]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =      .000  mm,	Y =   125.000  mm,	Z =      .000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+P[2:"hole 2"]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =      .000  mm,	Y =   375.000  mm,	Z =      .000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+/END

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "server/bias/kernels/kernel.h"
+#include "server/numerics/aligned_matrix.h"
+
+namespace trammel {
+
+/// The variance that the points leave which a target has most in common with. Fewer points know less, so it is never
+/// below the variance that all points leave. Nothing is kept for it. Refers to what it is made of.
+struct NearPoints {
+  static constexpr Eigen::Index kMost = 48;
+
+  const Kernel& kernel;
+  const Eigen::VectorXd& parameters;
+  const AlignedMatrix& features;  ///< of the points, padded
+  const Eigen::VectorXd& noise;   ///< of each point, relative to σ_f²
+  Eigen::Index count;             ///< of near ones; at most kMost, and fewer than there are points
+
+  /// In units of σ_f². `target`: one row of features, `prior` its variance without data. Without the point `left_out`,
+  /// if there is one.
+  [[nodiscard]] double left_of(const FeatureBlock& target, double prior, Eigen::Index left_out = -1) const;
+};
+
+}  // namespace trammel

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+
+#include "server/base/result.h"
+#include "server/measurement/measurement.h"
+
+namespace trammel {
+
+/// What speaks against learning from `batch` (checked against `cell`), of positions and orientations: a mistake of
+/// reading (look_at_readings(), orientation_doubt()) or another tool, with the figure of what would fit. Whoever looks
+/// at a batch before anything is learned asks this.
+[[nodiscard]] std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell);
+
+/// The same, without what is said of another tool: of a batch that a model in force judges better.
+[[nodiscard]] std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell);
+
+/// Refuses a batch with a batch_doubt().
+[[nodiscard]] Status check_batch(const MeasurementBatch& batch, const Cell& cell);
+
+}  // namespace trammel

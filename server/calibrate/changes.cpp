@@ -1,0 +1,291 @@
+#include "server/calibrate/changes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/calibrate/identify/weighted_pose.h"
+#include "server/calibrate/sessions/session_blocks.h"
+#include "server/measurement/sessions.h"
+
+namespace trammel {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kChance = 1e-4;  // of a false change in all sessions together
+constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
+constexpr double kLeastSeen = 1;  // information of a candidate, prior units: below it these poses do not show it
+constexpr double kLeastInflation = 1;
+
+/// The chance that chi-squared of that many degrees of freedom exceeds x.
+double chi_square_tail(int freedom, double x) {
+  const double half = 0.5 * x;
+  double tail = freedom % 2 == 1 ? std::erfc(std::sqrt(half)) : std::exp(-half);
+  for (int k = freedom % 2 == 1 ? 3 : 4; k <= freedom; k += 2)
+    tail += std::exp((0.5 * k - 1) * std::log(half) - half - std::lgamma(0.5 * k));
+  return tail;
+}
+
+/// A kind of change; its columns among those of all kinds.
+struct Kind {
+  std::string spelling;  ///< up to the pose at which it begins
+  Index first = 0, count = 0;
+
+  [[nodiscard]] std::string from(int index) const { return fmt::format("{}@{}", spelling, index + 1); }
+};
+
+/// A model that has every kind of change from the first pose on, at nothing, behind the parameters of `model`.
+class AllKinds {
+ public:
+  explicit AllKinds(const PhysicalModel& model) : probe_(model) {
+    for (const CauseRecord* cause : all_causes()) {
+      // What belongs to a session alone, such as where its tracker stood, is no change of the arm.
+      if (cause->lasting != causes::Lasting::kFromAPose || cause->scope == causes::Scope::kSession) continue;
+      if (cause->scope != causes::Scope::kJoint) add(std::string(cause->spelling));
+      for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j)
+        add(fmt::format("{}:{}", cause->spelling, j + 1));
+    }
+  }
+  [[nodiscard]] const std::vector<Kind>& kinds() const { return kinds_; }
+  [[nodiscard]] const PhysicalModel& probe() const { return probe_; }
+  /// Of the probe's parameters: those of the model, and those of the kinds, in the order of kinds().
+  [[nodiscard]] std::vector<Index> own() const { return sorted(false); }
+  [[nodiscard]] std::vector<Index> changes() const { return sorted(true); }
+
+ private:
+  void add(const std::string& spelling) {
+    Result<ErrorSourcePtr> source = make_error_source(spelling + "@1", *probe_.cell);
+    if (!source) return;
+    const auto count = static_cast<Index>((*source)->parameters().size());
+    const Index first = add_source(probe_, std::move(*source));
+    for (Index& at : places_) at += at >= first ? count : 0;
+    Index next = 0;
+    for (const Kind& kind : kinds_) next += kind.count;
+    kinds_.push_back({spelling, next, count});
+    for (Index k = 0; k < count; ++k) places_.push_back(first + k);
+  }
+  [[nodiscard]] std::vector<Index> sorted(bool of_kinds) const {
+    if (of_kinds) return places_;
+    std::vector<Index> own;
+    for (Index i = 0; i < probe_.values.size(); ++i) {
+      if (std::find(places_.begin(), places_.end(), i) == places_.end()) own.push_back(i);
+    }
+    return own;
+  }
+
+  PhysicalModel probe_;
+  std::vector<Kind> kinds_;
+  std::vector<Index> places_;
+};
+
+/// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P), of its motion.
+struct Sums {
+  MatrixXd own, shared, motion;  // K x K, K x P, K x 6
+  VectorXd gradient;             // K
+
+  Sums(Index K, Index P)
+      : own(MatrixXd::Zero(K, K)),
+        shared(MatrixXd::Zero(K, P)),
+        motion(MatrixXd::Zero(K, 6)),
+        gradient(VectorXd::Zero(K)) {}
+  void add(const MatrixXd& E, const MatrixXd& J, const MatrixXd& D, const VectorXd& r) {
+    own.noalias() += E * E.transpose();
+    shared.noalias() += E * J.transpose();
+    motion.noalias() += E * D.transpose();
+    gradient.noalias() += E * r;
+  }
+};
+
+/// The same with the motions eliminated, over any sessions.
+struct Seen {
+  MatrixXd own, shared;
+  VectorXd gradient;
+
+  void add(const Sums& sums, const SessionBlock* block) {
+    if (own.size() == 0) {
+      own = MatrixXd::Zero(sums.own.rows(), sums.own.cols());
+      shared = MatrixXd::Zero(sums.shared.rows(), sums.shared.cols());
+      gradient = VectorXd::Zero(sums.gradient.size());
+    }
+    own += sums.own;
+    shared += sums.shared;
+    gradient += sums.gradient;
+    if (block == nullptr) return;
+    const MatrixXd across = block->solve(sums.motion.transpose());  // 6 x K
+    own.noalias() -= sums.motion * across;
+    shared.noalias() -= across.transpose() * block->cross;
+    gradient.noalias() -= across.transpose() * block->gradient;
+  }
+};
+
+/// The equations of a whole batch beside one calibration.
+class ChangeSearch {
+ public:
+  ChangeSearch(const CalibrationResult& found, const MeasurementBatch& batch)
+      : kinds_(found.model),
+        sessions_(found.sessions),
+        s_(scaled_parameters(kinds_.probe(), {})),
+        own_(kinds_.own()),
+        changes_(kinds_.changes()),
+        joints_(static_cast<std::size_t>(found.model.cell->robot.size())),
+        blocks_(sessions_.size() - 1) {
+    const auto P = static_cast<Index>(own_.size());
+    const auto K = static_cast<Index>(changes_.size());
+    information_ = MatrixXd::Identity(P, P);
+    for (SessionBlock& block : blocks_) block.cross = MatrixXd::Zero(6, P);
+    whole_.assign(sessions_.size(), Sums(K, P));
+    halves_.assign(joints_ * sessions_.size(), Sums(K, P));
+    const Tracker& tracker = found.model.cell->tracker;
+    const MeasurementBatch here = moved(batch, sessions_, tracker.sigma, tracker.sigma_rotation);
+    find_middles(here);
+    const Weights weights{found.discrepancy, found.discrepancy_rotation, true};
+    for (const Measurement& m : here.measurements) add(m, weights);
+    VectorXd at_rest = VectorXd::Zero(P);  // the shared parameters are where their gradient vanishes
+    eliminate(blocks_, information_, at_rest);
+    factor_.compute(information_);
+  }
+
+  [[nodiscard]] std::optional<Change> strongest() const {
+    const double inflation = inflation_by_halves();
+    std::vector<Scored> all;
+    Seen seen;
+    for (std::size_t s = sessions_.size() - 1; s >= 1; --s) {
+      seen.add(whole_[s], block(s));
+      for (const Kind& kind : kinds_.kinds()) {
+        const Scored scored = score(kind, s, seen, inflation);
+        if (scored.gain > 0) all.push_back(scored);
+      }
+    }
+    const auto best = std::max_element(all.begin(), all.end(),
+                                       [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+    if (best == all.end()) return std::nullopt;
+    const double chance = std::min(
+        1.0, static_cast<double>(all.size()) * chi_square_tail(static_cast<int>(best->kind->count), best->gain));
+    if (chance > kChance) return std::nullopt;
+    Change change{best->kind->from(first_of(best->session)), best->session, best->gain, chance, {}};
+    for (const Scored& other : all) {
+      if (&other != &*best && other.gain > best->gain - kAsGood)
+        change.could_also_be.push_back(other.kind->from(first_of(other.session)));
+    }
+    return change;
+  }
+
+ private:
+  struct Scored {
+    const Kind* kind = nullptr;
+    std::size_t session = 0;
+    double gain = 0, evidence = 0;
+  };
+
+  [[nodiscard]] int first_of(std::size_t session) const { return sessions_[session].first; }
+  /// Null for the newest session, where the base itself moves.
+  [[nodiscard]] const SessionBlock* block(std::size_t session) const {
+    return session < blocks_.size() ? &blocks_[session] : nullptr;
+  }
+
+  /// Of each joint in each session.
+  void find_middles(const MeasurementBatch& batch) {
+    std::vector<std::vector<double>> angles(joints_ * sessions_.size());
+    for (const Measurement& m : batch.measurements) {
+      for (std::size_t j = 0; j < joints_; ++j)
+        angles[half(j, m.session)].push_back(m.context.q(static_cast<Index>(j)));
+    }
+    for (std::vector<double>& some : angles) {
+      const auto middle = some.begin() + static_cast<std::ptrdiff_t>(some.size() / 2);
+      if (!some.empty()) std::nth_element(some.begin(), middle, some.end());
+      middles_.push_back(some.empty() ? 0 : *middle);
+    }
+  }
+  [[nodiscard]] std::size_t half(std::size_t joint, int session) const {
+    return joint * sessions_.size() + static_cast<std::size_t>(session);
+  }
+
+  void add(const Measurement& m, const Weights& weights) {
+    const WeightedPose pose(kinds_.probe(), s_, m, weights);
+    VectorXd r(pose.size());
+    MatrixXd all(s_.scale.size(), pose.size());  // one column an equation
+    if (!pose.evaluate(s_.prior.data(), r.data(), all.data())) return;
+    MatrixXd D =
+        motion_columns(m, kinds_.probe().X_WB.translation(), pose.inverse_sigma(), pose.inverse_rotation_sigma());
+    if (const double norm = r.norm(); norm > pose.huber_limit()) {
+      const double root_weight = std::sqrt(pose.huber_limit() / norm);
+      r *= root_weight;
+      all *= root_weight;
+      D *= root_weight;
+    }
+    const MatrixXd J = all(own_, Eigen::all);
+    const MatrixXd E = all(changes_, Eigen::all);
+    information_.noalias() += J * J.transpose();
+    const auto session = static_cast<std::size_t>(m.session);
+    if (session < blocks_.size()) {
+      blocks_[session].curvature.noalias() += D * D.transpose();
+      blocks_[session].gradient.noalias() += D * r;
+      blocks_[session].cross.noalias() += D * J.transpose();
+    }
+    whole_[session].add(E, J, D, r);
+    for (std::size_t j = 0; j < joints_; ++j) {
+      const std::size_t place = half(j, m.session);
+      if (m.context.q(static_cast<Index>(j)) > middles_[place]) halves_[place].add(E, J, D, r);
+    }
+  }
+
+  /// What the columns [first, first + count) gain beside all that is free.
+  [[nodiscard]] double gain(Index first, Index count, const Seen& seen) const {
+    const MatrixXd shared = seen.shared.middleRows(first, count);
+    const MatrixXd explained = factor_.solve(shared.transpose());
+    MatrixXd left = seen.own.block(first, first, count, count) - shared * explained;
+    if (left.trace() < kLeastSeen) return 0;
+    left.diagonal().array() += 1;  // the prior
+    const VectorXd along = seen.gradient.segment(first, count);
+    return along.dot(left.ldlt().solve(along));
+  }
+
+  [[nodiscard]] Scored score(const Kind& kind, std::size_t session, const Seen& seen, double inflation) const {
+    const double gained = gain(kind.first, kind.count, seen) / inflation;
+    double rows = 0;
+    for (const SessionSetting& one : sessions_) rows += 3.0 * one.poses;
+    return {&kind, session, gained, gained - static_cast<double>(kind.count) * std::log(rows)};
+  }
+
+  /// How much larger gains are than white noise would make them: the mean over single numbers between halves of the
+  /// poses.
+  [[nodiscard]] double inflation_by_halves() const {
+    double sum = 0, count = 0;
+    for (std::size_t j = 0; j < joints_; ++j) {
+      Seen seen;
+      for (std::size_t s = 0; s < sessions_.size(); ++s) seen.add(halves_[half(j, static_cast<int>(s))], block(s));
+      for (Index k = 0; k < seen.gradient.size(); ++k) {
+        const double one = gain(k, 1, seen);
+        if (one <= 0) continue;
+        sum += one;
+        ++count;
+      }
+    }
+    return count > 0 ? std::max(kLeastInflation, sum / count) : kLeastInflation;
+  }
+
+  const AllKinds kinds_;
+  const std::vector<SessionSetting>& sessions_;
+  const ScaledParameters s_;
+  const std::vector<Index> own_, changes_;
+  const std::size_t joints_;
+  MatrixXd information_;  // P x P, of the shared parameters with their priors, in prior units
+  std::vector<SessionBlock> blocks_;
+  std::vector<Sums> whole_;   // by session
+  std::vector<Sums> halves_;  // by joint and session: its poses above the middle
+  std::vector<double> middles_;
+  Eigen::LLT<MatrixXd> factor_;
+};
+
+}  // namespace
+
+std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch) {
+  if (found.sessions.size() < 2) return std::nullopt;
+  return ChangeSearch(found, batch).strongest();
+}
+
+}  // namespace trammel

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/calibrate/calibration.h"
+
+/// What has changed on the arm between two sessions of one batch.
+namespace trammel {
+
+/// A cause that began between two sessions and lasts since.
+struct Change {
+  std::string source;       ///< as a list of error sources has it: `joint_slip:3@121`
+  std::size_t session = 0;  ///< from which on, its place in CalibrationResult::sessions
+  double gain = 0;          ///< twice the log likelihood that it adds, everything else refitted
+  double p_value = 1;       ///< chance that the best of all candidates at all boundaries gains as much with no change
+  std::vector<std::string> could_also_be = {};  ///< explain it nearly as well: `tool_changed@121`
+};
+
+/// The change that the sessions speak for most: a joint that lost its zero, another tool, another load, from a session
+/// on; empty where none is beyond chance. `found` was identified on `batch`, whose sessions each have a base of their
+/// own. Every candidate is held against the residuals with everything else free (a score test), so nothing is fitted
+/// again. What the model leaves over is no white noise: it makes differences between sessions of other poses, too. How
+/// much is measured by the same candidates between halves of each session's poses, where nothing can have changed, and
+/// taken off.
+[[nodiscard]] std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch);
+
+}  // namespace trammel

@@ -1,0 +1,105 @@
+#include "server/calibrate/identify/own_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trammel {
+
+namespace {
+
+constexpr double kMedianOfChiSquare = 2.366;  // of 3 degrees of freedom
+constexpr double kSpreadOfMedian = 1.124;     // relative, times 1 / sqrt(n): of that median
+constexpr double kBeyondChance = 4;           // standard deviations
+constexpr std::size_t kFewestPoses = 8;       // that tell how noisy a session is
+constexpr double kSettled = 0.02;             // relative
+
+/// Of two in the middle the lower one.
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Squared residuals of one kind in units of their variance, and that variance itself, session by session.
+struct Squares {
+  std::vector<std::vector<double>> ratio;
+  std::vector<double> variance;  // sums
+
+  explicit Squares(std::size_t sessions) : ratio(sessions), variance(sessions, 0.0) {}
+  void add(int session, double square, double of) {
+    const auto s = static_cast<std::size_t>(session);
+    ratio[s].push_back(square / of);
+    variance[s] += of;
+  }
+};
+
+/// The variance that each session has beyond the others.
+std::vector<double> beyond_others(const Squares& squares, double share) {
+  const std::size_t S = squares.ratio.size();
+  std::vector<double> level(S, 0.0), beyond(S, 0.0), all;
+  for (std::size_t s = 0; s < S; ++s) {
+    if (squares.ratio[s].size() < kFewestPoses) continue;
+    level[s] = median(squares.ratio[s]) / (kMedianOfChiSquare * share);
+    all.insert(all.end(), squares.ratio[s].size(), level[s]);  // a large session tells more of what is usual
+  }
+  if (all.empty()) return beyond;
+  const double usual = median(all);
+  for (std::size_t s = 0; s < S; ++s) {
+    const auto n = static_cast<double>(squares.ratio[s].size());
+    if (level[s] <= usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, n)))) continue;
+    beyond[s] = (level[s] - usual) * squares.variance[s] / n;
+  }
+  return beyond;
+}
+
+}  // namespace
+
+void set_own_noise(const Residuals& r, double freedom, const Weights& weights, const MeasurementBatch& batch,
+                   std::vector<SessionSetting>& sessions) {
+  Squares positions(sessions.size()), rotations(sessions.size());
+  Eigen::Index turned = 0;
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const Measurement& m = batch.measurements[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    const SessionSetting& session = sessions[static_cast<std::size_t>(m.session)];
+    const double own = std::pow(session.own_noise, 2);
+    const double rest = std::max(0.0, r.sigma(at) * r.sigma(at) - own) + std::pow(weights.discrepancy, 2);
+    positions.add(m.session, r.position.col(at).squaredNorm(), rest);
+    if (!m.R_WT) continue;
+    const double own_turn = std::pow(session.own_noise_rotation, 2);
+    const double rest_turn =
+        std::max(0.0, std::pow(r.sigma_rotation(turned), 2) - own_turn) + std::pow(weights.discrepancy_rotation, 2);
+    rotations.add(m.session, r.rotation.col(turned++).squaredNorm(), rest_turn);
+  }
+  const double equations = 3.0 * static_cast<double>(r.position.cols() + turned);
+  const double share = std::max(0.1, 1 - freedom / equations);
+  const std::vector<double> beyond = beyond_others(positions, share);
+  const std::vector<double> turns_beyond = beyond_others(rotations, share);
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    sessions[s].own_noise = std::sqrt(beyond[s]);
+    sessions[s].own_noise_rotation = std::sqrt(turns_beyond[s]);
+  }
+}
+
+bool are_as_noisy(const std::vector<SessionSetting>& now, const std::vector<SessionSetting>& before,
+                  const Tracker& tracker) {
+  const auto same = [](double sigma, double a, double b) {
+    return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <= kSettled * std::hypot(sigma, a);
+  };
+  return std::equal(now.begin(), now.end(), before.begin(), before.end(),
+                    [&](const SessionSetting& a, const SessionSetting& b) {
+                      return same(tracker.sigma, a.own_noise, b.own_noise) &&
+                             same(tracker.sigma_rotation, a.own_noise_rotation, b.own_noise_rotation);
+                    });
+}
+
+void set_sigmas(const MeasurementBatch& batch, const Tracker& tracker, Residuals& r) {
+  Eigen::Index turned = 0;
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const Measurement& m = batch.measurements[i];
+    r.sigma(static_cast<Eigen::Index>(i)) = m.sigma.value_or(tracker.sigma);
+    if (m.R_WT) r.sigma_rotation(turned++) = m.sigma_rotation.value_or(tracker.sigma_rotation);
+  }
+}
+
+}  // namespace trammel

@@ -1,0 +1,50 @@
+#include "server/calibrate/sessions/session_blocks.h"
+
+namespace trammel {
+
+namespace {
+
+// Standard deviations of where an instrument may stand from where it was located: so wide that they do not matter.
+constexpr double kShift = 1;   // m
+constexpr double kTurn = 2.5;  // rad
+
+}  // namespace
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> motion_columns(const Measurement& m, const Vector3& centre_W,
+                                                        double inverse_sigma, double inverse_rotation_sigma) {
+  const Eigen::Index rows = m.R_WT ? 6 : 3;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> columns = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, rows);
+  // d(w x r) = -skew(r) w, and the residual is measured - predicted; r as measured is near enough.
+  columns.topLeftCorner<3, 3>() = -inverse_sigma * Matrix3::Identity();
+  columns.bottomLeftCorner<3, 3>() = inverse_sigma * skew(m.p_W - centre_W).transpose();
+  if (m.R_WT) columns.bottomRightCorner<3, 3>() = -inverse_rotation_sigma * Matrix3::Identity();
+  return columns;
+}
+
+Eigen::MatrixXd SessionBlock::solve(const Eigen::MatrixXd& right, double damping) const {
+  Eigen::Matrix<double, 6, 6> regular = curvature;
+  regular.diagonal() *= 1 + damping;
+  regular.diagonal().head<3>().array() += 1 / (kShift * kShift);
+  regular.diagonal().tail<3>().array() += 1 / (kTurn * kTurn);
+  return regular.ldlt().solve(right);
+}
+
+SessionMotion SessionBlock::motion(const Eigen::VectorXd& step, double damping) const {
+  return -solve(gradient + cross * step, damping);
+}
+
+void eliminate(const std::vector<SessionBlock>& blocks, Eigen::MatrixXd& information, Eigen::VectorXd& gradient,
+               double damping) {
+  for (const SessionBlock& block : blocks) {
+    const Eigen::MatrixXd across = block.solve(block.cross, damping);
+    information.noalias() -= block.cross.transpose() * across;
+    gradient.noalias() -= across.transpose() * block.gradient;
+  }
+}
+
+Pose measured_by(const SessionMotion& motion, const Vector3& centre_W) {
+  const Matrix3 back = rotation_exp(-motion.tail<3>());
+  return make_pose(back, centre_W - back * (centre_W + motion.head<3>()));
+}
+
+}  // namespace trammel

@@ -1,0 +1,98 @@
+#include "server/compensate/world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/compensate/known_rows.h"
+#include "server/measurement/sessions.h"
+#include "server/robot/rigid_fit.h"
+
+namespace trammel {
+
+namespace {
+
+/// As the model has it; null where it does not know the session.
+const SessionSetting* known_session(const CompensatedModel& model, const std::string& name) {
+  const std::vector<SessionSetting>& sessions = model.parts().sessions;
+  const auto found =
+      std::find_if(sessions.begin(), sessions.end(), [&](const SessionSetting& session) { return session.id == name; });
+  return found == sessions.end() ? nullptr : &*found;
+}
+
+/// By what a batch of its own, or a part of one, may be called in a model.
+const SessionSetting* known_session(const CompensatedModel& model, const MeasurementBatch& batch,
+                                    const std::string& session) {
+  for (const std::string& name : {session, batch.id + "/" + session, batch.id}) {
+    if (name.empty() || (name == batch.id && has_sessions(batch) && session != batch.id)) continue;
+    if (const SessionSetting* known = known_session(model, name)) return known;
+  }
+  return nullptr;
+}
+
+/// Where the rows themselves put the session's world.
+Result<Pose> located(const CompensatedModel& model, const MeasurementBatch& session) {
+  const MeasurementBatch rows = known_rows(model, session);
+  if (rows.measurements.empty()) return refused("the model knows none of its tools").in("session " + session.id);
+  const Pose X_WB = model.parts().physics.X_WB;
+  Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(rows.measurements.size()));
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = rows.measurements[static_cast<std::size_t>(i)].p_W;
+  const Eigen::Matrix3Xd p_B = X_WB.inverse() * p_W - model.errors_B(rows).compensated;
+  const Result<Pose> X_SB = fit_transform(p_W, p_B);
+  if (!X_SB) return Failure(X_SB.error()).in("session " + session.id);
+  return X_WB * X_SB->inverse();
+}
+
+constexpr double kOtherSetUp = 3;  // times what is left where the rows themselves put it
+constexpr double kSlack = 1e-4;    // m
+
+/// m rms, of what the model leaves of the rows, seen from there.
+double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Pose& X_WS) {
+  MeasurementBatch rows = known_rows(model, session);
+  if (rows.measurements.empty()) return 0;
+  for (Measurement& m : rows.measurements) m.p_W = X_WS * m.p_W;
+  return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
+}
+
+/// Whether the rows were measured from where the model knows the session of that name to have stood: names are used
+/// again.
+bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session, const SessionSetting& known) {
+  const Result<Pose> X_WS = located(model, session);
+  if (!X_WS) return true;
+  return left_of(model, session, known.X_WS) <= kOtherSetUp * left_of(model, session, *X_WS) + kSlack;
+}
+
+/// The batch is one session.
+MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& batch) {
+  const std::string& said = batch.measurements.empty() ? batch.id : batch.measurements.front().session_id;
+  const SessionSetting* known = known_session(model, batch, said);
+  if (known == nullptr || !is_same_set_up(model, batch, *known)) return batch;
+  MeasurementBatch here = batch;
+  for (Measurement& m : here.measurements) m.session = 0;
+  return aligned(std::move(here), {*known}, model.cell().tracker);
+}
+
+}  // namespace
+
+Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch) {
+  if (!has_sessions(batch)) return InWorld{of_one(model, batch)};
+  std::vector<SessionSetting> settings = settings_of(batch);
+  InWorld world;
+  const std::vector<MeasurementBatch> sessions = by_session(batch);
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    const SessionSetting* known = known_session(model, batch, batch.sessions[s]);
+    if (known != nullptr && is_same_set_up(model, sessions[s], *known)) {
+      settings[s].X_WS = known->X_WS;
+      settings[s].own_noise = known->own_noise;
+      settings[s].own_noise_rotation = known->own_noise_rotation;
+      continue;
+    }
+    const Result<Pose> X_WS = located(model, sessions[s]);
+    if (!X_WS) return tl::make_unexpected(X_WS.error());
+    settings[s].X_WS = *X_WS;
+    world.located.push_back(batch.sessions[s]);
+  }
+  world.batch = aligned(batch, settings, model.cell().tracker);
+  return world;
+}
+
+}  // namespace trammel

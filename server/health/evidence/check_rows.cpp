@@ -1,0 +1,182 @@
+#include "server/health/evidence/check_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/robot/rigid_fit.h"
+
+namespace trammel::health {
+
+namespace {
+
+using Eigen::Index;
+
+constexpr double kShared = 0.2;    // of a joint's range: poses nearer than that share what the model leaves over
+constexpr double kFarOff = 6;      // times the median: a pose that does not say where the base stands
+constexpr int kLocalisations = 4;  // without the poses that were far off the last time
+constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Where the base stands by the positions, those left out that are much farther off than others.
+Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions) {
+  const std::size_t n = predictions.size();
+  std::vector<std::size_t> used(n);
+  for (std::size_t i = 0; i < n; ++i) used[i] = i;
+  Result<Pose> X_WB = failure(ErrorCode::kRefused, "no poses");
+  for (int round = 0; round < kLocalisations; ++round) {
+    Eigen::Matrix3Xd measured_W(3, static_cast<Index>(used.size())), predicted_B = measured_W;
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      measured_W.col(static_cast<Index>(k)) = batch.measurements[used[k]].p_W;
+      predicted_B.col(static_cast<Index>(k)) = predictions[used[k]].X_BT_predicted.translation();
+    }
+    Result<Pose> next = fit_transform(measured_W, predicted_B);
+    if (!next) return round == 0 ? next : X_WB;
+    X_WB = std::move(next);
+    std::vector<double> off;
+    for (std::size_t i = 0; i < n; ++i)
+      off.push_back((X_WB->inverse() * batch.measurements[i].p_W - predictions[i].X_BT_predicted.translation()).norm());
+    const double far_off = kFarOff * median(off);
+    used.clear();
+    for (std::size_t i = 0; i < n; ++i)
+      if (off[i] <= far_off) used.push_back(i);
+    if (used.size() == n) break;
+  }
+  return X_WB;
+}
+
+/// Standard deviation of one axis of an orientation that the model shows on its own poses; 0: it knows none.
+double rotation_shown(const ModelParts& parts) {
+  if (!parts.training.orientation) return 0;
+  const auto& held_out = parts.validation ? parts.validation->orientation : std::nullopt;
+  return std::max(parts.training.orientation->compensated, held_out ? held_out->compensated : 0) / std::sqrt(3.0);
+}
+
+/// How much two poses share of what the model leaves over.
+double shared(const PoseContext& one, const PoseContext& other, const JointVector& range) {
+  double square = 0;
+  for (Index j = 0; j < range.size(); ++j) {
+    const double apart = (one.q(j) - other.q(j)) / std::max(kShared * range(j), 1e-6);
+    square += apart * apart;
+  }
+  return std::exp(-0.5 * square);
+}
+
+/// Standard deviations of each row: the measurement's noise, and what the model leaves over beyond its parameters.
+struct RowDeviations {
+  Eigen::VectorXd noise, left;
+  Eigen::MatrixXd J;  ///< R x P: by the parameters, as far as they count
+};
+
+/// Of the position of pose i, in B.
+void add_position(const ErrorPrediction& prediction, const Measurement& m, double sigma,
+                  const Eigen::MatrixXd& covariance, Index first, RowDeviations& rows) {
+  const double noise = std::max(m.sigma.value_or(sigma), sigma);
+  const Vector3 variance = (prediction.covariance_B.diagonal().array() - sigma * sigma).max(0.0);
+  auto J = rows.J.middleRows<3>(first);
+  const Vector3 identified = (J * covariance * J.transpose()).diagonal();
+  // A bias corrects part of what the parameters leave uncertain: they count no more than the model says in all.
+  const double counts = identified.sum() > 0 ? std::min(1.0, variance.sum() / identified.sum()) : 0.0;
+  J *= std::sqrt(counts);
+  rows.noise.segment<3>(first).setConstant(noise);
+  rows.left.segment<3>(first) = (variance - counts * identified).cwiseMax(0.0).cwiseSqrt();
+}
+
+void add_rotation(double sigma, double shown, const Eigen::MatrixXd& covariance, Index first, RowDeviations& rows) {
+  auto J = rows.J.middleRows<3>(first);
+  const double identified = (J * covariance * J.transpose()).trace() / 3;
+  rows.noise.segment<3>(first).setConstant(sigma);
+  rows.left.segment<3>(first).setConstant(std::sqrt(std::max(shown * shown - sigma * sigma - identified, 0.0)));
+}
+
+Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviations, const ModelParts& parts) {
+  Eigen::MatrixXd S = deviations.J * parts.covariance * deviations.J.transpose();
+  const JointVector range = parts.q_max - parts.q_min;
+  for (std::size_t i = 0; i < rows.poses(); ++i) {
+    for (std::size_t k = 0; k < rows.poses(); ++k) {
+      const double alike = i == k ? 1 : shared(rows.contexts[i], rows.contexts[k], range);
+      for (Index a = 0; a < std::min(rows.count[i], rows.count[k]); ++a) {
+        const Index row = rows.first[i] + a;
+        const Index column = rows.first[k] + a;
+        S(row, column) += alike * deviations.left(row) * deviations.left(column);
+      }
+    }
+  }
+  S.diagonal() += (1 + kJitter) * deviations.noise.cwiseAbs2();
+  return 0.5 * (S + S.transpose());
+}
+
+/// The model's held-out poses say how large its errors really are.
+double held_out_factor(const CheckRows& rows, const ModelParts& parts) {
+  if (!parts.validation) return 1;
+  double expected = 0;
+  for (std::size_t i = 0; i < rows.poses(); ++i) expected += rows.covariance.diagonal().segment<3>(rows.first[i]).sum();
+  expected = std::sqrt(expected / static_cast<double>(rows.poses()));
+  return std::max(1.0, parts.validation->compensated.rms / expected);
+}
+
+}  // namespace
+
+std::vector<PoseContext> contexts_of(const CompensatedModel& model, const MeasurementBatch& batch) {
+  std::vector<PoseContext> contexts;
+  for (const Measurement& m : batch.measurements) {
+    PoseContext context = m.context;
+    context.served = true;
+    if (!context.temperature) context.temperature = model.parts().temperature_mean;
+    contexts.push_back(std::move(context));
+  }
+  return contexts;
+}
+
+Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBatch& batch,
+                             const CauseEffects& effects) {
+  const ModelParts& parts = model.parts();
+  CheckRows rows;
+  rows.contexts = contexts_of(model, batch);
+  const std::vector<ErrorPrediction> predictions = model.predict_all(rows.contexts);
+  const Result<Pose> X_WB = located(batch, predictions);
+  if (!X_WB) return tl::make_unexpected(X_WB.error());
+  const double shown = rotation_shown(parts);
+  Index next = 0;
+  for (const Measurement& m : batch.measurements) {
+    rows.pose_ids.push_back(m.pose_id);
+    rows.first.push_back(next);
+    rows.count.push_back(m.R_WT && shown > 0 ? 6 : 3);
+    next += rows.count.back();
+  }
+  rows.residual.resize(next);
+  rows.by_base.resize(next, 6);
+  rows.by_cause.resize(next, effects.size());
+  RowDeviations deviations{Eigen::VectorXd(next), Eigen::VectorXd(next),
+                           Eigen::MatrixXd(next, parts.covariance.rows())};
+  const Tracker& tracker = model.cell().tracker;
+  const Matrix3 R_BW = parts.physics.X_WB.linear().transpose();
+  for (std::size_t i = 0; i < rows.poses(); ++i) {
+    const Measurement& m = batch.measurements[i];
+    const Index first = rows.first[i];
+    const Pose& X_BT = predictions[i].X_BT_predicted;
+    const PoseEffects at = effects.at(rows.contexts[i]);
+    Eigen::MatrixXd J_W;
+    static_cast<void>(parts.physics.pose_W(rows.contexts[i], parts.physics.values, &J_W));
+    rows.residual.segment<3>(first) = X_WB->inverse() * m.p_W - X_BT.translation();
+    rows.by_base.middleRows(first, rows.count[i]) = at.by_base.topRows(rows.count[i]);
+    rows.by_cause.middleRows(first, rows.count[i]) = at.by_cause.topRows(rows.count[i]);
+    deviations.J.middleRows<3>(first) = R_BW * J_W.topRows<3>();
+    add_position(predictions[i], m, tracker.sigma, parts.covariance, first, deviations);
+    if (rows.count[i] == 3) continue;
+    rows.residual.segment<3>(first + 3) =
+        rotation_log(X_WB->linear().transpose() * *m.R_WT * X_BT.linear().transpose());
+    deviations.J.middleRows<3>(first + 3) = R_BW * J_W.bottomRows<3>();
+    add_rotation(tracker.sigma_rotation, shown, parts.covariance, first + 3, deviations);
+  }
+  rows.covariance = covariance_of(rows, deviations, parts);
+  const double factor = held_out_factor(rows, parts);
+  rows.covariance *= factor * factor;
+  return rows;
+}
+
+}  // namespace trammel::health

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/compensate/compensated_model.h"
+#include "server/plan/detectable.h"
+
+namespace trammel::health {
+
+/// A check's poses against the model: R rows, three of each position and three more of each orientation, in B.
+struct CheckRows {
+  std::vector<std::string> pose_ids;
+  std::vector<PoseContext> contexts;
+  std::vector<Eigen::Index> first;  ///< row of each pose
+  std::vector<Eigen::Index> count;  ///< 3 or 6
+  Eigen::VectorXd residual;         ///< R, m and rad: measured - predicted, with the base where it fits best
+  Eigen::MatrixXd covariance;       ///< R x R: what a healthy robot's residuals have
+  Eigen::MatrixXd by_base;          ///< R x 6
+  Eigen::MatrixXd by_cause;         ///< R x K, as CauseEffects has them
+
+  [[nodiscard]] std::size_t poses() const { return pose_ids.size(); }
+};
+
+/// How the poses of a request to the model are, beside what is measured there.
+[[nodiscard]] std::vector<PoseContext> contexts_of(const CompensatedModel& model, const MeasurementBatch& batch);
+
+/// `batch` has only rows that the model knows(). Refuses positions that do not say where the base stands.
+[[nodiscard]] Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBatch& batch,
+                                           const CauseEffects& effects);
+
+}  // namespace trammel::health

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "server/health/evidence/check_rows.h"
+
+namespace trammel::health {
+
+/// Something that may explain the residuals: columns of R rows.
+struct Hypothesis {
+  std::size_t cause = 0;         ///< index in CauseEffects::causes()
+  int pose = -1;                 ///< a single bad pose; -1: the cause
+  Eigen::MatrixXd columns = {};  ///< R x k
+};
+/// A hypothesis for every cause that has a signal.
+[[nodiscard]] std::vector<Hypothesis> cause_hypotheses(const CauseEffects& effects, const CheckRows& rows,
+                                                       const std::vector<CauseSignal>& signals);
+/// For every pose.
+[[nodiscard]] std::vector<Hypothesis> pose_hypotheses(const CheckRows& rows);
+
+/// What is left of residuals and effects after whitening, and after what is refitted anyway.
+class RefittedRows {
+ public:
+  /// `nuisance`: R x f, refitted: base, tool, bad poses, what was found before.
+  RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance);
+
+  [[nodiscard]] Eigen::Index size() const { return nuisance_.rows(); }
+  [[nodiscard]] int freedom() const { return static_cast<int>(nuisance_.rows() - nuisance_.cols()); }
+  /// R x k of R x k.
+  [[nodiscard]] Eigen::MatrixXd left(const Eigen::MatrixXd& columns) const;
+  /// The same of what is whitened already.
+  [[nodiscard]] Eigen::VectorXd refitted(const Eigen::VectorXd& whitened) const {
+    return whitened - nuisance_ * (nuisance_.transpose() * whitened);
+  }
+  /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up for are none.
+  [[nodiscard]] Eigen::MatrixXd directions(const Eigen::MatrixXd& columns) const;
+  /// R: residuals as a generalised least-squares fit of the nuisance leaves them, in their own units.
+  [[nodiscard]] Eigen::VectorXd unwhitened(const Eigen::VectorXd& left) const;
+  /// R x R: their covariance.
+  [[nodiscard]] Eigen::MatrixXd unwhitened_covariance() const;
+
+ private:
+  [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& columns) const;
+
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::MatrixXd nuisance_;  // R x f, orthonormal
+};
+
+}  // namespace trammel::health

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/measurement/reading/number_table.h"
+#include "server/robot/cell.h"
+
+/// The mistakes that measured batches come with.
+namespace trammel::reading {
+
+/// One way in which the numbers of a batch may have been meant.
+struct Reading {
+  std::string name;      ///< after "read ": `with q2_deg and q3_deg exchanged`
+  std::string columns;   ///< that it is about: `q2_deg,q3_deg`
+  bool of_rows = false;  ///< other rows belong together: it needs the whole table
+  std::function<NumberTable(NumberTable)> apply;
+};
+
+/// Everything that may be wrong in joint columns: two exchanged, the other sign, another unit, another zero, a joint
+/// that was counted with its neighbour.
+[[nodiscard]] std::vector<Reading> joint_readings(const NumberTable& table, const Chain& robot);
+/// Likewise of the measured positions; of a batch with orientations also a left-handed frame.
+[[nodiscard]] std::vector<Reading> position_readings(const NumberTable& table);
+/// Rows whose joints stand in other rows: those next to it, or whatever the distances from pose to pose suggest.
+[[nodiscard]] std::vector<Reading> row_readings(const NumberTable& table, const Cell& cell);
+
+}  // namespace trammel::reading

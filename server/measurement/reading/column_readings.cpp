@@ -1,0 +1,167 @@
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "server/base/units.h"
+#include "server/measurement/pose_columns.h"
+#include "server/measurement/reading/catalogue.h"
+
+namespace trammel::reading {
+
+namespace {
+
+constexpr double kMostRadians = 6.4;  // of a joint in radians, read as degrees: two half turns and a little
+constexpr double kGon = 0.9;          // deg
+constexpr double kInch = 25.4;        // mm
+constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
+constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
+
+/// Unit of a position that should have been mm.
+struct Unit {
+  const char* name;
+  double factor;
+};
+constexpr std::array<Unit, 4> kLengths = {Unit{"metres", 1000}, {"inches", kInch}, {"centimetres", 10}, {"um", 1e-3}};
+constexpr std::array<double, 3> kTurns = {90, -90, 180};
+
+Reading of_joints(std::string name, std::string columns, std::function<void(Eigen::MatrixXd&)> change) {
+  return {std::move(name), std::move(columns), false, [change = std::move(change)](NumberTable table) {
+            change(table.q);
+            return table;
+          }};
+}
+
+Reading of_positions(std::string name, std::string columns, std::function<void(Eigen::Matrix3Xd&)> change) {
+  return {std::move(name), std::move(columns), false, [change = std::move(change)](NumberTable table) {
+            change(table.p_W);
+            return table;
+          }};
+}
+
+class JointReadings {
+ public:
+  JointReadings(const NumberTable& table, const Chain& robot) : table_(table), robot_(robot) {}
+
+  std::vector<Reading> all() {
+    for (int j = 0; j < robot_.size(); ++j) {
+      const std::string column = name(j);
+      add("with the other sign of " + column, column, [j](Eigen::MatrixXd& q) { q.row(j) *= -1; });
+    }
+    exchanges();
+    for (int j = 0; j < robot_.size(); ++j) {
+      if (turns(j)) units(j);
+    }
+    unit_of_all("radians", 180 / kPi);
+    unit_of_all("gon", kGon);
+    couplings();
+    for (int j = 0; j < robot_.size(); ++j) {
+      if (turns(j)) zeros(j);
+    }
+    return std::move(all_);
+  }
+
+ private:
+  [[nodiscard]] std::string name(int j) const { return joint_column(j, robot_.joint(j).type); }
+  [[nodiscard]] bool turns(int j) const { return robot_.joint(j).type == JointType::kRevolute; }
+  [[nodiscard]] bool small(int j) const { return table_.q.row(j).cwiseAbs().maxCoeff() <= from_deg(kMostRadians); }
+  void add(std::string name, std::string columns, std::function<void(Eigen::MatrixXd&)> change) {
+    all_.push_back(of_joints(std::move(name), std::move(columns), std::move(change)));
+  }
+
+  void exchanges() {
+    for (int i = 0; i < robot_.size(); ++i) {
+      for (int j = i + 1; j < robot_.size(); ++j) {
+        if (turns(i) != turns(j)) continue;
+        add(fmt::format("with {} and {} exchanged", name(i), name(j)), name(i) + "," + name(j),
+            [i, j](Eigen::MatrixXd& q) { q.row(i).swap(q.row(j)); });
+      }
+    }
+  }
+  void units(int j) {
+    if (small(j)) {
+      add(fmt::format("with {} in radians", name(j)), name(j), [j](Eigen::MatrixXd& q) { q.row(j) *= 180 / kPi; });
+    }
+    add(fmt::format("with {} in gon", name(j)), name(j), [j](Eigen::MatrixXd& q) { q.row(j) *= kGon; });
+  }
+  void unit_of_all(const char* unit, double factor) {
+    std::vector<int> turning;
+    for (int j = 0; j < robot_.size(); ++j) {
+      if (!turns(j)) continue;
+      if (factor > 1 && !small(j)) return;
+      turning.push_back(j);
+    }
+    add(fmt::format("with all joints in {}", unit), "q1_deg", [turning, factor](Eigen::MatrixXd& q) {
+      for (const int j : turning) q.row(j) *= factor;
+    });
+  }
+  /// A controller that reports a joint together with one that drives it, or the joint file without it.
+  void couplings() {
+    for (int j = 1; j < robot_.size(); ++j) {
+      for (int by = std::max(0, j - 2); by < j; ++by) {
+        if (!turns(by) || !turns(j)) continue;
+        add(fmt::format("with {} subtracted from {}", name(by), name(j)), name(j),
+            [j, by](Eigen::MatrixXd& q) { q.row(j) -= q.row(by); });
+        add(fmt::format("with {} added to {}", name(by), name(j)), name(j),
+            [j, by](Eigen::MatrixXd& q) { q.row(j) += q.row(by); });
+      }
+    }
+  }
+  void zeros(int j) {
+    for (const double turn : kTurns) {
+      add(fmt::format("with {:g} deg added to {}", turn, name(j)), name(j),
+          [j, turn](Eigen::MatrixXd& q) { q.row(j).array() += from_deg(turn); });
+    }
+  }
+
+  const NumberTable& table_;
+  const Chain& robot_;
+  std::vector<Reading> all_;
+};
+
+Reading left_handed(int axis) {
+  return {fmt::format("as of a left-handed frame (mirrored {} axis)", kAxes[static_cast<std::size_t>(axis)][0]),
+          std::string(kAllAxes) + ",qw,qx,qy,qz", false, [axis](NumberTable table) {
+            Matrix3 mirror = Matrix3::Identity();
+            mirror(axis, axis) = -1;
+            table.p_W = mirror * table.p_W;
+            for (auto& R_WT : table.R_WT) {
+              if (R_WT) *R_WT = mirror * *R_WT * mirror;
+            }
+            return table;
+          }};
+}
+
+}  // namespace
+
+std::vector<Reading> joint_readings(const NumberTable& table, const Chain& robot) {
+  return JointReadings(table, robot).all();
+}
+
+std::vector<Reading> position_readings(const NumberTable& table) {
+  std::vector<Reading> all;
+  for (int k = 0; k < 3; ++k) {
+    const std::string name = kAxes[static_cast<std::size_t>(k)];
+    all.push_back(of_positions("with the other sign of " + name, name, [k](Eigen::Matrix3Xd& p) { p.row(k) *= -1; }));
+  }
+  for (const auto& [i, j] : {std::pair(0, 1), std::pair(1, 2), std::pair(0, 2)}) {
+    const std::string one = kAxes[static_cast<std::size_t>(i)];
+    const std::string other = kAxes[static_cast<std::size_t>(j)];
+    all.push_back(of_positions(fmt::format("with {} and {} exchanged", one, other), one + "," + other,
+                               [i = i, j = j](Eigen::Matrix3Xd& p) { p.row(i).swap(p.row(j)); }));
+  }
+  if (std::any_of(table.R_WT.begin(), table.R_WT.end(), [](const auto& R) { return R.has_value(); })) {
+    for (const int axis : {1, 0, 2}) all.push_back(left_handed(axis));
+  }
+  for (const Unit& unit : kLengths) {
+    for (int k = 0; k < 3; ++k) {
+      const std::string name = kAxes[static_cast<std::size_t>(k)];
+      all.push_back(of_positions(fmt::format("with {} in {}", name, unit.name), name,
+                                 [k, unit](Eigen::Matrix3Xd& p) { p.row(k) *= unit.factor; }));
+    }
+    all.push_back(of_positions(fmt::format("with all positions in {}", unit.name), kAllAxes,
+                               [unit](Eigen::Matrix3Xd& p) { p *= unit.factor; }));
+  }
+  return all;
+}
+
+}  // namespace trammel::reading

@@ -1,0 +1,307 @@
+#include "server/measurement/reading_doubt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "server/base/units.h"
+#include "server/measurement/pose_columns.h"
+#include "server/measurement/reading/arm_fit.h"
+#include "server/measurement/reading/catalogue.h"
+
+namespace trammel {
+
+namespace {
+
+using reading::ArmFit;
+using reading::NumberTable;
+using reading::Reading;
+
+constexpr std::size_t kFewestPoses = 6;
+constexpr std::size_t kRowsLocated = 80, kRowsFitted = 200;  // evenly drawn beyond
+constexpr std::size_t kMostFitted = 16;  // readings that are tried with all of the arm, the nearest first
+// Distances, m.
+constexpr double kWorthAsking = 1e-3;  // below it no reading is tried: what a model of a robot leaves
+constexpr double kOfRows = 5e-3;       // the same for rows: on a path, a late clock looks like the next row
+constexpr double kMuchBetter = 0.25;   // of the distance as given: a reading that was surely meant
+constexpr double kAsGood = 1.5;        // times the best: a reading that cannot be told from it
+constexpr double kFollow = 20e-3;      // what fits within it can be asked for single rows, zeros and tools
+constexpr double kBadRow = 10e-3;      // and 8 times the median: a row of other joints
+constexpr double kBadRowRatio = 8;
+constexpr std::size_t kFewestBadRows = 3;
+// What no robot is off by.
+constexpr double kMostZero = from_deg(15);
+constexpr double kCertainZero = from_deg(4);  // its standard deviation is below that
+constexpr double kCertainBase = from_deg(1);
+constexpr double kToolStddev = 5e-3;  // of a tool as it is mounted
+constexpr double kToolSigmas = 4;
+constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell is that near
+// Angles.
+constexpr double kOtherTurn = from_deg(0.5);  // by which orientations decide between readings
+constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
+
+std::string mm(double metres) {
+  const double value = to_mm(metres);
+  return fmt::format("{:.{}f} mm", value, value < 1 ? 2 : value < 100 ? 1 : 0);
+}
+
+/// A reading that was tried with all of the arm.
+struct Tried {
+  const Reading* reading = nullptr;
+  NumberTable table;
+  ArmFit fit;
+};
+
+/// rad, median turn of the orientations from what the arm and its tool say; empty where there are none.
+std::optional<double> turned(const NumberTable& table, const Cell& cell, const ArmFit& fit) {
+  std::map<std::string, std::vector<Matrix3>> by_tool;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (table.R_WT[i])
+      by_tool[table.from[i]->context.tool].push_back(flange_pose_W(table, i, cell, fit).linear().transpose() *
+                                                     *table.R_WT[i]);
+  }
+  std::vector<double> off;
+  for (const auto& [tool, all] : by_tool) {
+    Matrix3 sum = Matrix3::Zero();
+    for (const Matrix3& R_FT : all) sum += R_FT;
+    const auto& X_FT = cell.tools.at(tool);
+    const Eigen::Quaterniond about(X_FT ? Matrix3(X_FT->linear()) : nearest_rotation(sum));
+    for (const Matrix3& R_FT : all) off.push_back(about.angularDistance(Eigen::Quaterniond(R_FT)));
+  }
+  if (off.empty()) return std::nullopt;
+  return reading::median(off);
+}
+
+class Look {
+ public:
+  Look(const MeasurementBatch& batch, const Cell& cell) : cell_(cell), table_(reading::table_of(batch)) {
+    if (table_.size() < kFewestPoses) return;
+    const NumberTable some = thinned(table_, kRowsFitted);
+    given_ = fitted(some, cell_, located(thinned(table_, kRowsLocated), cell_));
+  }
+
+  ReadingLook look() {
+    ReadingLook seen;
+    seen.zeros = JointVector::Zero(cell_.robot.size());
+    if (!given_) return seen;
+    if (given_->quality > kWorthAsking) {
+      search();
+      if (!found_.empty()) {
+        seen.doubt = of_reading();
+        return seen;
+      }
+    }
+    if (given_->off > kFollow) return seen;
+    seen.zeros = given_->arm.head(cell_.robot.size());
+    if (given_->base_turn_stddev < kCertainBase) seen.X_WB = given_->X_WB;
+    seen.doubt = of_some_rows();
+    if (!seen.doubt) seen.doubt = of_zero();
+    if (seen.doubt) return seen;
+    seen.doubt = of_tool();
+    seen.of_tool = seen.doubt.has_value();
+    return seen;
+  }
+
+ private:
+  void search();
+  void keep_best(std::vector<Tried> tried);
+  [[nodiscard]] Error of_reading() const;
+  [[nodiscard]] std::optional<Error> of_some_rows();
+  [[nodiscard]] std::optional<Error> of_zero() const;
+  [[nodiscard]] std::optional<Error> of_tool() const;
+  [[nodiscard]] Error of_tool_at(const std::string& tool, const Vector3& p_FT) const;
+
+  const Cell& cell_;
+  const NumberTable table_;
+  std::optional<ArmFit> given_;
+  std::vector<Reading> readings_;
+  std::vector<Tried> found_;  // readings that fit and cannot be told apart, the most likely first
+};
+
+void Look::search() {
+  const NumberTable few = thinned(table_, kRowsLocated);
+  const NumberTable some = thinned(table_, kRowsFitted);
+  readings_ = position_readings(table_);
+  for (auto& one : joint_readings(table_, cell_.robot)) readings_.push_back(std::move(one));
+  for (auto& one : row_readings(table_, cell_)) readings_.push_back(std::move(one));
+  std::vector<std::pair<double, Tried>> near;
+  for (const Reading& one : readings_) {
+    Tried tried{&one, one.of_rows ? thinned(one.apply(table_), kRowsFitted) : one.apply(some), {}};
+    if (tried.table.size() < kFewestPoses) continue;
+    tried.fit = located(one.of_rows ? thinned(tried.table, kRowsLocated) : one.apply(few), cell_);
+    const double quality = tried.fit.quality;
+    near.emplace_back(quality, std::move(tried));
+  }
+  std::stable_sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (near.size() > kMostFitted) near.resize(kMostFitted);
+  std::vector<Tried> tried;
+  for (auto& [quality, one] : near) {
+    one.fit = fitted(one.table, cell_, one.fit);
+    const bool worth = !one.reading->of_rows || given_->quality > kOfRows;
+    if (worth && one.fit.quality < std::min(kFollow, kMuchBetter * given_->quality)) tried.push_back(std::move(one));
+  }
+  if (!tried.empty()) keep_best(std::move(tried));
+}
+
+/// Of readings that fit the positions as well, orientations decide, then where the base stands, then the catalogue.
+void Look::keep_best(std::vector<Tried> tried) {
+  const auto keep = [&tried](const auto& figure, double ratio, double slack, double limit) {
+    std::vector<double> all;
+    for (const Tried& one : tried) all.push_back(figure(one));
+    const double least = *std::min_element(all.begin(), all.end());
+    if (least > limit) return;
+    std::vector<Tried> kept;
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      if (all[i] <= ratio * least + slack) kept.push_back(std::move(tried[i]));
+    }
+    tried = std::move(kept);
+  };
+  const auto quality = [](const Tried& one) { return one.fit.quality; };
+  keep(quality, kAsGood, 0.2 * kWorthAsking, std::numeric_limits<double>::infinity());
+  keep([this](const Tried& one) { return turned(one.table, cell_, one.fit).value_or(0); }, kAsGood, kOtherTurn, kPi);
+  std::stable_sort(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) { return a.reading < b.reading; });
+  if (cell_.X_WB) {
+    const auto from_drawn = [this](const Tried& one) {
+      return Eigen::Quaterniond(one.fit.X_WB.linear()).angularDistance(Eigen::Quaterniond(cell_.X_WB->linear()));
+    };
+    std::vector<Tried> all = tried;
+    keep(from_drawn, 1, from_deg(5), kNearBase);
+    const Reading* first = tried.front().reading;
+    std::stable_partition(all.begin(), all.end(), [first](const Tried& one) { return one.reading == first; });
+    tried = std::move(all);
+  }
+  found_ = std::move(tried);
+}
+
+Error Look::of_reading() const {
+  const Tried& best = found_.front();
+  const double given = std::max(given_->off, given_->quality);
+  std::string text = fmt::format("the positions do not follow the joints: {} off; read {} they would fit to {}",
+                                 mm(given), best.reading->name, mm(std::max(best.fit.off, best.fit.quality)));
+  std::vector<std::string> others;
+  for (std::size_t k = 1; k < found_.size(); ++k) {
+    // Of rows, the others are the same with a few rows more.
+    if (!best.reading->of_rows) others.push_back(found_[k].reading->name);
+  }
+  if (!others.empty()) {
+    text += fmt::format(" (or {})", fmt::join(others, ", or "));
+  }
+  return refused("{}", text)
+      .of(best.reading->columns)
+      .beyond(to_mm(given), to_mm(std::max(kWorthAsking, kMuchBetter * given_->quality)))
+      .with_text(best.reading->name)
+      .next("correct the file if it was meant so")
+      .value();
+}
+
+/// A block of rows whose joints stand in other rows, while the others follow theirs.
+std::optional<Error> Look::of_some_rows() {
+  const std::vector<double> off = distances(table_, cell_, *given_);
+  const double limit = std::max(kBadRow, kBadRowRatio * reading::median(off));
+  const auto bad = static_cast<std::size_t>(std::count_if(off.begin(), off.end(), [&](double d) { return d > limit; }));
+  if (bad < kFewestBadRows) return std::nullopt;
+  for (const Reading& one : row_readings(table_, cell_)) {
+    const NumberTable table = one.apply(table_);
+    if (2 * (table_.size() - table.size()) > bad) continue;
+    const std::vector<double> then = distances(table, cell_, *given_);
+    const auto left =
+        static_cast<std::size_t>(std::count_if(then.begin(), then.end(), [&](double d) { return d > limit; }));
+    if (4 * left > bad) continue;
+    const auto first = std::find_if(off.begin(), off.end(), [&](double d) { return d > limit; });
+    const double worst = *std::max_element(off.begin(), off.end());
+    return refused("{} of {} positions do not follow the joints, by up to {}; read {} all but {} would fit to {}", bad,
+                   off.size(), mm(worst), one.name, left, mm(reading::median(then)))
+        .of(one.columns)
+        .at_row(table_.from[static_cast<std::size_t>(first - off.begin())]->row)
+        .beyond(to_mm(worst), to_mm(limit))
+        .with_text(one.name)
+        .next("correct the file if it was meant so")
+        .value();
+  }
+  return std::nullopt;
+}
+
+/// A joint that counts from another zero than the robot file's.
+std::optional<Error> Look::of_zero() const {
+  constexpr double kQuarter = 90;
+  for (int j = 0; j < cell_.robot.size(); ++j) {
+    const double zero = given_->arm(j);
+    if (cell_.robot.joint(j).type != JointType::kRevolute || std::abs(zero) < kMostZero) continue;
+    if (given_->stddev_of_zeros(j) > kCertainZero) continue;
+    const double turns = kQuarter * std::round(to_deg(zero) / kQuarter);
+    const bool is_turn = turns != 0 && std::abs(to_deg(zero) - turns) < to_deg(kMostZero);
+    if (j + 1 == cell_.robot.size() && !is_turn) continue;  // the tool turned about the last axis, or another one
+    const std::string column = joint_column(j, JointType::kRevolute);
+    const double added = is_turn ? turns : to_deg(zero);
+    const std::string name = fmt::format("with {:.3g} deg added to {}", added, column);
+    return refused(
+               "the positions follow the joints only {}: the zero of joint {} would be {:.1f} deg from the robot "
+               "file's",
+               name, j + 1, to_deg(zero))
+        .of(column)
+        .beyond(std::abs(to_deg(zero)), to_deg(kMostZero))
+        .with_text(name)
+        .next("another convention, or another robot?")
+        .value();
+  }
+  return std::nullopt;
+}
+
+/// A measured point that is not that of the tool.
+std::optional<Error> Look::of_tool() const {
+  const NumberTable some = thinned(table_, kRowsFitted);
+  std::optional<ArmFit> anywhere;
+  for (const auto& [tool, X_FT] : given_->tools) {
+    const auto& drawn = cell_.tools.at(tool);
+    if (!drawn || (X_FT.translation() - drawn->translation()).norm() < kToolStddev) continue;
+    if (!anywhere) anywhere = fitted(some, cell_, *given_, reading::ToolPoints::kAnywhere);
+    const Vector3 p_FT = anywhere->tools.at(tool).translation();
+    const Vector3 moved = p_FT - drawn->translation();
+    const Matrix3 spread = anywhere->tool_covariance.at(tool) + kToolStddev * kToolStddev * Matrix3::Identity();
+    if (moved.dot(spread.ldlt().solve(moved)) > kToolSigmas * kToolSigmas) return of_tool_at(tool, p_FT);
+  }
+  return std::nullopt;
+}
+
+Error Look::of_tool_at(const std::string& tool, const Vector3& p_FT) const {
+  const double moved = (p_FT - cell_.tools.at(tool)->translation()).norm();
+  std::string is = "another point of the tool";
+  for (const auto& [other, X_FT] : cell_.tools) {
+    if (other != tool && X_FT && (p_FT - X_FT->translation()).norm() < kSameTool * moved)
+      is = fmt::format("those of tool '{}'", other);
+  }
+  return refused("the positions are {} from the point of tool '{}': they would be {}", mm(moved), tool, is)
+      .of("tool_id")
+      .beyond(to_mm(moved), to_mm(kToolSigmas * kToolStddev))
+      .with_text(is)
+      .next(fmt::format("another tool frame? Its xyz_mm would be [{:.1f}, {:.1f}, {:.1f}]", to_mm(p_FT.x()),
+                        to_mm(p_FT.y()), to_mm(p_FT.z())))
+      .value();
+}
+
+/// The batch with its tools named, if the cell knows them and the joints are as many as the robot's.
+std::optional<MeasurementBatch> with_tools(MeasurementBatch batch, const Cell& cell) {
+  for (Measurement& m : batch.measurements) {
+    const auto tool = resolve_tool(cell, m.context.tool);
+    if (!tool || m.context.q.size() != cell.robot.size()) return std::nullopt;
+    m.context.tool = *tool;
+    if (const auto payload = resolve_payload(cell, m.context.payload)) m.context.payload = *payload;
+  }
+  return batch;
+}
+
+}  // namespace
+
+ReadingLook look_at_readings(const MeasurementBatch& batch, const Cell& cell) { return Look(batch, cell).look(); }
+
+Error with_likely_reading(Error failed, const MeasurementBatch& batch, const Cell& cell) {
+  const auto named = with_tools(batch, cell);
+  if (!named) return failed;
+  const ReadingLook seen = look_at_readings(*named, cell);
+  if (!seen.doubt || seen.of_tool) return failed;
+  failed.text = seen.doubt->text;
+  failed.next = seen.doubt->message;
+  return failed;
+}
+
+}  // namespace trammel

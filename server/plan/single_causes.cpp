@@ -1,0 +1,205 @@
+#include "server/plan/single_causes.h"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+#include "server/robot/arm_state.h"
+
+namespace trammel {
+
+namespace {
+
+using causes::Lasting;
+using causes::Numbers;
+using causes::Part;
+using causes::Scope;
+using causes::SearchFamily;
+using Eigen::Index;
+
+/// The rival that a cause is from the first pose on, of every cause that begins at a pose.
+const causes::Rival* begun_before(const CauseRecord& whole, const std::string& parameter, int joint) {
+  for (const CauseRecord* step : all_causes()) {
+    const causes::Rival* rival = whole_of(*step);
+    if (rival != nullptr && rival->cause == whole.spelling && parameter_of(*rival, joint) == parameter) return rival;
+  }
+  return nullptr;
+}
+
+/// Causes that can be another than they were while the instrument is as it should be.
+bool may_have_changed(const CauseRecord& record) {
+  if (record.scope == Scope::kPose || record.scope == Scope::kSession || record.part == Part::kBase) return false;
+  if (record.search == SearchFamily::kNone || record.search == SearchFamily::kPose) return false;
+  // Of a cause and its beginning at a pose one is asked for; of maps of an angle that of any function.
+  return record.search != SearchFamily::kMap && begun_before(record, "", -1) == nullptr;
+}
+
+bool approached(const std::vector<PoseContext>& poses, int joint, int from) {
+  return std::any_of(poses.begin(), poses.end(), [&](const PoseContext& c) {
+    return !c.direction.empty() && c.direction[static_cast<std::size_t>(joint)] == from;
+  });
+}
+
+bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
+  return std::any_of(poses.begin(), poses.end(), [&](const PoseContext& c) {
+    const auto found = cell.payloads.find(c.payload);
+    return found != cell.payloads.end() && found->second.mass > 0;
+  });
+}
+
+constexpr double kWarmer = 2;  // K between poses, from which on temperature shows
+
+bool warms(const std::vector<PoseContext>& poses) {
+  std::optional<double> low, high;
+  for (const PoseContext& c : poses) {
+    if (!c.temperature) return false;
+    low = std::min(low.value_or(*c.temperature), *c.temperature);
+    high = std::max(high.value_or(*c.temperature), *c.temperature);
+  }
+  return low && *high - *low > kWarmer;
+}
+
+/// What these poses would have to record; empty where the cause shows.
+std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses) {
+  const ContextNeeds& needs = record.needs;
+  if (needs.payload && !carries(cell, poses)) return "a payload";
+  if (needs.direction && joint >= 0 && !(approached(poses, joint, 1) && approached(poses, joint, -1)))
+    return "approaching the poses from both sides of this joint";
+  if (needs.temperature && !warms(poses)) return "temperatures that differ between the poses";
+  if (needs.velocity || needs.time) return "a continuous path with times";
+  return "";
+}
+
+std::string spelled(const CauseRecord& record, int joint) {
+  return fmt::format("{}{}{}", record.spelling, joint < 0 ? "" : fmt::format(":{}", joint + 1),
+                     record.lasting == Lasting::kFromAPose ? "@1" : "");
+}
+
+CauseNotAsked cause_not_asked(const CauseRecord& record, int joint, const std::string& needs) {
+  CauseNotAsked one;
+  one.cause.record = &record;
+  one.cause.joint = joint;
+  one.needs = needs;
+  return one;
+}
+
+}  // namespace
+
+std::string to_string(const SingleCause& cause) {
+  const std::string spelling(cause.record->spelling);
+  if (!cause.parameter.empty()) return spelling + ":" + cause.parameter;
+  return cause.joint < 0 ? spelling : fmt::format("{}:{}", spelling, cause.joint + 1);
+}
+
+std::string in_words(const SingleCause& cause) {
+  std::string words = plain_name(*cause.record, cause.joint);
+  if (!cause.parameter.empty() && cause.joint < 0) words += fmt::format(" ({})", cause.parameter);
+  return words;
+}
+
+bool same_cause(const SingleCause& one, const SingleCause& other) {
+  return one.record == other.record && one.joint == other.joint && one.parameter == other.parameter;
+}
+
+CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses) : model_(std::move(model)) {
+  const Chain& robot = model_.cell->robot;
+  for (const CauseRecord* record : all_causes()) {
+    if (!may_have_changed(*record)) continue;
+    const bool of_joint = record->scope == Scope::kJoint;
+    for (int joint = of_joint ? 0 : -1; joint < (of_joint ? robot.size() : 0); ++joint) {
+      if (record->of_turning_joint && robot.joint(joint).type != JointType::kRevolute) continue;
+      const std::string lacks = lacking(*record, joint, *model_.cell, poses);
+      if (lacks.empty()) {
+        add(*record, joint);
+      } else {
+        not_asked_.push_back(cause_not_asked(*record, joint, lacks));
+      }
+    }
+  }
+  find_places();
+}
+
+void CauseEffects::add(const CauseRecord& record, int joint) {
+  if (record.search != SearchFamily::kOrder) {
+    if (const ErrorSourcePtr source = source_of(record, joint)) add_numbers(record, joint, *source);
+    return;
+  }
+  const CauseRecord& zero = first_searched_by(SearchFamily::kZeroStep);
+  if (const ErrorSourcePtr source = source_of(zero, joint)) ask({&record, joint, "", true}, source->name(), {0});
+}
+
+void CauseEffects::add_numbers(const CauseRecord& record, int joint, const ErrorSource& source) {
+  const std::vector<Parameter>& parameters = source.parameters();
+  std::vector<Index> all(parameters.size());
+  std::iota(all.begin(), all.end(), Index{0});
+  const causes::Rival* whole = whole_of(record);
+  const bool is_tool = whole != nullptr && cause_spelled(whole->cause).part == Part::kTool;
+  if (record.numbers == Numbers::kTogether) {
+    ask({&record, joint, "", false}, source.name(), all);
+    if (is_tool) tool_ = causes_.back().columns;
+    return;
+  }
+  for (const Index k : all) {
+    const std::string& name = parameters[static_cast<std::size_t>(k)].name;
+    bool begins = false;  // asked for by itself, as what it is when it begins at a pose
+    for (int j = 0; j < model_.cell->robot.size(); ++j) begins = begins || begun_before(record, name, j) != nullptr;
+    if (begins) continue;
+    const bool one_a_joint = record.numbers == Numbers::kOneAJoint;
+    ask({&record, one_a_joint ? static_cast<int>(k) : joint, name, false}, source.name(), {k});
+  }
+}
+
+void CauseEffects::ask(SingleCause cause, const std::string& source, const std::vector<Index>& numbers) {
+  Entry entry{std::move(cause), {}};
+  for (const Index k : numbers) {
+    entry.columns.push_back(size());
+    numbers_.push_back({source, k});
+  }
+  causes_.push_back(std::move(entry));
+}
+
+ErrorSourcePtr CauseEffects::source_of(const CauseRecord& record, int joint) {
+  const std::string spec = spelled(record, joint);
+  for (const ErrorSourcePtr& source : model_.sources) {
+    if (source->name() == spec) return source;
+    const bool same = &source->cause() == &record && source->joint() == joint;
+    if (same && record.lasting == Lasting::kAlways) return source;
+  }
+  Result<ErrorSourcePtr> made = make_error_source(spec, *model_.cell);
+  if (!made) return nullptr;
+  const auto count = static_cast<Index>((*made)->parameters().size());
+  const Index first = add_source(model_, *made);
+  model_.values.segment(first, count).setZero();  // the arm is as its model has it
+  return *made;
+}
+
+void CauseEffects::find_places() {
+  const std::vector<Parameter> parameters = model_.parameters();
+  scale_.resize(size());
+  for (const Number& number : numbers_) {
+    Index first = 0;
+    for (const ErrorSourcePtr& source : model_.sources) {
+      if (source->name() == number.source) break;
+      first += static_cast<Index>(source->parameters().size());
+    }
+    const Index place = first + number.number;
+    scale_(static_cast<Index>(place_.size())) = parameters[static_cast<std::size_t>(place)].prior_scale;
+    place_.push_back(place);
+  }
+}
+
+PoseEffects CauseEffects::at(const PoseContext& context) const {
+  Eigen::MatrixXd jacobian;
+  const Pose X_WT = model_.pose_W(context, model_.values, &jacobian);
+  const Matrix3 R_BW = model_.X_WB.linear().transpose();
+  const Vector3 p_B = model_.X_WB.inverse() * X_WT.translation();
+  PoseEffects effects;
+  effects.by_cause.resize(6, size());
+  effects.by_cause.topRows<3>() = R_BW * jacobian(Eigen::seqN(0, 3), place_);
+  effects.by_cause.bottomRows<3>() = R_BW * jacobian(Eigen::seqN(3, 3), place_);
+  effects.by_cause *= scale_.asDiagonal();
+  effects.by_base << Matrix3::Identity(), -skew(p_B), Matrix3::Zero(), Matrix3::Identity();
+  return effects;
+}
+
+}  // namespace trammel

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "server/error_sources/physical_model.h"
+
+/// What each single cause that may have changed would do to the tool.
+namespace trammel {
+
+/// A cause of the arm, its load or its tool that may be another than it was.
+struct SingleCause {
+  const CauseRecord* record = nullptr;  ///< of the catalogue
+  int joint = -1;                       ///< 0-based; -1 where it concerns the whole arm
+  std::string parameter = {};           ///< `d6`: where one number of it is meant; else empty
+  bool any_function = false;            ///< an error of the joint's angle by any function of that angle
+};
+/// `joint_slip:2`, `geometry:d6`.
+[[nodiscard]] std::string to_string(const SingleCause& cause);
+/// For people: `lost zero in joint 2`, `link geometry (d6)`.
+[[nodiscard]] std::string in_words(const SingleCause& cause);
+[[nodiscard]] bool same_cause(const SingleCause& one, const SingleCause& other);
+
+/// A cause that cannot be asked for, and what would have to be recorded.
+struct CauseNotAsked {
+  SingleCause cause;
+  std::string needs;
+};
+
+/// At one pose, all in B: m and rad of the tool.
+struct PoseEffects {
+  Eigen::MatrixXd by_cause;             ///< 6 x K, by each number of the causes, in units of its prior scale
+  Eigen::Matrix<double, 6, 6> by_base;  ///< by a motion of the base
+};
+
+/// All single causes of a model's arm, one by one. Immutable, thread-safe.
+class CauseEffects {
+ public:
+  struct Entry {
+    SingleCause cause;
+    std::vector<Eigen::Index> columns;  ///< of PoseEffects::by_cause; one for any function: that of the joint's zero
+  };
+  /// The causes that `poses` could show by what was recorded with them: others are listed as not asked.
+  CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses);
+
+  [[nodiscard]] const std::vector<Entry>& causes() const { return causes_; }
+  [[nodiscard]] const std::vector<CauseNotAsked>& not_asked() const { return not_asked_; }
+  /// Of a tool that sits elsewhere on the flange.
+  [[nodiscard]] const std::vector<Eigen::Index>& tool_columns() const { return tool_; }
+  /// Number of columns, K.
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(numbers_.size()); }
+  /// At the values of the model.
+  [[nodiscard]] PoseEffects at(const PoseContext& context) const;
+
+ private:
+  /// One number of a source, which gets a column.
+  struct Number {
+    std::string source;
+    Eigen::Index number = 0;
+  };
+  void add(const CauseRecord& record, int joint);
+  void add_numbers(const CauseRecord& record, int joint, const ErrorSource& source);
+  void ask(SingleCause cause, const std::string& source, const std::vector<Eigen::Index>& numbers);
+  /// The source of that cause in the model, which gets it where it has none; null where the cell cannot have it.
+  [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
+  void find_places();
+
+  PhysicalModel model_;
+  std::vector<Entry> causes_;
+  std::vector<CauseNotAsked> not_asked_;
+  std::vector<Number> numbers_;      // of each column
+  std::vector<Eigen::Index> place_;  // of each column among the model's parameters
+  Eigen::VectorXd scale_;            // likewise
+  std::vector<Eigen::Index> tool_;
+};
+
+}  // namespace trammel

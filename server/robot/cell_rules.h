@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+
+#include "server/base/result.h"
+#include "server/robot/cell.h"
+
+namespace trammel {
+
+/// What the owner of a cell demands of it, beside its description.
+struct CellRules {
+  std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
+  bool fleet_prior = false;         ///< robots of its type that were trained before say what to expect of it
+};
+/// As the cell file says; nothing is demanded of a cell without one.
+[[nodiscard]] Result<CellRules> rules_of(const Cell& cell);
+
+}  // namespace trammel

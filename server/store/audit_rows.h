@@ -1,0 +1,28 @@
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <string>
+
+#include "server/store/audit.h"
+#include "server/store/change_id.h"
+
+/// The audit trail, for the transactions that change something.
+namespace trammel {
+
+/// What a change did.
+struct AuditEntry {
+  std::string cell, what, subject, before, after;
+  std::string why = {};
+};
+
+/// Appends it to the trail, in the transaction that is open. `by`: who asked for it, and under which id.
+void record_audit(SQLite::Database& database, const AuditEntry& entry, const ChangeId& by = {});
+
+/// Makes the trail where there is none, and records how it began.
+void prepare_audit(SQLite::Database& database, bool is_new, int schema_before);
+
+/// Takes the next rows into the chain and, as far as they are asked for, into the trail; false: there are no more.
+[[nodiscard]] bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail);
+
+}  // namespace trammel

@@ -1,0 +1,84 @@
+#include "server/calibrate/batch_check.h"
+
+#include <gtest/gtest.h>
+
+#include "server/measurement/checked_batch.h"
+#include "tests/support/demand.h"
+#include "tests/support/misread_batch.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+using test::FirstBatch;
+
+/// The next batch of a new cell in which the mistake can show.
+FirstBatch drawn(std::uint64_t seed, const test::Misreading& mistake) {
+  FirstBatch first = test::first_batch(seed, test::Robots::kOfSixJoints);
+  first.poses = std::max(first.poses, 25);
+  first.spread = std::max(first.spread, 0.4);
+  first.orientation = first.orientation || mistake.needs_orientation;
+  first.tool_known = first.tool_known || mistake.kind == "another point of the tool";
+  return first;
+}
+
+class Misread : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(Misread, AFirstBatchIsRefusedWithTheReadingThatFits) {
+  const test::Misreading& mistake = test::misreadings()[GetParam()];
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const FirstBatch first = drawn(seed, mistake);
+    const auto cell = test::new_cell(first);
+    MeasurementBatch batch = test::measured_first(first, *cell);
+    std::mt19937_64 random(seed);
+    const std::string reading = mistake.make(batch, *cell, random);
+    const auto said = test::said_of(std::move(batch), *cell);
+    ASSERT_TRUE(said) << mistake.kind << ", seed " << seed << ": " << reading;
+    EXPECT_EQ(said->code, ErrorCode::kRefused);
+    EXPECT_TRUE(test::names(*said, reading))
+        << mistake.kind << ", seed " << seed << ": expected '" << reading << "', not: " << sentence(*said);
+  }
+}
+
+std::string kind_of(const testing::TestParamInfo<std::size_t>& mistake) {
+  std::string name;
+  for (const char c : test::misreadings()[mistake.param].kind) name += std::isalnum(c) != 0 ? c : '_';
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Misread, testing::Range<std::size_t>(0, test::misreadings().size()), kind_of);
+
+TEST(BatchCheck, RobotsAsTheyAreDeliveredAreNotDoubtedHoweverBadlyTheyWereMastered) {
+  for (std::uint64_t seed = 1; seed <= 25; ++seed) {
+    const FirstBatch first = test::first_batch(seed, test::Robots::kAll);
+    const auto cell = test::new_cell(first);
+    const auto said = test::said_of(test::measured_first(first, *cell), *cell);
+    EXPECT_FALSE(said) << first.robot << ", seed " << seed << ": " << sentence(*said);
+  }
+}
+
+TEST(BatchCheck, AToolOfAnotherNameIsNamed) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  Pose probe = *cell->tools.at("spindle");
+  probe.translation() += Vector3(0.03, 0.05, 0.12);
+  cell->tools["probe"] = probe;
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
+  for (Measurement& m : batch.measurements)
+    m.p_W += *m.R_WT * (probe.translation() - cell->tools.at("spindle")->translation());
+  for (Measurement& m : batch.measurements) m.context.tool = "spindle";
+  const auto said = test::said_of(std::move(batch), *cell);
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->text, "those of tool 'probe'") << sentence(*said);
+}
+
+TEST(BatchCheck, WhatIsRefusedForALimitSaysUnderWhichReadingItWouldNotBe) {
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 60, 3);
+  for (Measurement& m : batch.measurements) std::swap(m.context.q(1), m.context.q(3));
+  const auto checked = check_against_cell(std::move(batch), *test::cell_7());
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().text, "with q2_deg and q4_deg exchanged") << sentence(checked.error());
+  EXPECT_TRUE(checked.error().row) << "the limit that was broken";
+}
+
+}  // namespace
+}  // namespace trammel

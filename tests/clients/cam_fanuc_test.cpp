@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/shifting_model.h"
+
+namespace trammel::cam {
+namespace {
+
+using test::corrected_by_shift;
+using test::row_of;
+
+std::string setting(const std::string& name, const std::vector<std::string>& numbers) {
+  std::string lines;
+  for (std::size_t k = 0; k < 6; ++k)
+    lines += fmt::format("   1:  PR[{},{}]={}    ;\n", name == "UTOOL[2]" ? 5 : 6, k + 1, numbers[k]);
+  return lines + fmt::format("   7:  {}=PR[{}] ;\n", name, name == "UTOOL[2]" ? 5 : 6);
+}
+
+std::string position(int number, const std::string& xyz, const std::string& rest = "") {
+  return fmt::format(
+      "P[{}{}]{{\n   GP1:\n\tUF : 1, UT : 2,\t\tCONFIG : 'N U T, 0, 0, 0',\n{},\n"
+      "\tW =      .000 deg,\tP =    60.000 deg,\tR =      .000 deg\n}};\n",
+      number, rest, xyz);
+}
+const std::string kXyz = "\tX =   300.000  mm,\tY =     -.384  mm,\tZ =   500.000  mm";
+
+std::string program(const std::string& lines, const std::string& positions) {
+  return "/PROG  P1\n/ATTR\nCOMMENT\t\t= \"\xC4\x8D\";\nLINE_COUNT\t= 3;\n/MN\n   1:  UFRAME_NUM=1 ;\n" + lines +
+         "/POS\n" + positions + "/END\n";
+}
+test::Corrected ls(const std::string& text, ReadOptions read = {}) {
+  read.frames.emplace("UFRAME[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5}));
+  read.frames.emplace("UTOOL[2]", test::spindle_only().tools.at("spindle"));
+  return corrected_by_shift(Dialect::kFanuc, {{"p1.ls", text}}, read);
+}
+std::string why(const test::Corrected& made, const std::string& name) { return row_of(made.program, name).message; }
+
+TEST(Fanuc, OnlyNumbersOfPositionsChange) {
+  const std::string text = program("   2:J P[1] 100% FINE ;\n   3:L P[2:\"hole; 2\"] 250mm/sec CNT50 ;\n",
+                                   position(1, kXyz) + position(2, kXyz, ":\"hole; 2\""));
+  const test::Corrected made = ls(text);
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << made.program.rows[0].message;
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program)), test::without_numbers(text));
+  EXPECT_NE(made.program.files[0].text.find("\tX =   300.123  mm,\tY =     -.619  mm,\tZ =   500.346  mm,\n"
+                                            "\tW =      .0000 deg,\tP =    60.0000 deg,\tR =      .0000 deg"),
+            std::string::npos)
+      << made.program.files[0].text;
+  EXPECT_NE(made.program.files[0].text.find("/MN\n   0:  !TRAMMEL model=0123456789ab ;\n"), std::string::npos);
+}
+
+TEST(Fanuc, JointsArcsAndSeveralGroupsAreRead) {
+  const std::string joints =
+      "P[3]{\n   GP1:\n\tUF : 1, UT : 2,\n\tJ1=     0.000 deg,\tJ2=   -20.000 deg,\tJ3=    20.000 deg,\n"
+      "\tJ4=     0.000 deg,\tJ5=    30.000 deg,\tJ6=     0.000 deg\n   GP2:\n\tUF : 0, UT : 1,\n\tJ1=    12.000 "
+      "deg\n};\n";
+  const test::Corrected made = ls(program("   2:J P[3] 100% FINE ;\n   3:C P[1]\n    :  P[2] 100mm/sec FINE ;\n",
+                                          position(1, kXyz) + position(2, kXyz) + joints));
+  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  EXPECT_EQ(made.program.rows.size(), 3u);
+  EXPECT_NE(made.program.files[0].text.find("J1=     0.01235 deg"), std::string::npos) << made.program.files[0].text;
+}
+
+TEST(Fanuc, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
+  const test::Corrected made =
+      ls(program("   2:L PR[4] 100mm/sec FINE ;\n   3:L P[1] 100mm/sec FINE Offset,PR[1] ;\n"
+                 "   4:L P[2] 100mm/sec FINE Tool_Offset,PR[2] ;\n   5:  P[3]=LPOS ;\n   6:L P[3] 50mm/sec FINE ;\n"
+                 "   7:L P[5] 50mm/sec FINE Skip,LBL[1] ;\n   8:L P[9] 50mm/sec FINE ;\n",
+                 position(1, kXyz) + position(2, kXyz) + position(3, kXyz) + position(4, kXyz) + position(5, kXyz)));
+  EXPECT_NE(why(made, "PR[4]").find("register"), std::string::npos);
+  EXPECT_NE(why(made, "P[1]").find("Offset"), std::string::npos);
+  EXPECT_NE(why(made, "P[2]").find("Tool_Offset"), std::string::npos);
+  EXPECT_NE(why(made, "P[3]").find("set at run time"), std::string::npos);
+  EXPECT_NE(why(made, "P[4]").find("no motion"), std::string::npos);
+  EXPECT_NE(why(made, "P[5]").find("sensor"), std::string::npos);
+  EXPECT_NE(why(made, "P[9]").find("not in /POS"), std::string::npos);
+}
+
+TEST(Fanuc, AToolFromARegisterThatTheProgramSetsIsCompared) {
+  std::string lines = setting("UTOOL[2]", {"100", "0", "153.5", "0", "-45", "0"}) + "   9:L P[1] 100mm/sec FINE ;\n";
+  const auto made = corrected_by_shift(Dialect::kFanuc, {{"p.ls", program(lines, position(1, kXyz))}},
+                                       {.frames = {{"UFRAME[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5})}}});
+  EXPECT_NE(made.refusal.find("3.500 mm and 0.0000 deg apart"), std::string::npos) << made.refusal;
+}
+
+TEST(Fanuc, FramesThatOnlyTheControllerKnowsAreNotGuessed) {
+  const auto made =
+      corrected_by_shift(Dialect::kFanuc, {{"p.ls", program("   2:L P[1] 100mm/sec FINE ;\n", position(1, kXyz))}});
+  EXPECT_NE(made.program.rows[0].message.find("UFRAME[1] is not in the files"), std::string::npos)
+      << made.program.rows[0].message;
+}
+
+TEST(Fanuc, WhatIsNoLsFileIsLeftAsItIs) {
+  for (const std::string& text : std::vector<std::string>{
+           "", "\n", "/POS", "/POS\nP[1]{", "/POS\nP[1", "/MN\nL P[", "/MN\n1:L P[1] ;\n/POS\nP[1]{};",
+           "/MN\n;;;:::", "/", "/POS\nP[1]{GP1: X =", "/MN\nL P[1]", "/MN\nPR[1,9]=3;\nUTOOL[1]=PR[1];"}) {
+    const test::Corrected made = corrected_by_shift(Dialect::kFanuc, {{"p.ls", text}});
+    EXPECT_EQ(made.program.files[0].text, text);
+  }
+}
+
+}  // namespace
+}  // namespace trammel::cam

@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/shifting_model.h"
+
+namespace trammel::cam {
+namespace {
+
+using test::corrected_by_shift;
+using test::row_of;
+
+// The tool of the shipped cell: turned by -45 deg about y.
+const std::string kConfig =
+    "DEFDAT $CONFIG\r\nDECL FRAME TOOL_DATA[16]\r\nTOOL_DATA[1]={X 100.0,Y 0.0,Z 150.0,A 0.0,B -45.0,C 0.0}\r\n"
+    "BASE_DATA[2]={X 1500.0,Y 0.0,Z 500.0,A 0.0,B 0.0,C 0.0}\r\n"
+    "LOAD_DATA[1]={M 100.0,CM {X 0.0,Y 0.0,Z 100.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}\r\nENDDAT\r\n";
+const std::string kSet = "$TOOL=TOOL_DATA[1]\n$BASE=BASE_DATA[2]\n";
+
+test::Corrected krl(const std::string& src, const std::string& dat = "", const ReadOptions& read = {}) {
+  std::vector<SourceFile> files = {{"p.src", src}, {"$config.dat", kConfig}};
+  if (!dat.empty()) files.push_back({"p.dat", dat});
+  return corrected_by_shift(Dialect::kKrl, files, read);
+}
+std::string program(const std::string& lines) { return "&ACCESS RVP\nDEF p( )\nINI\n" + kSet + lines + "END\n"; }
+std::string why(const test::Corrected& made, const std::string& name) { return row_of(made.program, name).message; }
+
+TEST(Krl, PositionsOfTheDataListAreCorrectedWhereTheyStand) {
+  const std::string dat =
+      "DEFDAT p PUBLIC\r\n; Bohrung gr\xFC"
+      "n: XP9={X 1,Y 2}\r\n"
+      "DECL E6POS XP1={X 300.0,Y\t-250.00,Z 300,A 0.0,B 60.0,C 0.0,S 2,T 2,E1 0.0,E2 0.0}\r\n"
+      "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE FALSE}\r\nENDDAT\r\n";
+  const std::string src =
+      "DEF p( )\n;FOLD PTP P1 Vel=100 % PDAT1 Tool[1]:spindle Base[2]:panel;%{PE}%R 8.3,%MKUKATPBASIS\nFDAT_ACT=FP1\n"
+      "PTP XP1\n;ENDFOLD\n;LIN XP1\nEND\n";
+  const test::Corrected made = krl(src, dat);
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u);
+  EXPECT_EQ(made.program.files[0].text, src);
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program, 2)), test::without_numbers(dat));
+  EXPECT_NE(made.program.files[2].text.find("{X 300.123,Y\t-250.235,Z 300.346,A 0.0000,B 60.0000,C 0.0000,S 2,T 2,"),
+            std::string::npos)
+      << made.program.files[2].text;
+}
+
+TEST(Krl, FramesInMotionsSplinesAxesAndAssignmentsAreFound) {
+  const test::Corrected made =
+      krl(program("PTP {A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}\n"
+                  "LIN {X 300,Y 0,Z 500,A 0,B 60,C 0} C_DIS\n"
+                  "P1={X 300,Y 10,Z 500,A 0,B 60,C 0}\nLIN P1 C_VEL\n"
+                  "CIRC {X 300,Y 20,Z 510,A 0,B 60,C 0},{X 300,Y 40,Z 500,A 0,B 60,C 0},CA 180\n"
+                  "SPLINE\nSPL {X 300,Y 50,Z 500,A 0,B 60,C 0}\nSLIN {E6POS: X 300,Y 60,Z 500,A 0,B 60,C 0} WITH "
+                  "$VEL.CP=0.1\nENDSPLINE\n"
+                  "SPTP {X 300,Y 70,Z 500,A 0,B 60,C 0,S 'B010',T 'B000010'}\n"));
+  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  EXPECT_EQ(made.program.rows.size(), 8u);
+  EXPECT_EQ(made.program.moves_corrected, 7u);
+}
+
+TEST(Krl, ConstantFramesOfTheGeometricOperatorAreFolded) {
+  const test::Corrected made =
+      krl(program("P1={X 300,Y 10,Z 500,A 0,B 90,C 0}\nLIN P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN P1\n"));
+  const ReceiptRow row = row_of(made.program, "P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}");
+  ASSERT_TRUE(row.corrected()) << row.message;
+  EXPECT_NEAR(row.after[0], 250.123, 1e-3);
+  EXPECT_NEAR(row.after[1], 9.765, 1e-3);
+  EXPECT_NEAR(row.after[2], 495.346, 1e-3);
+  EXPECT_NE(made.program.files[0].text.find("; trammel: was P1:{X 5,Y 0,Z -50,A 0,B 0,C 0}\nLIN {X 250.123,Y 9.765,"),
+            std::string::npos)
+      << made.program.files[0].text;
+}
+
+TEST(Krl, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
+  const test::Corrected made =
+      krl(program("P1={X 300,Y 10,Z 500,A 0,B 60,C 0}\nLIN P1\nP1.X=P1.X+5\nP2={X 300,Y 10,Z H,A 0,B 60,C 0}\nLIN P2\n"
+                  "LIN_REL {X 10}\nLIN {Z 400}\nLIN $POS_ACT\nPTP XELSEWHERE\nLIN P1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"
+                  "BAS(#BASE,n)\nLIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n"));
+  EXPECT_NE(why(made, "P1").find("P1 is set at run time (p.src line"), std::string::npos) << why(made, "P1");
+  EXPECT_NE(why(made, "P2").find("Z is not a constant number"), std::string::npos);
+  EXPECT_NE(why(made, "{X 10}").find("relative"), std::string::npos);
+  EXPECT_NE(why(made, "{Z 400}").find("does not say X"), std::string::npos);
+  EXPECT_NE(why(made, "$POS_ACT").find("decides it"), std::string::npos);
+  EXPECT_NE(why(made, "XELSEWHERE").find("not in the files"), std::string::npos);
+  EXPECT_NE(why(made, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("N chooses it"), std::string::npos);
+  EXPECT_EQ(made.program.moves_corrected, 0u);
+}
+
+TEST(Krl, ToolAndBaseAreFollowedThroughCallsAndBranches) {
+  const test::Corrected made =
+      krl(program("up( )\nIF $IN[1] THEN\n$BASE=$NULLFRAME\nENDIF\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n") +
+          "DEF up( )\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
+  EXPECT_TRUE(row_of(made.program, "{X 300,Y 0,Z 500,A 0,B 60,C 0}").corrected());
+  EXPECT_NE(why(made, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("branch"), std::string::npos);
+}
+
+TEST(Krl, WithoutAToolOrABaseNothingIsGuessed) {
+  const test::Corrected made = krl("DEF p()\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
+  EXPECT_NE(made.program.rows[0].message.find("no $TOOL is set"), std::string::npos);
+  const test::Corrected other =
+      krl("DEF p()\n$TOOL=TOOL_DATA[1]\n$BASE=BASE_DATA[7]\nLIN {X 300,Y 0,Z 500,A 0,B 60,C 0}\nEND\n");
+  EXPECT_NE(other.program.rows[0].message.find("BASE_DATA[7] is not in the files"), std::string::npos);
+}
+
+TEST(Krl, AToolThatIsNotTheCellsIsRefusedWithBothValues) {
+  const test::Corrected made =
+      krl("DEF p()\n$TOOL={X 100,Y 0,Z 152.5,A 0,B -45,C 0}\n$BASE=$NULLFRAME\n"
+          "LIN {X 1800,Y 0,Z 1000,A 0,B 60,C 0}\nEND\n");
+  EXPECT_NE(made.refusal.find("2.500 mm and 0.0000 deg apart"), std::string::npos) << made.refusal;
+}
+
+TEST(Krl, WhatIsNoKrlIsLeftAsItIs) {
+  for (const std::string& text : std::vector<std::string>{"",
+                                                          "\n",
+                                                          "DEF",
+                                                          "LIN",
+                                                          "LIN {",
+                                                          "LIN {X",
+                                                          "LIN {X 1,{{{{{{{{{{{{{{",
+                                                          "\"",
+                                                          "'",
+                                                          "DEF a()\na()\nEND",
+                                                          "P1=P1\nLIN P1",
+                                                          "LIN P1:",
+                                                          "PTP XP[",
+                                                          "$TOOL=",
+                                                          "BAS(#TOOL,",
+                                                          "FDAT_ACT=",
+                                                          "ELSE\nENDIF\nENDIF",
+                                                          ";FOLD Tool[",
+                                                          "GLOBAL",
+                                                          "DECL",
+                                                          "DECL E6POS",
+                                                          std::string(5000, '{')}) {
+    const test::Corrected made = corrected_by_shift(Dialect::kKrl, {{"p.src", text}});
+    EXPECT_EQ(made.program.files[0].text, text);
+  }
+}
+
+}  // namespace
+}  // namespace trammel::cam

@@ -1,0 +1,134 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/shifting_model.h"
+
+namespace trammel::cam {
+namespace {
+
+using test::corrected_by_shift;
+using test::row_of;
+
+std::string why(const test::Corrected& made, const std::string& name) { return row_of(made.program, name).message; }
+
+const Pose kSpindle = test::spindle_only().tools.at("spindle");
+
+// Yaskawa
+
+std::string job(const std::string& positions, const std::string& lines) {
+  return "/JOB\r\n//NAME DRILL\r\n//POS\r\n///NPOS 3,0,0,0,0,0\r\n///TOOL 1\r\n///POSTYPE ROBOT\r\n///RECTAN\r\n"
+         "///RCONF 1,0,0,0,0,0,0,0\r\n" +
+         positions + "//INST\r\n///DATE 2026/11/22 10:00\r\n///ATTR SC,RW\r\n///GROUP1 RB1\r\nNOP\r\n" + lines +
+         "END\r\n";
+}
+test::Corrected jbi(const std::string& text) {
+  return corrected_by_shift(Dialect::kInform, {{"drill.jbi", text}}, {.frames = {{"TOOL[1]", kSpindle}}});
+}
+
+TEST(Inform, OnlyNumbersOfPositionsChange) {
+  const std::string text =
+      job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\nC00001=1800.0,0,900.,0,60,0\r\n",
+          "'MOVL C00009\r\nMOVJ C00000 VJ=50.00\r\nMOVL C00001 V=100.0 PL=0\r\n");
+  const test::Corrected made = jbi(text);
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << made.program.rows[0].message;
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program)), test::without_numbers(text));
+  EXPECT_NE(made.program.files[0].text.find("C00000=1800.123,-250.235,800.346,0.0000,60.0000,0.0000\r\n"),
+            std::string::npos)
+      << made.program.files[0].text;
+  EXPECT_NE(made.program.files[0].text.find("NOP\r\n'TRAMMEL model=0123456789ab\r\n"), std::string::npos);
+}
+
+TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
+  const test::Corrected made =
+      jbi(job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\nC00001=1800.0,0,900.,0,60,0\r\n"
+              "C00002=1800.0,0,900.,0,60,0\r\n///POSTYPE PULSE\r\n///PULSE\r\nC00003=0,100,200,0,0,0\r\n",
+              "MOVL P001 V=1.0\r\nMOVL C00000 V=1.0 UNTIL IN#(1)=ON\r\nSFTON P010\r\nMOVL C00001 V=1.0\r\nSFTOF\r\n"
+              "IMOV C00002 V=1.0\r\nMOVJ C00003 VJ=1.0\r\n"));
+  EXPECT_NE(why(made, "P001").find("variable"), std::string::npos);
+  EXPECT_NE(why(made, "C00000").find("sensor"), std::string::npos);
+  EXPECT_NE(why(made, "C00001").find("SFTON"), std::string::npos);
+  EXPECT_NE(why(made, "C00002").find("relative"), std::string::npos);
+  EXPECT_NE(why(made, "C00003").find("pulses"), std::string::npos);
+}
+
+// Universal Robots
+
+test::Corrected script(const std::string& text) { return corrected_by_shift(Dialect::kUrScript, {{"p.script", text}}); }
+const std::string kTcp = "  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n";
+
+TEST(UrScript, PosesAndJointsAreCorrectedWhereTheyStand) {
+  const std::string text = "def drill():\n" + kTcp +
+                           "  # movel(p[1,2,3,0,0,0])\n  global hole = p[1.8, -0.25, 0.8, 0, 1.0472, 0]\n"
+                           "  movej([0, -0.35, 0.35, 0, 0.5, 0], a=1.4, v=1.05)\n  movel(hole, a=1.2, v=0.25)\n"
+                           "  movec(p[1.8, 0, 0.9, 0, 1.0472, 0], p[1.8, 0.1, 0.8, 0, 1.0472, 0], a=1, v=0.1)\n"
+                           "  textmsg(\"movel(p[0,0,0,0,0,0])\")\nend\n";
+  const test::Corrected made = script(text);
+  ASSERT_EQ(made.refusal, "");
+  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  EXPECT_EQ(made.program.rows.size(), 4u);
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program)), test::without_numbers(text));
+  EXPECT_NE(made.program.files[0].text.find("p[1.800123, -0.250235, 0.800346, 0.000000, 1.047200, 0.000000]"),
+            std::string::npos)
+      << made.program.files[0].text;
+}
+
+TEST(UrScript, ConstantTransformsAreFoldedAndWhatIsComputedIsLeft) {
+  const test::Corrected made = script(
+      "def p():\n" + kTcp +
+      "  hole = p[1.8, 0, 0.8, 0, 1.5707963, 0]\n  movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+      "  movel(pose_trans(hole, p[0, 0, -0.05, 0, 0, 0]))\n  moving = p[1.8, 0, 0.8, 0, 0, 0]\n  moving[2] = 3\n"
+      "  movel(moving)\n  movel(get_actual_tcp_pose())\n  movel(pose_add(hole, off))\n  movel(elsewhere)\nend\n");
+  const ReceiptRow folded = row_of(made.program, "pose_trans(hole, p[0, 0, -0.05, 0, 0, 0])");
+  ASSERT_TRUE(folded.corrected()) << folded.message;
+  EXPECT_NEAR(folded.after[0], 1.75 + 0.000123, 1e-6);
+  EXPECT_NE(made.program.files[0].text.find(
+                "  # trammel: was pose_trans(hole, p[0, 0, -0.05, 0, 0, 0])\n  movel(p[1.750123,"),
+            std::string::npos)
+      << made.program.files[0].text;
+  EXPECT_NE(why(made, "moving").find("set at run time"), std::string::npos);
+  EXPECT_NE(why(made, "get_actual_tcp_pose()").find("function"), std::string::npos);
+  EXPECT_NE(why(made, "elsewhere").find("not in the script"), std::string::npos);
+}
+
+TEST(UrScript, AToolThatIsNotTheCellsIsRefused) {
+  const test::Corrected made =
+      script("def p():\n  set_tcp(p[0.1,0,0.151,0,-0.785398163,0])\n  movel(p[1.8,0,0.8,0,1,0])\nend\n");
+  EXPECT_NE(made.refusal.find("1.000 mm"), std::string::npos) << made.refusal;
+}
+
+// Tables
+
+TEST(Tables, CamRobLinesKeepAllButTheirPose) {
+  const std::string text =
+      "1;1800.0000;-250.0000;800.0000;0.0000;60.0000;0.0000;1;25.000;1;0;0;0;3;0.0000\r\n"
+      "2;1800.0000;-249.0000;800.0000;0.0000;60.0000;0.0000;2;25.000;1;0;0;0;3;0.0000\r\n";
+  const test::Corrected made = corrected_by_shift(Dialect::kCamRob, {{"p.csv", text}});
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(test::without_inserted(made.program),
+            "1;1800.1235;-250.2346;800.3457;0.0000;60.0000;0.0000;1;25.000;1;0;0;0;3;0.0000\r\n"
+            "2;1800.1235;-249.2346;800.3457;0.0000;60.0000;0.0000;2;25.000;1;0;0;0;3;0.0000\r\n");
+}
+
+TEST(Tables, RoboDkHeadersSayWhichColumnsArePoses) {
+  const std::string text =
+      "Name,X [mm],Y [mm],Z [mm],RX [deg],RY [deg],RZ [deg]\n\"a, b\",1,2\nhole 1,1800.00,0,800,0,60,0\n";
+  const test::Corrected made = corrected_by_shift(Dialect::kRoboDk, {{"t.csv", text}});
+  EXPECT_EQ(test::without_inserted(made.program),
+            "Name,X [mm],Y [mm],Z [mm],RX [deg],RY [deg],RZ [deg]\n\"a, b\",1,2\nhole "
+            "1,1800.123,-0.235,800.346,0.0000,60.0000,0.0000\n");
+}
+
+TEST(OtherDialects, WhatIsNoneIsLeftAsItIs) {
+  for (const Dialect dialect : {Dialect::kInform, Dialect::kUrScript, Dialect::kCamRob, Dialect::kRoboDk}) {
+    for (const std::string& text : std::vector<std::string>{
+             "", "\n", ";;;;;;;\n", "//INST\nMOVL", "//INST\nNOP", "C1=", "C00000=\n//INST\nNOP\nMOVL C00000", "movel(",
+             "movel(p[", "p=p\nmovel(p)", "x", "movel(p[1,2,3,4,5])", "a[", "set_tcp(", "\"", "movej(get_inverse_kin(",
+             std::string(5000, '(')}) {
+      const test::Corrected made = corrected_by_shift(dialect, {{"p", text}});
+      EXPECT_EQ(made.program.files[0].text, text);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trammel::cam

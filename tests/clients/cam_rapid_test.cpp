@@ -1,0 +1,224 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/shifting_model.h"
+
+namespace trammel::cam {
+namespace {
+
+using test::corrected_by_shift;
+using test::kShift_mm;
+using test::row_of;
+
+const std::string kTool =
+    "  PERS tooldata tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\n";
+const std::string kPanel =
+    "  PERS wobjdata wPanel:=[FALSE,TRUE,\"\",[[1500,0,500],[1,0,0,0]],[[300,-250,300],[1,0,0,0]]];\n";
+const std::string kRest = ",[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+
+std::string target(const std::string& name, const std::string& position) {
+  return "  CONST robtarget " + name + ":=[[" + position + "]" + kRest + ";\n";
+}
+std::string program(const std::string& data, const std::string& motions) {
+  return "MODULE M\n" + kTool + kPanel + data + "  PROC main()\n" + motions + "  ENDPROC\nENDMODULE\n";
+}
+std::string move_l(const std::string& point, const std::string& wobj = "\\WObj:=wPanel") {
+  return "    MoveL " + point + ",v100,fine,tSpindle" + wobj + ";\n";
+}
+test::Corrected rapid(const std::string& text, const ReadOptions& read = {},
+                      const CorrectProgramOptions& options = {}) {
+  return corrected_by_shift(Dialect::kRapid, {{"m.mod", text}}, read, options);
+}
+std::string why(const test::Corrected& made, const std::string& name) { return row_of(made.program, name).message; }
+
+TEST(Rapid, OnlyNumbersOfTargetsChangeAndWholeLinesAreInserted) {
+  const std::string text = "\xEF\xBB\xBF" + program(
+                                                "\t! Sch\xE4"
+                                                "fte: p10:=[[1,2,3],[1,0,0,0]]; MoveL p10\r\n" +
+                                                    target("p10", "0, 125.00,\t400.5") +
+                                                    "  CONST string s:=\"MoveL p10,\"\"v100\"\",fine;\"; ! p10\n",
+                                                move_l("p10"));
+  const test::Corrected made = rapid(text);
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program)), test::without_numbers(text));
+  EXPECT_NE(
+      made.program.files[0].text.find("[[0.123, 124.765,\t400.846],[0.707107,0.000000,0.707107,0.000000],[0,0,0,0]"),
+      std::string::npos)
+      << made.program.files[0].text;
+  ASSERT_EQ(made.program.inserted.size(), 1u);
+  EXPECT_NE(made.program.inserted[0].text.find("TRAMMEL model=0123456789ab version=0.1.0 date=2026-11-22 original="),
+            std::string::npos);
+}
+
+TEST(Rapid, NumbersKeepTheWayTheyAreWritten) {
+  const test::Corrected made = rapid(program(target("p10", ".5,+250.,4E+02"), move_l("p10")));
+  EXPECT_NE(made.program.files[0].text.find("[[.623,+249.765,4.00346E+02]"), std::string::npos)
+      << made.program.files[0].text;
+}
+
+TEST(Rapid, DigitsAreAddedWhereRoundingWouldTakeATenthOfWhatIsKnownUnlessForbidden) {
+  const std::string text = program(target("p10", "0.0,125.0,400.0"), move_l("p10"));
+  const test::Corrected more = rapid(text);
+  EXPECT_LE(row_of(more.program, "p10").rounding_mm, std::sqrt(3.0) * 0.001);
+  CorrectProgramOptions options;
+  options.keep_digits = true;
+  const test::Corrected same = rapid(text, {}, options);
+  EXPECT_NE(same.program.files[0].text.find("[[0.1,124.8,400.3]"), std::string::npos) << same.program.files[0].text;
+  const ReceiptRow row = row_of(same.program, "p10");
+  EXPECT_NEAR(row.rounding_mm, Vector3(0.0234567, 0.0345678, 0.0456789).norm(), 1e-6);
+  EXPECT_GT(row.error_after_mm, row.rounding_mm);
+}
+
+TEST(Rapid, ConstantOffsetsAreFoldedAndKeptAsAComment) {
+  const test::Corrected made = rapid(
+      program("  CONST num up:=2*(10+15);\n" + target("p10", "0,125,400"),
+              move_l("p10") + move_l("Offs(Offs(p10,-up,0,0),0,0,up/2)") + move_l("RelTool(p10,0,0,-10\\Rz:=90)")));
+  ASSERT_EQ(made.program.left_alone(), 0u) << made.program.rows[0].message;
+  const std::string& text = made.program.files[0].text;
+  EXPECT_NE(text.find("    ! trammel: was Offs(Offs(p10,-up,0,0),0,0,up/2)\n    MoveL [[-49.877,124.765,425.346],["),
+            std::string::npos)
+      << text;
+  // The tool's z is the base's x here: 10 mm back.
+  EXPECT_NE(text.find("MoveL [[-9.877,124.765,400.346],[0.500000,0.500000,0.500000,0.500000],"), std::string::npos)
+      << text;
+  EXPECT_EQ(made.program.moves_corrected, 3u);
+}
+
+TEST(Rapid, ATargetIsCorrectedInItsWorkObjectWithItsMovedObjectFrame) {
+  // Both frames turned about z by 90 deg: the object's x is the base's -x.
+  const test::Corrected made =
+      rapid(program("  PERS wobjdata wTurned:=[FALSE,TRUE,\"\",[[1800,0,1000],[0.70710678,0,0,0.70710678]],"
+                    "[[0,0,0],[0.70710678,0,0,0.70710678]]];\n  CONST robtarget "
+                    "p10:=[[0,10,0],[0,-0.70710678,0,0.70710678],[0,0,0,0],"
+                    "[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
+                    move_l("p10", "\\WObj:=wTurned")));
+  const ReceiptRow row = row_of(made.program, "p10");
+  ASSERT_TRUE(row.corrected()) << row.message;
+  EXPECT_NEAR(row.after[0], -kShift_mm.x(), 1e-3);
+  EXPECT_NEAR(row.after[1], 10 - kShift_mm.y(), 1e-3);
+  EXPECT_NEAR(row.after[2], kShift_mm.z(), 1e-3);
+  EXPECT_NEAR(row.p_B.x(), 1.8, 1e-9);
+  EXPECT_NEAR(row.p_B.y(), -0.01, 1e-9);
+}
+
+TEST(Rapid, ArraysRecordsInlineTargetsAndArcsAreFound) {
+  const std::string data =
+      "  RECORD hole\n    num depth;\n    robtarget place;\n  ENDRECORD\n"
+      "  CONST hole h:=[12,[[0,100,400]" +
+      kRest +
+      "];\n"
+      "  CONST robtarget a{2,2}:=[[[[0,0,0]" +
+      kRest + ",[[0,0,100]" + kRest + "],\n    [[[0,100,0]" + kRest + ",[[0,100,100]" + kRest + "]];\n" +
+      target("p1", "0,200,200") + target("p2", "0,210,210");
+  const test::Corrected made =
+      rapid(program(data, "    FOR i FROM 1 TO 2 DO\n" + move_l("a{i,2}") + "    ENDFOR\n" + move_l("a{2,1}") +
+                              move_l("h.place") + move_l("[[0,50,50]" + kRest) +
+                              "    MoveC p1,p2\\ID:=4,v100,z10,tSpindle,\\WObj:=wPanel;\n"
+                              "    IF i>3 TriggL Offs(p2,0,0,5),v100,trig1\\T2:=trig2,z10,tSpindle\\WObj:=wPanel;\n"));
+  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  EXPECT_EQ(made.program.rows.size(), 3u + 1 + 1 + 2 + 1) << made.program.files[0].text;
+  EXPECT_EQ(made.program.moves_corrected, 6u);
+}
+
+TEST(Rapid, WhatTheProgramDecidesAtRunTimeIsLeftWithTheReason) {
+  const std::string data = target("p10", "0,0,0") + target("a", "0,1,0") + "  VAR robtarget pVar:=[[0,9,0]" + kRest +
+                           ";\n  VAR num n:=3;\n  PERS num nPers:=3;\n  VAR robtarget pFound;\n";
+  const test::Corrected made =
+      rapid(program(data, move_l("p10") + move_l("a") + move_l("Offs(p10,n,0,0)") + move_l("Offs(p10,nPers,0,0)") +
+                              move_l("pVar") + "    SearchL di1,pFound,a,v20,tSpindle\\WObj:=wPanel;\n" +
+                              move_l("Offs(pFound,0,0,1)") + move_l("fWhere(2)") + move_l("pElsewhere") +
+                              "    FOR k FROM 1 TO 3 DO\n" + move_l("Offs(p10,0,k*10,0)") + "    ENDFOR\n" +
+                              "    n:=n+1;\n    pVar.trans.z:=5;\n    PDispOn p10,tSpindle;\n" +
+                              move_l("Offs(p10,1,0,0)") + "    PDispOff;\n" + move_l("Offs(p10,2,0,0)")));
+  EXPECT_NE(why(made, "Offs(p10,n,0,0)").find("n is set at run time (m.mod line"), std::string::npos);
+  EXPECT_NE(why(made, "Offs(p10,nPers,0,0)").find("persistent"), std::string::npos);
+  EXPECT_NE(why(made, "pVar").find("set at run time"), std::string::npos);
+  EXPECT_NE(why(made, "Offs(pFound,0,0,1)").find("SearchL"), std::string::npos);
+  EXPECT_NE(why(made, "fWhere(2)").find("function"), std::string::npos);
+  EXPECT_NE(why(made, "pElsewhere").find("not in the files"), std::string::npos);
+  EXPECT_NE(why(made, "Offs(p10,0,k*10,0)").find("loop counts k"), std::string::npos);
+  EXPECT_NE(why(made, "Offs(p10,1,0,0)").find("PDispOn"), std::string::npos);
+  EXPECT_TRUE(row_of(made.program, "Offs(p10,2,0,0)").corrected());
+  EXPECT_TRUE(row_of(made.program, "p10").corrected());
+}
+
+TEST(Rapid, TheSamePointInTwoFramesIsRefusedOrSplit) {
+  const std::string text =
+      program("  PERS wobjdata wOther:=[FALSE,TRUE,\"\",[[1800,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n" +
+                  target("p10", "0,125,400"),
+              move_l("p10") + move_l("p10", "\\WObj:=wOther"));
+  EXPECT_NE(why(rapid(text), "p10").find("used in different ways: tool tSpindle in wPanel (m.mod line"),
+            std::string::npos);
+  const test::Corrected split = rapid(text, {.split = true});
+  ASSERT_EQ(split.program.rows.size(), 2u);
+  for (const ReceiptRow& row : split.program.rows) EXPECT_TRUE(row.corrected()) << row.message;
+  EXPECT_NE(split.program.files[0].text.find("MoveL [[0.123,124.765,400.346],"), std::string::npos)
+      << split.program.files[0].text;
+}
+
+TEST(Rapid, ParametersAreFollowedToWhatIsHandedOver) {
+  const test::Corrected made =
+      rapid(program(target("p10", "0,125,400") + target("p20", "0,225,400"),
+                    "    rDrill p10,tSpindle,50;\n    rDrill p20,tSpindle,50;\n    rOnce p20;\n  ENDPROC\n"
+                    "  PROC rDrill(robtarget pAt,PERS tooldata tWith,num nBack)\n"
+                    "    MoveL pAt,v10,fine,tWith\\WObj:=wPanel;\n    MoveL "
+                    "Offs(pAt,-nBack,0,0),v10,fine,tWith\\WObj:=wPanel;\n  ENDPROC\n"
+                    "  PROC rOnce(robtarget pAt)\n    MoveL Offs(pAt,-20,0,0),v10,fine,tSpindle\\WObj:=wPanel;\n"));
+  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << why(made, "p10");
+  EXPECT_TRUE(row_of(made.program, "p20").corrected());
+  EXPECT_NE(why(made, "Offs(pAt,-nBack,0,0)").find("different values"), std::string::npos);
+  EXPECT_TRUE(row_of(made.program, "Offs(pAt,-20,0,0)").corrected());
+}
+
+TEST(Rapid, ModulesShareTheirDataAndKeepTheirOwn) {
+  const std::string data = "MODULE D(SYSMODULE)\n" + kTool + kPanel + target("p10", "0,125,400") + "  LOCAL" +
+                           target("p20", "0,1,1").substr(1) + "ENDMODULE\n";
+  const std::string moves = "MODULE P\n  LOCAL" + target("p20", "0,200,200").substr(1) + "  PROC main()\n" +
+                            move_l("p10") + move_l("p20") + "  ENDPROC\nENDMODULE\n";
+  const test::Corrected made = corrected_by_shift(Dialect::kRapid, {{"d.sys", data}, {"p.mod", moves}});
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_NE(made.program.files[0].text.find("[[0.123,124.765,400.346]"), std::string::npos);
+  EXPECT_NE(made.program.files[0].text.find("[[0,1,1]"), std::string::npos);
+  EXPECT_NE(made.program.files[1].text.find("[[0.123,199.765,200.346]"), std::string::npos);
+}
+
+TEST(Rapid, AToolThatIsNotTheCellsIsRefusedWithBothValues) {
+  std::string text = program(target("p10", "0,125,400"), move_l("p10"));
+  text.replace(text.find("[100,0,150]"), 11, "[100,0,153]");
+  const std::string refusal = rapid(text).refusal;
+  EXPECT_NE(refusal.find("100.000, 0.000, 153.000"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("100.000, 0.000, 150.000"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("3.000 mm and 0.0000 deg apart"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("m.mod row 2"), std::string::npos) << refusal;
+  std::string heavy = program(target("p10", "0,125,400"), move_l("p10"));
+  heavy.replace(heavy.find("[100,[0,0,100]"), 14, "[130,[0,0,100]");
+  EXPECT_NE(rapid(heavy).refusal.find("30.000 kg"), std::string::npos) << rapid(heavy).refusal;
+}
+
+TEST(Rapid, JointTargetsAreCorrectedInJointsOrKept) {
+  const std::string text = program("  CONST jointtarget j:=[[0,-20,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n",
+                                   "    MoveAbsJ j\\NoEOffs,v100,fine,tSpindle;\n");
+  EXPECT_NE(rapid(text).program.files[0].text.find("[[0.01235,-19.98765,20.01235,0.01235,30.01235,0.01235]"),
+            std::string::npos)
+      << rapid(text).program.files[0].text;
+  EXPECT_EQ(rapid(text, {.keep_joints = true}).program.files[0].text, text);
+}
+
+TEST(Rapid, AMarkedProgramIsNotCorrectedTwice) {
+  const std::string text = program(target("p10", "0,125,400"), move_l("p10"));
+  const test::Corrected twice = rapid(rapid(text).program.files[0].text);
+  EXPECT_NE(twice.refusal.find("corrected already, by model 0123456789ab on 2026-11-22"), std::string::npos)
+      << twice.refusal;
+}
+
+TEST(Rapid, WhatIsNoRapidIsLeftAsItIs) {
+  for (const std::string& text : std::vector<std::string>{
+           "", "\n", "MODULE", "MODULE M\nPROC main()\nMoveL ,,,;", "\"", "!", "[[[[", "MoveL p", "%%%",
+           "CONST robtarget p:=p;\nMoveL p,v1,fine,t;", std::string(5000, '('), std::string(5000, '['),
+           "IF IF IF MoveL", "PROC a()\na;\nENDPROC\nPROC b(robtarget p)\nb p;\nMoveL p,v,z,t;"}) {
+    const test::Corrected made = rapid(text);
+    EXPECT_EQ(made.program.files[0].text, text);
+  }
+}
+
+}  // namespace
+}  // namespace trammel::cam

@@ -1,0 +1,170 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "clients/cli/command_line.h"
+#include "server/base/text_file.h"
+#include "server/compensate/model_file.h"
+#include "server/measurement/files/csv_table.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kNotAll = 1;
+constexpr int kWrongUsage = 2;
+constexpr int kRefusedData = 3;
+
+const std::string kPrograms = TRAMMEL_SOURCE_DIR "/config/programs/";
+
+/// A model of the shipped cell that knows of no errors: what is corrected is written as it was, with its digits.
+class CorrectProgram : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Result<Cell> cell = read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml");
+    folder_.write("cell.model", serialize(test::nominal_model(std::make_shared<const Cell>(*cell), 10)));
+  }
+  int correct(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"trammel", "correct"});
+    std::vector<const char*> argv;
+    for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+    return run_command_line(static_cast<int>(argv.size()), argv.data());
+  }
+  std::string file(const std::string& name) const { return folder_.file(name); }
+  std::string text(const std::string& name) const { return read_text_file(file(name)).value(); }
+  bool exists(const std::string& name) const { return fs::exists(file(name)); }
+  const std::string model() const { return file("cell.model"); }
+
+  /// A module with one target that is corrected and, if asked for, one that is decided at run time.
+  std::string module(const std::string& name, bool some_left = false) {
+    std::string lines = "    MoveL p10,v100,fine,tSpindle;\n";
+    if (some_left) lines += "    MoveL CRobT(),v100,fine,tSpindle;\n";
+    return folder_.write(
+        name,
+        "MODULE M\r\n  PERS tooldata "
+        "tSpindle:=[TRUE,[[100,0,150],[0.923879533,0,-0.382683432,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\r\n"
+        "  CONST robtarget p10:=[[1800.1,0,1000],[0.669131,0,0.743145,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+        "  PROC main()\n" +
+            lines + "  ENDPROC\nENDMODULE\n");
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(CorrectProgram, WhatItWasBeforeIsKeptBesideItAndRestoredByteForByte) {
+  const std::string before = module("m.mod");
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("r.csv"), "--json",
+                     file("r.json")}),
+            0);
+  EXPECT_EQ(text("out.mod.original"), text("m.mod"));
+  EXPECT_NE(text("out.mod"), text("m.mod"));
+  ASSERT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), 0);
+  EXPECT_EQ(text("back.mod"), text("m.mod"));
+
+  const CsvTable receipt = CsvTable::parse(text("r.csv"), "r.csv").value();
+  EXPECT_EQ(receipt.field(0, receipt.find("name").value()), "p10");
+  EXPECT_EQ(receipt.field(0, receipt.find("status").value()), "ok");
+  const auto json = nlohmann::json::parse(text("r.json"));
+  EXPECT_EQ(json["moves_corrected"], 1);
+  EXPECT_EQ(json["inserted_lines"].size(), 1u);
+}
+
+TEST_F(CorrectProgram, WithoutItsOriginalOrWithAnotherOneNothingIsUndone) {
+  const std::string before = module("m.mod");
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), 0);
+  EXPECT_EQ(correct({"--undo", before, "-o", file("back.mod")}), kRefusedData) << "it is not marked";
+  folder_.write("out.mod.original", "MODULE Other\nENDMODULE\n");
+  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kRefusedData);
+  fs::remove(file("out.mod.original"));
+  EXPECT_EQ(correct({"--undo", file("out.mod"), "-o", file("back.mod")}), kRefusedData);
+  EXPECT_FALSE(exists("back.mod"));
+}
+
+TEST_F(CorrectProgram, ACorrectedProgramIsCorrectedAgainOnlyFromItsOriginal) {
+  ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod")}), 0);
+  EXPECT_EQ(correct({"--model", model(), file("out.mod"), "-o", file("twice.mod")}), kRefusedData);
+  EXPECT_FALSE(exists("twice.mod"));
+  ASSERT_EQ(correct({"--again", "--model", model(), file("out.mod"), "-o", file("twice.mod")}), 0);
+  EXPECT_EQ(text("twice.mod"), text("out.mod"));
+  EXPECT_EQ(text("twice.mod.original"), text("m.mod"));
+}
+
+TEST_F(CorrectProgram, WhatIsLeftDecidesTheExitCode) {
+  const std::string before = module("m.mod", true);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("strict.mod"), "--strict"}), kRefusedData);
+  EXPECT_FALSE(exists("strict.mod"));
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kNotAll);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("allowed.mod"), "--allow-failed"}), 0);
+  EXPECT_EQ(text("allowed.mod"), text("out.mod"));
+}
+
+TEST_F(CorrectProgram, WrongUsageChangesNothing) {
+  const std::string before = module("m.mod");
+  const std::string was = text("m.mod");
+  EXPECT_EQ(correct({before, "-o", file("out.mod")}), kWrongUsage) << "no model";
+  EXPECT_EQ(correct({"--model", model(), before, "-o", before}), kWrongUsage) << "over its input";
+  EXPECT_EQ(correct({"--model", model(), "--format", "fortran", before, "-o", file("out.mod")}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), folder_.write("x.txt", "x"), "-o", file("out.mod")}), kWrongUsage);
+  EXPECT_EQ(text("m.mod"), was);
+  EXPECT_FALSE(exists("out.mod"));
+}
+
+TEST_F(CorrectProgram, AToolOfAnotherCellIsRefusedAndNothingIsWritten) {
+  std::string other = read_text_file(module("m.mod")).value();
+  other.replace(other.find("[100,0,150]"), 11, "[100.2,0,150]");
+  EXPECT_EQ(correct({"--model", model(), folder_.write("o.mod", other), "-o", file("out.mod")}), kRefusedData);
+  EXPECT_FALSE(exists("out.mod"));
+}
+
+TEST_F(CorrectProgram, AFolderComesBackAsAFolder) {
+  fs::create_directory(file("in"));
+  fs::rename(module("m.mod"), file("in/m.mod"));
+  folder_.write("in/empty.sys", "MODULE E(SYSMODULE)\nENDMODULE\n");
+  ASSERT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), 0);
+  EXPECT_EQ(text("out/m.mod.original"), text("in/m.mod"));
+  EXPECT_EQ(text("out/empty.sys"), text("in/empty.sys"));
+  EXPECT_FALSE(exists("out/empty.sys.original"));
+  ASSERT_EQ(correct({"--undo", file("out"), "-o", file("back")}), 0);
+  EXPECT_EQ(text("back/m.mod"), text("in/m.mod"));
+}
+
+TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
+  ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--report", file("page.html"),
+                     "--tolerance", "0.2", "--json", file("r.json")}),
+            0);
+  const std::string page = text("page.html");
+  EXPECT_NE(page.find("1 of 1 targets are inside"), std::string::npos);
+  EXPECT_NE(page.find("p10 m.mod:3"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "it loads something";
+  EXPECT_EQ(page.find("{{"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(text("r.json"))["tolerance"]["inside_after"], 1);
+}
+
+TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
+  const std::vector<std::vector<std::string>> examples = {
+      {kPrograms + "drill.mod"},
+      {kPrograms + "drill.src", kPrograms + "drill.dat", kPrograms + "$config.dat"},
+      {kPrograms + "drill.ls"},
+      {kPrograms + "drill.jbi"},
+      {kPrograms + "drill.script"},
+      {"--format", "camrob", kPrograms + "camrob.csv"},
+      {"--format", "robodk", kPrograms + "robodk.csv"},
+  };
+  for (const std::vector<std::string>& example : examples) {
+    std::vector<std::string> arguments = example;
+    arguments.insert(arguments.end(), {"--model", model(), "--frames", kPrograms + "frames.csv", "-o", file("out/"),
+                                       "--json", file("r.json")});
+    EXPECT_EQ(correct(arguments), 0) << example.back();
+    const auto json = nlohmann::json::parse(text("r.json"));
+    EXPECT_EQ(json["left_alone"], 0) << example.back();
+    EXPECT_EQ(json["moves"], json["moves_corrected"]) << example.back();
+    EXPECT_GE(json["moves"].get<int>(), 2) << example.back();
+  }
+}
+
+}  // namespace
+}  // namespace trammel::cli

@@ -1,0 +1,117 @@
+#include "server/health/health_check.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/base/units.h"
+#include "tests/support/checked_robot.h"
+
+namespace trammel {
+namespace {
+
+using test::checked;
+using test::CheckedRobot;
+using test::trained_robot;
+
+HealthOptions tolerance_mm(double mm) {
+  HealthOptions options;
+  options.tolerance = mm * from_mm(1);
+  return options;
+}
+
+bool is_joint_slip(const SingleCause& cause, int joint) {
+  return cause.record->spelling == "joint_slip" && cause.joint == joint;
+}
+
+/// One robot for all tests: trained on 200 poses, checked by twelve planned ones.
+class HealthTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { robot_ = new CheckedRobot(trained_robot({.seed = 3, .poses = 200})); }
+  static void TearDownTestSuite() {
+    delete robot_;
+    robot_ = nullptr;
+  }
+  [[nodiscard]] static hidden::Effect effect(const hidden::HiddenCause& cause, double mm, bool new_tool = false) {
+    hidden::Random random(5);
+    return changed_by(robot_->robot, cause, mm, new_tool, random);
+  }
+  static CheckedRobot* robot_;
+};
+CheckedRobot* HealthTest::robot_ = nullptr;
+
+TEST_F(HealthTest, AHealthyRobotIsHealthyAndTheCheckSaysWhatItWouldHaveSeen) {
+  int healthy = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const HealthCheck check = checked(*robot_, {}, seed, tolerance_mm(0.05));
+    EXPECT_NE(check.verdict, HealthVerdict::kChanged) << seed << ": " << check.sentence;
+    healthy += check.verdict == HealthVerdict::kHealthy ? 1 : 0;
+    ASSERT_TRUE(check.would_have_seen);
+    EXPECT_LT(*check.would_have_seen, 50e-6);
+    EXPECT_NEAR(check.rms, check.expected_rms, 0.4 * check.expected_rms);
+  }
+  EXPECT_GE(healthy, 9);
+}
+
+TEST_F(HealthTest, AJointThatLostItsZeroBy50umIsSeenAndNamedWithItsSize) {
+  const hidden::Effect slip = effect({"joint_slip", 3, "", 0, {}, 0}, 0.05);
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const HealthCheck check = checked(*robot_, {{slip}}, seed, tolerance_mm(0.1));
+    ASSERT_EQ(check.verdict, HealthVerdict::kChanged) << seed << ": " << check.sentence;
+    const SeenChange& change = check.changed.front();
+    const auto is = [](const SingleCause& cause) { return is_joint_slip(cause, 2); };
+    const bool listed = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), is);
+    named += is(change.cause) || listed ? 1 : 0;
+    if (is(change.cause)) {
+      EXPECT_NEAR(change.effect_rms, 50e-6, 2 * change.u95) << seed;
+    }
+  }
+  EXPECT_GE(named, 9);
+}
+
+TEST_F(HealthTest, WhatThePosesCouldHideIsNotCalledHealthy) {
+  const HealthCheck check = checked(*robot_, {}, 1, tolerance_mm(0.01));
+  EXPECT_EQ(check.verdict, HealthVerdict::kCannotTell) << check.sentence;
+}
+
+TEST_F(HealthTest, ASingleBadPoseIsNamedAndIsNoChange) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const int bad = static_cast<int>(seed);
+    const HealthCheck check = checked(*robot_, {{}, bad, seed % 2 == 0 ? 30.0 : 0.5}, seed, tolerance_mm(0.1));
+    EXPECT_NE(check.verdict, HealthVerdict::kChanged) << seed << ": " << check.sentence;
+    ASSERT_EQ(check.suspects.size(), 1u) << check.sentence;
+    EXPECT_EQ(check.suspects.front(), fmt::format("p{}", bad + 1));
+  }
+}
+
+TEST_F(HealthTest, AToolThatWasMountedAnewIsNoChangeWhereThatIsSaid) {
+  const hidden::Effect mounted = effect({"tool_changed", 0, "", 0, {}, 0}, 1.0);
+  HealthOptions options = tolerance_mm(0.1);
+  EXPECT_EQ(checked(*robot_, {{mounted}}, 1, options).verdict, HealthVerdict::kChanged);
+  options.new_tool = true;
+  const HealthCheck check = checked(*robot_, {{mounted}}, 1, options);
+  EXPECT_EQ(check.verdict, HealthVerdict::kHealthy) << check.sentence;
+  const hidden::Effect slip = effect({"joint_slip", 3, "", 0, {}, 0}, 0.06, true);
+  EXPECT_EQ(checked(*robot_, {{mounted, slip}}, 1, options).verdict, HealthVerdict::kChanged);
+}
+
+TEST_F(HealthTest, TooFewPosesCannotTell) {
+  CheckedRobot few = *robot_;
+  few.planned.resize(2);
+  const HealthCheck check = checked(few, {}, 1, tolerance_mm(0.1));
+  EXPECT_EQ(check.verdict, HealthVerdict::kCannotTell);
+  EXPECT_FALSE(check.would_have_seen);
+}
+
+TEST_F(HealthTest, PlannedPosesShowMoreThanScatteredOnes) {
+  CheckedRobot scattered = *robot_;
+  for (std::size_t i = 0; i < scattered.planned.size(); ++i) scattered.planned[i] = scattered.robot.world.poses[i].q;
+  const HealthCheck planned = checked(*robot_, {}, 1, tolerance_mm(0.1));
+  const HealthCheck by_chance = checked(scattered, {}, 1, tolerance_mm(0.1));
+  ASSERT_TRUE(planned.would_have_seen && by_chance.would_have_seen);
+  EXPECT_LT(*planned.would_have_seen, 0.9 * *by_chance.would_have_seen);
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+#include "server/health/health_check.h"
+#include "tests/support/hidden_check.h"
+
+/// A hidden robot, the model trained on its files alone, and the poses planned for its checks.
+namespace trammel::test {
+
+struct CheckedRobot {
+  hidden::TrainedRobot robot;
+  CompensatedModel model;
+  std::vector<hidden::Joints> planned;
+};
+/// `poses`: of the check.
+[[nodiscard]] CheckedRobot trained_robot(const hidden::RobotSpec& spec, int poses = 12,
+                                         const std::string& bias = "none");
+
+struct Hidden {
+  std::vector<hidden::Effect> effects = {};
+  int bad_pose = -1;
+  double bad_mm = 0;
+};
+/// What a check of the planned poses says of the robot as it is now.
+[[nodiscard]] HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed,
+                                  const HealthOptions& options);
+
+}  // namespace trammel::test

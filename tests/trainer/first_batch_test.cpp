@@ -1,0 +1,59 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/demand.h"
+#include "tests/support/learning_cell.h"
+
+// The daemon looks at the first batch of a cell, too, before it learns from it.
+namespace trammel {
+namespace {
+
+using test::LearningCell;
+
+MeasurementBatch measured(std::uint64_t seed) {
+  return test::measured(test::chapter_5_robot(test::cell_7()), 60, seed);
+}
+
+TEST(FirstBatch, OneThatWasReadWronglyIsKeptOutAndTheReadingThatFitsIsNamed) {
+  LearningCell cell(test::cell_7());
+  MeasurementBatch mirrored = measured(1);
+  for (Measurement& m : mirrored.measurements) m.p_W.y() *= -1;
+  const JobProgress job = cell.submit(std::move(mirrored));
+  EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
+  EXPECT_NE(job.what.find("read with the other sign of y_mm they would fit"), std::string::npos) << job.what;
+  EXPECT_EQ(cell.in_force(), 0) << "nothing is learned";
+  const auto kept_out = test::demand(cell.trainer().quarantined("cell-7"));
+  ASSERT_EQ(kept_out.size(), 1u) << "the batch is stored";
+  EXPECT_EQ(kept_out.front().id, "day-1");
+
+  EXPECT_EQ(cell.submit(measured(2)).outcome.verdict, JobVerdict::kInForce) << "the same as it was meant";
+}
+
+TEST(FirstBatch, OneOfAnotherToolIsLearnedOnceSomebodyWhoKnowsHasReleasedIt) {
+  auto without_bias = std::make_shared<Cell>(*test::cell_7());
+  without_bias->model.bias = "none";
+  LearningCell cell(without_bias);
+  MeasurementBatch other = measured(3);
+  for (Measurement& m : other.measurements) m.p_W += *m.R_WT * Vector3(0, 0, 0.03);
+  const JobProgress job = cell.submit(std::move(other));
+  EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
+  EXPECT_NE(job.what.find("another point of the tool"), std::string::npos) << job.what;
+  const auto again = test::demand(cell.trainer().retrain("cell-7", {"day-1"}, "", "", Trainer::Quarantine::kReleased));
+  EXPECT_EQ(cell.finished(again).outcome.verdict, JobVerdict::kInForce) << cell.finished(again).what;
+  EXPECT_EQ(cell.in_force(), 1);
+}
+
+TEST(FirstBatch, ALaterOneThatWasReadWronglyIsNamedLikewise) {
+  LearningCell cell(test::cell_7());
+  ASSERT_EQ(cell.submit(measured(4)).outcome.verdict, JobVerdict::kInForce);
+  MeasurementBatch shifted = measured(5);
+  for (std::size_t i = 0; i + 1 < shifted.measurements.size(); ++i) {
+    shifted.measurements[i].p_W = shifted.measurements[i + 1].p_W;
+    shifted.measurements[i].R_WT = shifted.measurements[i + 1].R_WT;
+  }
+  const JobProgress job = cell.submit(std::move(shifted));
+  EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
+  EXPECT_NE(job.what.find("of the next row"), std::string::npos) << job.what;
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,179 @@
+#include <gtest/gtest.h>
+
+#include "server/base/units.h"
+#include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
+#include "server/compensate/world.h"
+#include "server/trainer/pipeline/train.h"
+#include "tests/support/demand.h"
+#include "tests/support/learning_cell.h"
+#include "tests/support/refusal.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+using test::measured_on;
+using test::true_error;
+
+const TrainOptions kPhysics = [] {
+  TrainOptions options;
+  options.bias = "none";
+  return options;
+}();
+
+CheckedBatch checked(MeasurementBatch batch, const std::string& id, const Cell& cell) {
+  batch.id = id;
+  return test::demand(check_against_cell(std::move(batch), cell));
+}
+
+/// Batches of 60 poses, the tracker set up anew for each; from session `changed` on (from 0) on another robot.
+CheckedBatch sessions_of(const VirtualRobot& robot, const VirtualRobot& after, int count, int changed,
+                         std::uint64_t seed, int poses = 60) {
+  std::vector<CheckedBatch> batches;
+  for (int s = 0; s < count; ++s) {
+    const test::Day day{.poses = poses, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+    batches.push_back(
+        checked(measured_on(s < changed ? robot : after, day), fmt::format("day-{}", s + 1), *robot.truth.cell));
+  }
+  return joined(batches);
+}
+
+TEST(Sessions, FiveOfSixtyPosesWithAMovedTrackerAreWorthThreeHundredOfOneSetUp) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  double several = 0, one = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const CheckedBatch alone = checked(measured_on(robot, {.poses = 300, .seed = 100 * seed}), "all", *cell);
+    several += true_error(test::demand(train(cell, sessions_of(robot, robot, 5, 5, 100 * seed), kPhysics)), robot);
+    one += true_error(test::demand(train(cell, alone, kPhysics)), robot);
+  }
+  EXPECT_LT(several, 1.25 * one);
+}
+
+TEST(Sessions, AZeroLostBetweenTwoIsFoundAndDatedAndTheRestOfTheOldDataGoesOnCounting) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (int joint = 2; joint <= 5; ++joint) {
+    const VirtualRobot after = test::with_zero_off(robot, joint, 2e-4);
+    const CheckedBatch batch = sessions_of(robot, after, 4, 2, 1000 + static_cast<std::uint64_t>(joint));
+    const CompensatedModel model = test::demand(train(cell, batch, kPhysics));
+    const auto& parts = model.parts();
+    ASSERT_EQ(parts.changes.size(), 1u) << "joint " << joint;
+    EXPECT_EQ(parts.changes.front().source, fmt::format("joint_slip:{}@121", joint));
+    EXPECT_EQ(parts.sessions[parts.changes.front().session].id, "day-3");
+    EXPECT_TRUE(parts.changes.front().could_also_be.empty());
+    EXPECT_LT(true_error(model, after), 1e-5);
+    const std::string note = notes_of(model).front();
+    EXPECT_NE(note.find("since session day-3 (pose day-3/1)"), std::string::npos) << note;
+    EXPECT_EQ(test::demand(deserialize(serialize(model), "again")).parts().changes.front().source,
+              parts.changes.front().source);
+  }
+}
+
+TEST(Sessions, NothingHasChangedWhereOnlyTheTrackerMoved) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const CompensatedModel model = test::demand(train(cell, sessions_of(robot, robot, 4, 4, 7000 * seed), kPhysics));
+    EXPECT_TRUE(model.parts().changes.empty()) << model.parts().changes.front().source;
+    EXPECT_EQ(model.parts().sessions.size(), 4u);
+  }
+}
+
+TEST(Sessions, AZeroOfTheLastJointAndATurnedToolAreAmbiguous) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel model =
+      test::demand(train(cell, sessions_of(robot, test::with_zero_off(robot, 6, 1e-3), 3, 1, 500), kPhysics));
+  ASSERT_EQ(model.parts().changes.size(), 1u);
+  EXPECT_EQ(model.parts().changes.front().source, "joint_slip:6@61");
+  EXPECT_FALSE(model.parts().changes.front().could_also_be.empty());
+  EXPECT_NE(notes_of(model).front().find("ambiguous"), std::string::npos);
+}
+
+TEST(Sessions, AColumnDividesAFileAsSeveralFilesDo) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch all;
+  all.id = "all";
+  for (std::uint64_t s = 1; s <= 3; ++s) {
+    const MeasurementBatch part = measured_on(robot, {.poses = 40, .seed = s, .set_up_anew = true});
+    for (Measurement m : part.measurements) {
+      m.session_id = fmt::format("set-up {}", s);
+      m.pose_id = fmt::format("{}-{}", s, m.pose_id);
+      all.measurements.push_back(std::move(m));
+    }
+  }
+  const MeasurementBatch again = test::demand(parse_batch_csv(to_csv(all), "all.csv"));
+  const CompensatedModel model = test::demand(train(cell, test::demand(check_against_cell(again, *cell)), kPhysics));
+  ASSERT_EQ(model.parts().sessions.size(), 3u);
+  EXPECT_EQ(model.parts().sessions.back().id, "set-up 3");
+  EXPECT_LT(true_error(model, robot), 2e-5);
+}
+
+TEST(Sessions, OneSessionIdForAllRowsChangesNothing) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = measured_on(test::chapter_5_robot(cell), {.poses = 60});
+  const CompensatedModel without = test::demand(train(cell, checked(batch, "a", *cell), kPhysics));
+  for (Measurement& m : batch.measurements) m.session_id = "monday";
+  const CompensatedModel with = test::demand(train(cell, checked(batch, "a", *cell), kPhysics));
+  EXPECT_EQ(without.parts().physics.values, with.parts().physics.values);
+  EXPECT_TRUE(with.parts().sessions.empty());
+}
+
+TEST(Sessions, OneTooSmallToSayWhereItsTrackerStoodIsLeftOutAndSaid) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch few = measured_on(robot, {.poses = 2, .seed = 9, .set_up_anew = true});
+  for (Measurement& m : few.measurements) m.R_WT.reset();
+  const CheckedBatch first = checked(measured_on(robot, {.poses = 60}), "first", *cell);
+  const CompensatedModel model = test::demand(train(cell, joined({first, checked(few, "few", *cell)}), kPhysics));
+  const CompensatedModel alone = test::demand(train(cell, first, kPhysics));
+  EXPECT_EQ(model.parts().physics.values, alone.parts().physics.values);
+  ASSERT_EQ(model.parts().sessions_left_out.size(), 1u);
+  EXPECT_EQ(model.parts().sessions_left_out.front().id, "few");
+  EXPECT_NE(notes_of(model).front().find("nothing was learned from session few: 2 positions"), std::string::npos);
+}
+
+TEST(Sessions, ANoisySessionCountsForLess) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch good = checked(measured_on(robot, {.poses = 100, .seed = 3}), "good", *cell);
+  const CheckedBatch noisy =
+      checked(measured_on(robot, {.poses = 100, .seed = 4, .noise = 8, .set_up_anew = true}), "noisy", *cell);
+  const CompensatedModel both = test::demand(train(cell, joined({good, noisy}), kPhysics));
+  const CompensatedModel alone = test::demand(train(cell, good, kPhysics));
+  EXPECT_NEAR(to_mm(both.parts().sessions.back().own_noise), 8 * to_mm(cell->tracker.sigma), 0.03);
+  EXPECT_LT(true_error(both, robot), 1.1 * true_error(alone, robot));
+}
+
+TEST(Sessions, AnUnknownBaseAndToolAreFoundOverSessions) {
+  const auto located = test::cell_7();
+  const auto cell = test::cell_7_unlocated();
+  const VirtualRobot robot = test::chapter_5_robot(located);
+  std::vector<CheckedBatch> batches;
+  for (std::uint64_t s = 1; s <= 3; ++s)
+    batches.push_back(
+        checked(measured_on(robot, {.poses = 60, .seed = s, .set_up_anew = true}), fmt::format("day-{}", s), *cell));
+  EXPECT_LT(true_error(test::demand(train(cell, joined(batches), kPhysics)), robot), 3e-5);
+}
+
+TEST(Sessions, AFileOfOneThatTheModelKnowsIsEvaluatedWhereItsTrackerStood) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch batch = sessions_of(robot, robot, 3, 3, 77);
+  const CompensatedModel model = test::demand(train(cell, batch, kPhysics));
+  const test::Day day{.poses = 60, .seed = 77, .set_up_anew = true};
+  const CheckedBatch first = checked(measured_on(robot, day), "day-1", *cell);
+  const InWorld world = test::demand(in_world_of(model, first.rows()));
+  EXPECT_LT(model.evaluate(world.batch).compensated.rms, 3e-5);
+  EXPECT_TRUE(world.located.empty());
+  const InWorld anew = test::demand(
+      in_world_of(model, sessions_of(robot, robot, 2, 2, 5000).rows()));  // day-1 again, measured elsewhere
+  EXPECT_EQ(anew.located.size(), 2u);
+  EXPECT_LT(model.evaluate(anew.batch).compensated.rms, 3e-5);
+}
+
+}  // namespace
+}  // namespace trammel
