@@ -10,6 +10,7 @@
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/file/check_parts.h"
+#include "server/compensate/file/check_texts.h"
 #include "server/compensate/file/keys.h"
 #include "server/compensate/file/read_parts.h"
 #include "server/compensate/file/self_test.h"
@@ -87,10 +88,13 @@ Status check_predictions(const CompensatedModel& model, const Members& members) 
                                     : model_file::check_self_test(model, Json::parse(self_test->second));
 }
 
-Result<CompensatedModel> checked_model(const Members& members, const std::string& where) {
+Result<CompensatedModel> checked_model(const Members& members, const std::string& where, ModelTexts texts) {
   if (const Status fine = check_undamaged(members, where); !fine) return tl::make_unexpected(fine.error());
-  Result<ModelParts> parts =
-      model_file::parts_from(Json::parse(members.at("content")), Json::parse(members.at("stamp")), where);
+  const Json content = Json::parse(members.at("content"));
+  const Json stamp = Json::parse(members.at("stamp"));
+  const Status can_be_told = texts == ModelTexts::kChecked ? model_file::check_texts(content, stamp) : Status();
+  if (!can_be_told) return Failure(can_be_told.error()).in(where);
+  Result<ModelParts> parts = model_file::parts_from(content, stamp, where);
   if (!parts) return tl::make_unexpected(parts.error());
   const Status possible = model_file::check_parts(*parts);
   Result<CompensatedModel> model =
@@ -118,9 +122,11 @@ std::string serialize(const CompensatedModel& model) {
   return file.dump();
 }
 
-Result<CompensatedModel> deserialize(const std::string& text, const std::string& where) {
+Result<CompensatedModel> deserialize(const std::string& text, const std::string& where, ModelTexts texts) {
   try {
-    return json_members(text, where).and_then([&](const Members& members) { return checked_model(members, where); });
+    return json_members(text, where).and_then([&](const Members& members) {
+      return checked_model(members, where, texts);
+    });
   } catch (const Json::exception& error) {
     return refused("not a Trammel model: {}", excerpt(error.what())).in(where);
   } catch (const std::bad_alloc&) {

@@ -10,9 +10,15 @@ namespace trammel {
 
 /// The model as text: JSON, one object. Same data, same seed, same content, same hash, same id.
 [[nodiscard]] std::string serialize(const CompensatedModel& model);
+/// How much is asked of the names, sentences and times of a model, which change no answer.
+enum class ModelTexts {
+  kChecked,   ///< of a file from outside: see check_texts()
+  kAsTheyAre  ///< of a model that was accepted before: it goes on, and whoever shows them cleans them
+};
 /// The model that `text` holds; `where` names the file in messages. Refuses a text that is no model, whose hash does
-/// not fit its content, or whose numbers no model can have.
-[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where);
+/// not fit its content, or whose numbers or texts no model can have.
+[[nodiscard]] Result<CompensatedModel> deserialize(const std::string& text, const std::string& where,
+                                                   ModelTexts texts = ModelTexts::kChecked);
 [[nodiscard]] Result<CompensatedModel> load_model(const std::string& path);
 
 }  // namespace trammel

@@ -187,10 +187,18 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
 }
 
+/// A start waits for no pipe.
+Result<Cell> read_cell_file(const std::string& cell_file) {
+  std::error_code unknown;
+  if (std::filesystem::exists(cell_file, unknown) && !std::filesystem::is_regular_file(cell_file, unknown))
+    return refused("no file, but a pipe, a device or a folder").in(cell_file);
+  return read_cell(cell_file);
+}
+
 void read_cells(const std::string& path, ServerFile& file, std::vector<Error>& problems) {
   std::map<std::string, std::string> file_of;
   for (const std::string& cell_file : file.cell_files) {
-    auto cell = read_cell(cell_file);
+    auto cell = read_cell_file(cell_file);
     if (!cell) {
       for (Error& one : apart(cell.error())) {
         problems.push_back(Failure(std::move(one)).next(fmt::format("{} names it as one of its cells", path)).value());

@@ -8,6 +8,7 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/base/plain_text.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -19,19 +20,30 @@ constexpr std::int64_t kNoTime = -1;
 constexpr double kTemperatureLimit = 1e3;      // degrees Celsius, as in files
 constexpr std::uint32_t kRetryAfterMs = 1000;  // of a full queue, where nobody knows better
 
+constexpr std::int64_t kLastTime = 253'402'300'799;  // the end of the year 9999
+
 double age_s(std::int64_t since_unix_s, std::int64_t now_unix_s) {
   return static_cast<double>(std::max<std::int64_t>(0, now_unix_s - since_unix_s));
 }
 
+/// As clients can show it.
+std::int64_t told_time(std::int64_t unix_s) { return unix_s < 0 || unix_s > kLastTime ? kNoTime : unix_s; }
+
 /// The times of a model, and what follows from them.
 void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measured_at, std::int64_t now_unix_s,
                wire::ModelInfo& info) {
-  info.trained_at_unix_s(trained_at);
-  info.training_age_s(age_s(trained_at, now_unix_s));
-  info.measured_at_unix_s(measured_at.value_or(kNoTime));
-  info.data_age_s(measured_at ? age_s(*measured_at, now_unix_s) : kUnknown);
+  const std::int64_t trained = told_time(trained_at);
+  const std::int64_t measured = told_time(measured_at.value_or(kNoTime));
+  info.trained_at_unix_s(trained);
+  info.training_age_s(trained == kNoTime ? kUnknown : age_s(trained, now_unix_s));
+  info.measured_at_unix_s(measured);
+  info.data_age_s(measured == kNoTime ? kUnknown : age_s(measured, now_unix_s));
   info.valid_until_unix_s(kNoTime);
 }
+
+/// A foreign text as a reply can carry it, whatever it is.
+std::string told(const std::string& text, std::size_t most_bytes) { return cut(shown(text), most_bytes); }
+std::string told_sentence(const std::string& text) { return cut(shown_lines(text), wire::MAX_SENTENCE); }
 
 double mm_or_unknown(const std::optional<double>& length) { return length ? to_mm(*length) : kUnknown; }
 
@@ -123,12 +135,12 @@ wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t n
   const ModelProvenance& provenance = served.model.provenance();
   const auto& validation = served.model.parts().validation;
   wire::ModelInfo info;
-  info.cell(served.cell);
-  info.id(provenance.id);
-  info.hash(provenance.hash);
-  info.level(provenance.level);
-  info.batch_id(cut(provenance.batch_id, wire::MAX_SENTENCE));
-  info.batch_hash(provenance.batch_hash);
+  info.cell(told(served.cell, wire::MAX_ID));
+  info.id(told(provenance.id, wire::MAX_ID));
+  info.hash(told(provenance.hash, wire::MAX_ID));
+  info.level(told(provenance.level, wire::MAX_SPELLING));
+  info.batch_id(told(provenance.batch_id, wire::MAX_SENTENCE));
+  info.batch_hash(told(provenance.batch_hash, wire::MAX_ID));
   info.version(served.version);
   put_times(provenance.trained_at, provenance.measured_at, now_unix_s, info);
   info.training_poses(provenance.training_poses);
@@ -139,11 +151,11 @@ wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t n
 
 wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s) {
   wire::ModelInfo info;
-  info.cell(stored.cell);
-  info.id(stored.id);
-  info.hash(stored.hash);
-  info.level(stored.level);
-  info.batch_id(cut(stored.batch_id, wire::MAX_SENTENCE));
+  info.cell(told(stored.cell, wire::MAX_ID));
+  info.id(told(stored.id, wire::MAX_ID));
+  info.hash(told(stored.hash, wire::MAX_ID));
+  info.level(told(stored.level, wire::MAX_SPELLING));
+  info.batch_id(told(stored.batch_id, wire::MAX_SENTENCE));
   info.version(stored.version);
   put_times(stored.trained_at, stored.measured_at, now_unix_s, info);
   info.training_poses(stored.training_poses);
@@ -191,8 +203,8 @@ wire::JobOutcome to_wire(const JobOutcome& outcome) {
   result.limit_mm(mm_or_unknown(outcome.limit));
   result.u95_mm(kUnknown);
   if (outcome.code) result.code(trammel::to_wire(*outcome.code));
-  result.why(cut(outcome.why, wire::MAX_SENTENCE));
-  result.next(cut(outcome.next, wire::MAX_SENTENCE));
+  result.why(told_sentence(outcome.why));
+  result.next(told_sentence(outcome.next));
   result.peak_memory_mb(outcome.peak_memory ? static_cast<double>(*outcome.peak_memory) / kBytesPerMb : kUnknown);
   result.processor_time_s(outcome.processor_time.value_or(kUnknown));
   return result;
@@ -203,7 +215,7 @@ wire::JobOutcome to_wire(const JobOutcome& outcome) {
 wire::Job to_wire(const JobProgress& progress) {
   wire::Job job;
   job.number(progress.job);
-  job.cell(progress.cell);
+  job.cell(told(progress.cell, wire::MAX_ID));
   switch (progress.stage) {
     case JobStage::kQueued:
       job.stage(wire::JOB_QUEUED);
@@ -221,7 +233,7 @@ wire::Job to_wire(const JobProgress& progress) {
       job.stage(progress.outcome.verdict == JobVerdict::kCancelled ? wire::JOB_CANCELLED : wire::JOB_FAILED);
       break;
   }
-  job.what(cut(progress.what, wire::MAX_SENTENCE));
+  job.what(told_sentence(progress.what));
   job.share(progress.share);
   job.model_version(progress.model_version);
   job.in_force(progress.in_force);
@@ -251,7 +263,8 @@ wire::JobKind to_wire(JobKind kind) {
 wire::Job to_wire(const Trainer::DatedJob& dated) {
   wire::Job job = to_wire(dated.progress);
   job.kind(to_wire(dated.asked.kind));
-  job.batch_ids(dated.asked.batch_ids);
+  const std::size_t batches = std::min<std::size_t>(dated.asked.batch_ids.size(), wire::MAX_BATCHES);
+  for (std::size_t i = 0; i < batches; ++i) job.batch_ids().push_back(told(dated.asked.batch_ids[i], wire::MAX_ID));
   job.created_unix_s(dated.asked.created_at);
   job.started_unix_s(dated.asked.started_at.value_or(kNoTime));
   job.finished_unix_s(dated.asked.finished_at.value_or(kNoTime));
@@ -260,12 +273,12 @@ wire::Job to_wire(const Trainer::DatedJob& dated) {
 
 wire::BatchInfo to_wire(const StoredBatch& batch) {
   wire::BatchInfo info;
-  info.cell(batch.cell);
-  info.id(batch.id);
-  info.hash(batch.hash);
+  info.cell(told(batch.cell, wire::MAX_ID));
+  info.id(told(batch.id, wire::MAX_ID));
+  info.hash(told(batch.hash, wire::MAX_ID));
   info.poses(batch.poses);
   info.accepted_at_unix_s(batch.accepted_at);
-  info.quarantine(cut(batch.quarantine, wire::MAX_SENTENCE));
+  info.quarantine(told_sentence(batch.quarantine));
   return info;
 }
 
@@ -315,16 +328,16 @@ namespace {
 wire::Problem to_wire(const Error& error) {
   wire::Problem problem;
   problem.code(trammel::to_wire(error.code));
-  problem.what(cut(error.message, wire::MAX_SENTENCE));
-  problem.file(cut(error.file, wire::MAX_ID));
+  problem.what(told_sentence(error.message));
+  problem.file(told(error.file, wire::MAX_ID));
   problem.row(error.row.value_or(0));
-  problem.field(cut(error.field, wire::MAX_ID));
+  problem.field(told(error.field, wire::MAX_ID));
   problem.has_value(error.value.has_value());
   problem.value(error.value.value_or(0));
   problem.has_limit(error.limit.has_value());
   problem.limit(error.limit.value_or(0));
-  problem.text(cut(error.text, wire::MAX_ID));
-  problem.next(cut(error.next, wire::MAX_SENTENCE));
+  problem.text(told(error.text, wire::MAX_ID));
+  problem.next(told_sentence(error.next));
   return problem;
 }
 
@@ -332,7 +345,7 @@ wire::Problem to_wire(const Error& error) {
 
 void put_error(const Error& error, wire::ReplyHeader& header) {
   header.result(to_wire(error.code));
-  header.message(cut(sentence(error), wire::MAX_SENTENCE));
+  header.message(told_sentence(sentence(error)));
   if (error.code == ErrorCode::kBusy) header.retry_after_ms(kRetryAfterMs);
   for (const Error& one : apart(error)) {
     if (header.problems().size() < wire::MAX_ERRORS) header.problems().push_back(to_wire(one));

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,5 +64,21 @@ template <typename Reply>
 [[nodiscard]] std::string request_id_text(const wire::SampleIdentity& id);
 
 [[nodiscard]] std::int64_t unix_now_s();
+
+/// The answer to the same request, where `reply`, a Reply, is too large for the wire or holds what it cannot carry.
+template <typename Reply>
+[[nodiscard]] std::shared_ptr<void> instead_of(const void* reply) {
+  const wire::ReplyHeader& meant = static_cast<const Reply*>(reply)->header();
+  auto error = std::make_shared<Reply>();
+  put_error(failure(ErrorCode::kInternal, "the answer does not fit on the wire")
+                .next("ask for less of it, or look at the texts of the model in force")
+                .value(),
+            error->header());
+  error->header().related_request_id(meant.related_request_id());
+  error->header().server(meant.server());
+  error->header().contract_version(meant.contract_version());
+  error->header().trace_id(meant.trace_id());
+  return error;
+}
 
 }  // namespace trammel

@@ -44,7 +44,7 @@ Status OldContract::add_operation(wire::dds::DomainParticipant& participant) {
   if (!requests) return tl::make_unexpected(requests.error());
   const auto replies = wire::make_old_reply_topic<Old>(participant);
   if (!replies) return tl::make_unexpected(replies.error());
-  channels_.add_topic(*replies);
+  channels_.add_topic(*replies, nullptr);
   operations_[*requests] = {(*replies)->get_name(), [this](const contract_1::Request& request) {
                               const auto reply = std::make_shared<typename Old::Reply::type>();
                               reply->header(refusal_of(request, server_id_));

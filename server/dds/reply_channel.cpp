@@ -18,15 +18,21 @@ bool follows_to_another_partition(const std::string& participant) { return parti
 
 }  // namespace
 
-ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched)
-    : publisher_(publisher), matched_(std::move(matched)) {}
+ReplyWriter::ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched, InsteadOf instead)
+    : publisher_(publisher), matched_(std::move(matched)), instead_(std::move(instead)) {}
 
 std::shared_ptr<ReplyWriter> ReplyWriter::make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
-                                               std::function<void()> matched) {
-  std::shared_ptr<ReplyWriter> result(new ReplyWriter(publisher, std::move(matched)));
+                                               std::function<void()> matched, InsteadOf instead) {
+  std::shared_ptr<ReplyWriter> result(new ReplyWriter(publisher, std::move(matched), std::move(instead)));
   result->writer_ = publisher.create_datawriter(topic, wire::call_writer_qos(wire::kReplyDepth), result.get(),
                                                 wire::dds::StatusMask::publication_matched());
   return result->writer_ == nullptr ? nullptr : result;
+}
+
+bool ReplyWriter::write(void* reply) {
+  if (writer_->write(reply)) return true;
+  const std::shared_ptr<void> error = instead_ ? instead_(reply) : nullptr;
+  return error && writer_->write(error.get());
 }
 
 ReplyWriter::~ReplyWriter() {

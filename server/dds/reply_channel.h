@@ -14,27 +14,32 @@
 
 namespace trammel {
 
+/// Makes of a reply that cannot be written the answer that says so.
+using InsteadOf = std::function<std::shared_ptr<void>(const void* reply)>;
+
 /// A writer of one reply topic to one client.
 class ReplyWriter final : private wire::dds::DataWriterListener {
  public:
   /// Null when DDS refuses. `matched` is called when a reader has been matched, in a thread of DDS.
   [[nodiscard]] static std::shared_ptr<ReplyWriter> make(wire::dds::Publisher& publisher, wire::dds::Topic* topic,
-                                                         std::function<void()> matched);
+                                                         std::function<void()> matched, InsteadOf instead = nullptr);
   ~ReplyWriter() override;
   ReplyWriter(const ReplyWriter&) = delete;
   ReplyWriter& operator=(const ReplyWriter&) = delete;
 
   [[nodiscard]] bool has_reader() const { return readers_ > 0; }
-  /// Does not wait for the reader: what it does not take in time is overwritten.
-  [[nodiscard]] bool write(void* reply) { return writer_->write(reply); }
+  /// Does not wait for the reader: what it does not take in time is overwritten. A reply that does not fit on the wire
+  /// is replaced by an error. False: nothing was written.
+  [[nodiscard]] bool write(void* reply);
 
  private:
-  ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched);
+  ReplyWriter(wire::dds::Publisher& publisher, std::function<void()> matched, InsteadOf instead);
   void on_publication_matched(wire::dds::DataWriter* writer,
                               const wire::dds::PublicationMatchedStatus& status) override;
 
   wire::dds::Publisher& publisher_;
   const std::function<void()> matched_;
+  const InsteadOf instead_;
   wire::dds::DataWriter* writer_ = nullptr;
   std::atomic<int> readers_{0};
 };

@@ -35,9 +35,9 @@ ReplyChannels::ReplyChannels(wire::dds::DomainParticipant& participant, std::siz
       posted_(OutboxLimits{}),
       kept_(limits_of_kept()) {}
 
-void ReplyChannels::add_topic(wire::dds::Topic* topic) {
+void ReplyChannels::add_topic(wire::dds::Topic* topic, InsteadOf instead) {
   const MutexLock lock(mutex_);
-  topics_[topic->get_name()] = topic;
+  topics_[topic->get_name()] = {topic, std::move(instead)};
 }
 
 void ReplyChannels::heard(const std::vector<ReaderEvent>& events) {
@@ -77,7 +77,7 @@ void ReplyChannels::change(const ChannelBook::Change& change) {
 
 void ReplyChannels::open(const ChannelBook::Change& change) {
   std::shared_ptr<ReplyChannel> channel;
-  wire::dds::Topic* of = nullptr;
+  ReplyTopic of;
   {
     const MutexLock lock(mutex_);
     of = topics_.at(change.topic);
@@ -87,7 +87,9 @@ void ReplyChannels::open(const ChannelBook::Change& change) {
   if (!channel) channel = std::make_shared<ReplyChannel>(participant_, change.partition);
   if (channel->publisher() == nullptr) return;
   Writer writer = channel->writer(change.topic);
-  if (!writer) writer = ReplyWriter::make(*channel->publisher(), of, [this] { matched(); });
+  if (!writer)
+    writer = ReplyWriter::make(
+        *channel->publisher(), of.topic, [this] { matched(); }, of.instead);
   {
     const MutexLock lock(mutex_);
     if (writer) channel->add(change.topic, std::move(writer));

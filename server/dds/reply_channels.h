@@ -32,8 +32,9 @@ class ReplyChannels final : public ReplySink {
   ReplyChannels(wire::dds::DomainParticipant& participant, std::size_t capacity, std::function<void()> wants_tending,
                 WorkUnderWay& writing);
 
-  /// Adds a topic of replies. Call it before any other function.
-  void add_topic(wire::dds::Topic* topic);
+  /// Adds a topic of replies, and what is answered `instead` of one that cannot be written. Call it before any other
+  /// function.
+  void add_topic(wire::dds::Topic* topic, InsteadOf instead);
   /// What discovery has found since.
   void heard(const std::vector<ReaderEvent>& events);
   /// Opens and closes channels. Call it from one thread only. True while clients wait for a channel.
@@ -95,7 +96,11 @@ class ReplyChannels final : public ReplySink {
   std::atomic<std::uint64_t> looks_{0};
   mutable Mutex mutex_;
   Condition due_;
-  std::map<std::string, wire::dds::Topic*> topics_ TRAMMEL_GUARDED_BY(mutex_);                // by name
+  struct ReplyTopic {
+    wire::dds::Topic* topic = nullptr;
+    InsteadOf instead;
+  };
+  std::map<std::string, ReplyTopic> topics_ TRAMMEL_GUARDED_BY(mutex_);                       // by name
   std::map<std::string, std::shared_ptr<ReplyChannel>> channels_ TRAMMEL_GUARDED_BY(mutex_);  // by partition
   std::vector<std::shared_ptr<ReplyChannel>> closed_ TRAMMEL_GUARDED_BY(mutex_);  // perhaps still in use by a sender
   ChannelBook book_ TRAMMEL_GUARDED_BY(mutex_);

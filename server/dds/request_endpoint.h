@@ -13,6 +13,7 @@
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_call.h"
 #include "server/dds/schedule/lane.h"
+#include "server/dds/sent_type.h"
 #include "server/dds/stillness.h"
 
 namespace trammel {
@@ -55,9 +56,9 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lanes lanes) {
     const auto request_topic = wire::make_received_topic<Operation>(core.participant, core.unreadable);
     if (!request_topic) return tl::make_unexpected(request_topic.error());
-    const auto reply_topic = wire::make_reply_topic<Operation>(core.participant);
+    const auto reply_topic = make_sent_topic<Operation>(core.participant);
     if (!reply_topic) return tl::make_unexpected(reply_topic.error());
-    core.channels.add_topic(*reply_topic);
+    core.channels.add_topic(*reply_topic, instead_of<typename Operation::Reply::type>);
     std::unique_ptr<RequestEndpoint> endpoint(new RequestEndpoint(core, lanes, (*reply_topic)->get_name()));
     const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
     endpoint->reader_ = core.subscriber.create_datareader(*request_topic, wire::call_reader_qos(wire::kRequestDepth),

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "server/base/check.h"
+#include "server/base/plain_text.h"
 
 namespace trammel {
 
@@ -31,7 +32,7 @@ std::string class_of(const std::string& kind) { return kind.empty() ? "" : fmt::
 
 std::string html_text(std::string_view text) {
   std::string html;
-  for (const char c : text) html += escaped(c);
+  for (const char c : shown_lines(text)) html += escaped(c);
   return html;
 }
 

@@ -9,7 +9,7 @@
 
 namespace trammel {
 
-/// Text that shows as it stands, whatever it holds.
+/// Text that shows as it stands, whatever it holds; what controls a terminal is spelled out (plain_text.h).
 [[nodiscard]] std::string html_text(std::string_view text);
 
 /// A row of a table; its cells are HTML.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <system_error>
 
 #include "server/base/name_check.h"
 #include "server/base/text_file.h"
@@ -318,12 +319,20 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
   });
 }
 
+/// Of a file that a file names. Nobody who starts a program knows that it would wait for a pipe there.
+Result<std::string> file_text_of(const std::string& path) {
+  std::error_code unknown;
+  if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
+    return refused("no file, but a pipe, a device or a folder").in(path);
+  return read_text_file(path);
+}
+
 /// The text of the robot file that the cell names. Its path is relative to the cell file.
 Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
   const Result<std::string> name = read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); });
   if (!name) return tl::make_unexpected(name.error());
   robot_path = (std::filesystem::path(path).parent_path() / *name).string();
-  return read_text_file(robot_path).map_error([&](Error error) {
+  return file_text_of(robot_path).map_error([&](Error error) {
     return Failure(std::move(error)).of("robot").next(fmt::format("{} names it as its robot", path)).value();
   });
 }

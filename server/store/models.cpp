@@ -130,7 +130,7 @@ Result<int> version_of(const Result<ChangeOutcome>& outcome) {
 Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
   const auto text = read_text_file(copy.file);
   if (!text) return tl::make_unexpected(text.error());
-  return deserialize(*text, copy.file);
+  return deserialize(*text, copy.file, ModelTexts::kAsTheyAre);
 }
 
 int next_version(SQLite::Database& database, const std::string& cell) {
@@ -264,7 +264,8 @@ Result<std::string> Store::model_text(const std::string& cell, int version) cons
 Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
   const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
   const auto content = model_text(cell, version);
-  auto stored = content ? deserialize(*content, where) : Result<CompensatedModel>(tl::make_unexpected(content.error()));
+  auto stored = content ? deserialize(*content, where, ModelTexts::kAsTheyAre)
+                        : Result<CompensatedModel>(tl::make_unexpected(content.error()));
   if (stored) return stored;
   for (const ServedCopies::Copy& copy : connection_->copies->of(cell)) {
     if (copy.version != version) continue;

@@ -24,10 +24,7 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kMaxBatchId = 128;            // bytes
-constexpr std::size_t kMaxLevel = 16384;            // bytes
 constexpr std::size_t kMaxSources = 500;            // as in a cell file
-constexpr std::size_t kMaxBatches = 1000;           // of one training
 constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
@@ -35,7 +32,7 @@ constexpr int kKeeperNiceness = 5;  // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
-  return check_name(id, "batch", kMaxBatchId);
+  return check_name(id, "batch");
 }
 
 Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
@@ -46,7 +43,7 @@ Status check_most(const char* field, std::size_t asked, std::size_t most, const 
 /// Level and bias of a training that is asked for; empty: as usual.
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
-    if (Status fits = check_most("level", level.size(), kMaxLevel, "bytes"); !fits) return fits;
+    if (Status fits = check_most("level", level.size(), kMostSpellingBytes, "bytes"); !fits) return fits;
     const auto specs = parse_level(level);
     if (!specs) return tl::make_unexpected(specs.error());
     if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
@@ -315,7 +312,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
-  if (const Status fits = check_most("batches", batch_ids.size(), kMaxBatches, "batches in one training"); !fits)
+  if (const Status fits = check_most("batches", batch_ids.size(), kMostBatches, "batches in one training"); !fits)
     return tl::make_unexpected(fits.error());
   const bool release = quarantine == Quarantine::kReleased;
   if (release && batch_ids.empty())

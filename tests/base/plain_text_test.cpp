@@ -37,6 +37,14 @@ TEST(PlainText, ANameThatControlsATerminalOrIsNoTextIsRefusedAndShownHarmless) {
       {"\xe2\x80\xae", "\\u202e"},         // what follows is written from right to left
       {"\xe2\x80\xa8", "\\u2028"},         // a line separator
       {"\xef\xbb\xbf", "\\ufeff"},         // a mark that nobody sees
+      {"a\xe2\x80\x8b", "a\\u200b"},       // a space without width
+      {"\xe2\x81\xa0", "\\u2060"},         // a joiner that nobody sees
+      {"\xc2\xad", "\\u00ad"},             // a hyphen that nobody sees
+      {"\xef\xb8\x8f", "\\ufe0f"},         // a selector of variants
+      {"\xf3\xa0\x81\x81", "\\ue0041"},    // a tag
+      {"\xef\xb7\x90", "\\ufdd0"},         // no character
+      {"\xef\xbf\xbf", "\\uffff"},         // no character
+      {"\xf0\x9f\xbf\xbe", "\\u1fffe"},    // no character
       {"\xff", "\\xff"},                   // no UTF-8 at all
       {"\xc3", "\\xc3"},                   // cut
       {"\xc0\xaf", "\\xc0\\xaf"},          // overlong

@@ -318,6 +318,51 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
             Refusal("cell.model (robot)").of(ErrorCode::kTooLarge).beyond(21, 20));
 }
 
+TEST(ModelFile, TextsAndTimesThatNobodyCanBeToldAreRefusedInAFileAndLeftInWhatWasAcceptedBefore) {
+  const auto with = [](const char* part, const std::function<void(json&)>& change) {
+    json file = json::parse(small_model_text());
+    change(file[part]);
+    file[fmt::format("{}hash", part == std::string("stamp") ? "stamp_" : "")] = sha256_hex(file[part].dump());
+    return file.dump();
+  };
+  const auto provenance = [&](const char* key, const std::string& text) {
+    return with("content", [&](json& content) { content["provenance"][key] = text; });
+  };
+  const auto stamp = [&](const char* key, const json& value) {
+    return with("stamp", [&](json& its) { its[key] = value; });
+  };
+  const std::string escape = "\x1b[31m";
+  const std::vector<std::string> wrong = {
+      provenance("level", std::string(4097, 'x')),
+      provenance("level", escape),
+      provenance("batch_id", "a+" + std::string(257, 'b')),
+      provenance("batch_id", repeated("a+", 1000)),
+      provenance("batch_id", "a\nb"),
+      provenance("batch_hash", std::string(257, 'h')),
+      provenance("batch_hash", "a\xe2\x80\x8b"),
+      with("content",
+           [&](json& c) {
+             c["suspects"] = {{{"pose_id", escape}, {"row", 1}, {"distance_m", 0}, {"sigmas", 1}}};
+           }),
+      with("content",
+           [&](json& c) {
+             c["unidentifiable"] = {{{"singular_value", 0}, {"parameters", {"a"}}, {"sentence", "see\x1b[2J"}}};
+           }),
+      stamp("program_version", escape),
+      stamp("program_version", std::string(257, '1')),
+      stamp("trained_at", std::int64_t{1} << 62),
+      stamp("trained_at", std::numeric_limits<std::int64_t>::min()),
+      stamp("measured_at", -1),
+      stamp("measured_at", 253'402'300'800)};
+  for (const std::string& text : wrong) {
+    EXPECT_FALSE(deserialize(text, "cell.model")) << text.substr(0, 300);
+    EXPECT_TRUE(deserialize(text, "cell.model", ModelTexts::kAsTheyAre)) << text.substr(0, 300);
+  }
+  EXPECT_EQ(refusal_with(wrong.front()),
+            Refusal("cell.model", {}, "level").of(ErrorCode::kTooLarge).beyond(4097, 4096));
+  EXPECT_EQ(refusal_with(provenance("batch_id", repeated("a+", 999) + std::string(256, 'b'))), Refusal::none());
+}
+
 TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
   const auto bias_of = [](const std::string& kernel, std::size_t poses) {
     const auto matrix = [](std::size_t rows, std::size_t columns, double value) {

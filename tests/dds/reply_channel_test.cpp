@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "server/dds/codec.h"
+#include "server/dds/sent_type.h"
+
 namespace trammel {
 namespace {
 
@@ -47,6 +50,24 @@ TEST_F(ParkedChannelsTest, WhatIsLeftOverIsDeletedOnceNobodyLeavesAnyMore) {
   EXPECT_EQ(parked_.size(), 30u);
   while (parked_.tend(now_ + 3 * wire::kLease)) continue;
   EXPECT_EQ(parked_.size(), 8u);
+}
+
+TEST_F(ParkedChannelsTest, AReplyThatTheWireCannotCarryIsAnsweredByAnError) {
+  const auto topic = make_sent_topic<wire::PredictError>(*participant_);
+  ASSERT_TRUE(topic);
+  const auto to = channel("client");
+  wire::PredictErrorReply reply;
+  reply.header().contract_version(wire::CONTRACT_VERSION);
+  reply.header().related_request_id().sequence_number(7);
+  EXPECT_TRUE(ReplyWriter::make(*to->publisher(), *topic, [] {})->write(&reply));
+  reply.model().level(std::string(wire::MAX_SPELLING + 1, 'x'));
+  EXPECT_FALSE(ReplyWriter::make(*to->publisher(), *topic, [] {})->write(&reply));
+  const auto error = std::static_pointer_cast<wire::PredictErrorReply>(instead_of<wire::PredictErrorReply>(&reply));
+  EXPECT_EQ(error->header().result(), wire::RESULT_INTERNAL);
+  EXPECT_EQ(error->header().related_request_id().sequence_number(), 7);
+  EXPECT_TRUE(ReplyWriter::make(
+                  *to->publisher(), *topic, [] {}, instead_of<wire::PredictErrorReply>)
+                  ->write(&reply));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <future>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -150,6 +151,27 @@ TEST_F(ServiceTest, ATextThatANulWouldCutShortIsNotSent) {
   EXPECT_EQ(submitted.error().code, ErrorCode::kRefused);
   EXPECT_EQ(refusal_of(submitted), Refusal("batch lt-07", 42));
   EXPECT_FALSE(session->import_model("cell-7", torn));
+}
+
+TEST_F(ServiceTest, AModelWhoseTextsNoReplyCanCarryAnswersAndIsListed) {
+  server_.start();
+  test::Backend& backend = server_.backend();
+  CompensatedModel::Parts parts = test::shifted_model(backend.cell, 1e-4).parts();
+  parts.provenance.level = std::string(wire::MAX_SPELLING + 1, 'L');
+  parts.provenance.batch_id = "\x1b[31m" + std::string(3 * wire::MAX_SENTENCE, 'B');
+  parts.provenance.batch_hash = std::string("h\0h", 3) + std::string(wire::MAX_ID, 'h');
+  parts.provenance.trained_at = std::numeric_limits<std::int64_t>::min();
+  parts.provenance.measured_at = std::numeric_limits<std::int64_t>::max();
+  const CompensatedModel model = CompensatedModel::make(parts).value();
+  const int version = backend.store->add_model("cell-7", model, 0, true, "").value();
+  backend.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", version, model}));
+  const auto session = open_session(server_.options());
+  const auto answer = session->predict_error(kCell7, {kJoints});
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_EQ(answer->model.level, std::string(wire::MAX_SPELLING, 'L'));
+  EXPECT_TRUE(answer->model.batch_id.starts_with("\\u001b[31mBBB")) << answer->model.batch_id.substr(0, 30);
+  const auto listed = session->models("cell-7");
+  EXPECT_TRUE(listed) << listed.error().message;
 }
 
 TEST_F(ServiceTest, LongCallsGoInParts) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "idl/transport.h"
+#include "server/base/name_check.h"
 #include "server/dds/dds_options.h"
 
 namespace trammel::wire {
@@ -41,6 +42,13 @@ const std::vector<Row>& rows() {
     return read;
   }();
   return kRows;
+}
+
+TEST(WireDocument, WhatModelFilesMayHoldTheWireCanCarry) {
+  EXPECT_EQ(kMostNameBytes, MAX_ID);
+  EXPECT_EQ(kMostSpellingBytes, MAX_SPELLING);
+  EXPECT_EQ(kMostSentenceBytes, MAX_SENTENCE);
+  EXPECT_EQ(kMostBatches, MAX_BATCHES);
 }
 
 TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {

@@ -7,6 +7,8 @@ namespace {
 
 TEST(Html, TextStaysText) { EXPECT_EQ(html_text("<b> & \"x\""), "&lt;b&gt; &amp; &quot;x&quot;"); }
 
+TEST(Html, WhatControlsATerminalIsSpelledOut) { EXPECT_EQ(html_text("a\x1b[31m\nb"), "a\\u001b[31m\nb"); }
+
 TEST(Html, ATableHasACellForEachTextAndARowSaysWhatItIs) {
   const HtmlTable table = {.kind = "k",
                            .head = {"a", "b"},

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/robot/cell.h"
 #include "tests/support/refusal.h"
+#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
@@ -81,6 +83,14 @@ TEST(CellFile, RefusesWithFileKeyAndReason) {
   EXPECT_EQ(refusal(cell + "cell: twice\n", robot), Refusal("cell.yaml", 3, "cell"));
   EXPECT_EQ(refusal("", robot), Refusal("cell.yaml"));
   EXPECT_FALSE(read_cell("/no/such/cell.yaml"));
+}
+
+TEST(CellFile, ARobotFileThatIsAPipeIsRefusedAndNotWaitedFor) {
+  const test::TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo(folder.file("robot.yaml").c_str(), 0600), 0);
+  const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string text = with(cell, "../models/abb_irb6640-205-275.yaml", "robot.yaml");
+  EXPECT_EQ(refusal_of(read_cell(folder.write("cell.yaml", text))), Refusal(folder.file("robot.yaml"), {}, "robot"));
 }
 
 TEST(CellFile, TheOnlyToolNeedsNoName) {

@@ -199,7 +199,7 @@ Result<Made> to_made(const Frame& frame) {
   made.outcome.verdict = job_verdict_of(frame.head.at("verdict").get<std::string>()).value_or(JobVerdict::kOpen);
   made.outcome.why = frame.head.at("why");
   if (frame.text.empty()) return made;
-  auto model = deserialize(frame.text, "the model that was made");
+  auto model = deserialize(frame.text, "the model that was made", ModelTexts::kAsTheyAre);
   if (!model) return tl::make_unexpected(model.error());
   made.model = std::move(*model);
   return made;

@@ -236,7 +236,7 @@ Result<std::shared_ptr<const ServedModel>> Workbench::in_force() {
 
 Result<ServedModel> Workbench::loaded(const ModelText& text) const {
   const std::string which = fmt::format("version {} of cell {}", text.version, task_.cell->name);
-  auto model = deserialize(text.text, which);
+  auto model = deserialize(text.text, which, ModelTexts::kAsTheyAre);
   if (!model) return tl::make_unexpected(model.error());
   if (const Status fits = check_fits_cell(*model, *task_.cell, which); !fits) return tl::make_unexpected(fits.error());
   return ServedModel{task_.cell->name, text.version, std::move(*model)};
