@@ -20,6 +20,9 @@ constexpr double kChance = 1e-4;  // of a false change in all sessions together
 constexpr double kAsGood = 9.2;   // twice the log likelihood: 1 in 100
 constexpr double kLeastSeen = 1;  // information of a candidate, prior units: below it these poses do not show it
 constexpr double kLeastInflation = 1;
+constexpr std::size_t kFewestToWander = 4;  // sessions
+constexpr double kSlowest = 1e-4;           // prior standard deviations a session
+constexpr int kRates = 60;
 
 /// The chance that chi-squared of that many degrees of freedom exceeds x.
 double chi_square_tail(int freedom, double x) {
@@ -32,10 +35,10 @@ double chi_square_tail(int freedom, double x) {
 
 /// A kind of change; its columns among those of all kinds.
 struct Kind {
-  std::string spelling;  ///< up to the pose at which it begins
+  std::string spelling, behind;  ///< up to the pose at which it begins, and behind it
   Index first = 0, count = 0;
 
-  [[nodiscard]] std::string from(int index) const { return fmt::format("{}@{}", spelling, index + 1); }
+  [[nodiscard]] std::string from(int index) const { return fmt::format("{}@{}{}", spelling, index + 1, behind); }
 };
 
 /// A model that has every kind of change from the first pose on, at nothing, behind the parameters of `model`.
@@ -45,7 +48,7 @@ class AllKinds {
     for (const CauseRecord* cause : all_causes()) {
       // What belongs to a session alone, such as where its tracker stood, is no change of the arm.
       if (cause->lasting != causes::Lasting::kFromAPose || cause->scope == causes::Scope::kSession) continue;
-      if (cause->scope != causes::Scope::kJoint) add(std::string(cause->spelling));
+      if (cause->scope != causes::Scope::kJoint) add_of_arm(*cause);
       for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j)
         add(fmt::format("{}:{}", cause->spelling, j + 1));
     }
@@ -57,15 +60,22 @@ class AllKinds {
   [[nodiscard]] std::vector<Index> changes() const { return sorted(true); }
 
  private:
-  void add(const std::string& spelling) {
-    Result<ErrorSourcePtr> source = make_error_source(spelling + "@1", *probe_.cell);
+  /// Of several tools each by itself, where the cause takes one.
+  void add_of_arm(const CauseRecord& cause) {
+    const std::size_t tools = probe_.cell->tools.size();
+    const bool each = cause.takes_numbers && tools > 1;
+    for (std::size_t k = 1; k <= (each ? tools : 1); ++k)
+      add(std::string(cause.spelling), each ? fmt::format("+{}", k) : "");
+  }
+  void add(const std::string& spelling, const std::string& behind = "") {
+    Result<ErrorSourcePtr> source = make_error_source(spelling + "@1" + behind, *probe_.cell);
     if (!source) return;
     const auto count = static_cast<Index>((*source)->parameters().size());
     const Index first = add_source(probe_, std::move(*source));
     for (Index& at : places_) at += at >= first ? count : 0;
     Index next = 0;
     for (const Kind& kind : kinds_) next += kind.count;
-    kinds_.push_back({spelling, next, count});
+    kinds_.push_back({spelling, behind, next, count});
     for (Index k = 0; k < count; ++k) places_.push_back(first + k);
   }
   [[nodiscard]] std::vector<Index> sorted(bool of_kinds) const {
@@ -162,9 +172,10 @@ class ChangeSearch {
     }
     const auto best = std::max_element(all.begin(), all.end(),
                                        [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+    const Wandering wandering = most_wandering(inflation);
+    if (wandering.kind != nullptr && (best == all.end() || wandering.gain > best->gain)) return told(wandering);
     if (best == all.end()) return std::nullopt;
-    const double chance = std::min(
-        1.0, static_cast<double>(all.size()) * chi_square_tail(static_cast<int>(best->kind->count), best->gain));
+    const double chance = chance_of(static_cast<int>(best->kind->count), best->gain, all.size());
     if (chance > kChance) return std::nullopt;
     Change change{best->kind->from(first_of(best->session)), best->session, best->gain, chance, {}};
     for (const Scored& other : all) {
@@ -180,6 +191,73 @@ class ChangeSearch {
     std::size_t session = 0;
     double gain = 0, evidence = 0;
   };
+
+  struct Wandering {
+    const Kind* kind = nullptr;
+    double rate = 0, gain = 0;  // prior standard deviations a session; twice the log likelihood
+  };
+
+  static double chance_of(int freedom, double gain, std::size_t candidates) {
+    return std::min(1.0, static_cast<double>(candidates) * chi_square_tail(freedom, gain));
+  }
+
+  /// The one number that a random walk from session to session explains best, where that is beyond chance.
+  [[nodiscard]] Wandering most_wandering(double inflation) const {
+    Wandering best;
+    if (sessions_.size() < kFewestToWander) return best;
+    for (const Kind& kind : kinds_.kinds()) {
+      if (kind.count != 1) continue;
+      const Wandering one = wandering_of(kind, inflation);
+      if (one.gain > best.gain) best = one;
+    }
+    if (best.kind != nullptr && chance_of(1, best.gain, kinds_.kinds().size()) > kChance) return {};
+    return best;
+  }
+  /// Steps z of unit variance times the rate, summed up: the evidence of the rate is that of a Gaussian prior.
+  [[nodiscard]] Wandering wandering_of(const Kind& kind, double inflation) const {
+    const auto S = static_cast<Index>(sessions_.size());
+    const auto P = static_cast<Index>(own_.size());
+    VectorXd own(S - 1), along(S - 1);
+    MatrixXd shared(S - 1, P);
+    for (Index s = 1; s < S; ++s) {
+      Seen seen;
+      seen.add(whole_[static_cast<std::size_t>(s)], block(static_cast<std::size_t>(s)));
+      own(s - 1) = seen.own(kind.first, kind.first);
+      shared.row(s - 1) = seen.shared.row(kind.first);
+      along(s - 1) = seen.gradient(kind.first);
+    }
+    MatrixXd left = -(shared * factor_.solve(shared.transpose()));
+    left.diagonal() += own;
+    const MatrixXd sums = MatrixXd::Ones(S - 1, S - 1).triangularView<Eigen::Lower>();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(sums.transpose() * left * sums);
+    const VectorXd strength =
+        (eigen.eigenvectors().transpose() * (sums.transpose() * along)).array().square() / inflation;
+    Wandering best{&kind, 0, 0};
+    for (int k = 0; k < kRates; ++k) {
+      const double variance = std::pow(kSlowest, 2 - 2.0 * k / kRates);
+      double gain = 0;
+      for (Index i = 0; i < strength.size(); ++i) {
+        const double seen = 1 + variance * std::max(0.0, eigen.eigenvalues()(i));
+        gain += variance * strength(i) / seen - std::log(seen);
+      }
+      if (gain > best.gain) best = {&kind, std::sqrt(variance), gain};
+    }
+    return best;
+  }
+  [[nodiscard]] Change told(const Wandering& wandering) const {
+    const double scale = s_.scale(changes_[static_cast<std::size_t>(wandering.kind->first)]);
+    Change change{wandering.kind->from(first_of(1)),
+                  0,
+                  wandering.gain,
+                  chance_of(1, wandering.gain, kinds_.kinds().size()),
+                  {},
+                  wandering.rate * scale,
+                  {}};
+    for (std::size_t s = 1; s < sessions_.size(); ++s)
+      change.steps.push_back(fmt::format("{}+{:.6f}", wandering.kind->from(first_of(s)), 1e3 * change.rate));
+    change.source = change.steps.front();
+    return change;
+  }
 
   [[nodiscard]] int first_of(std::size_t session) const { return sessions_[session].first; }
   /// Null for the newest session, where the base itself moves.

@@ -174,7 +174,7 @@ Status CompensatedModel::check_trained_with(const std::string& tool, const std::
 }
 
 bool CompensatedModel::is_own(const MeasurementBatch& batch) const {
-  return batch_hash(batch) == parts().provenance.batch_hash;
+  return batch.as_then || batch_hash(batch) == parts().provenance.batch_hash;
 }
 
 void CompensatedModel::add_rotations(const MeasurementBatch& batch, const std::vector<PoseContext>& poses,

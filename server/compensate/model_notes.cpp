@@ -138,8 +138,33 @@ std::string size_of(const CompensatedModel::Parts& parts, const Change& change) 
   return fmt::format("{}", fmt::join(numbers, ", "));
 }
 
+/// `joint 3 wanders`: how fast, and how far it is by now.
+std::string wandering_sentence(const CompensatedModel::Parts& parts, const Change& change) {
+  double moved = 0;
+  std::vector<Eigen::Index> places;
+  Eigen::Index next = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const bool is_step = std::find(change.steps.begin(), change.steps.end(), source->name()) != change.steps.end();
+    for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
+      if (!is_step) continue;
+      places.push_back(next);
+      moved += parts.parameters[static_cast<std::size_t>(next)].value;
+    }
+  }
+  const double variance = parts.covariance(places, places).sum();
+  return fmt::format(
+      "slow drift: {}, {:.4f} mrad from session to session (a random walk); since session {} it has moved by {:.4f} ± "
+      "{:.4f} mrad (U, k=2)",
+      cause_in_words(change.source), 1e3 * change.rate, parts.sessions.front().id, 1e3 * moved,
+      2e3 * std::sqrt(std::max(0.0, variance)));
+}
+
 void add_changes(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
   for (const Change& change : parts.changes) {
+    if (change.rate > 0) {
+      notes.push_back(wandering_sentence(parts, change));
+      continue;
+    }
     const SessionSetting& since = parts.sessions[change.session];
     std::string note = fmt::format("since session {} (pose {}): {} ({}; U, k=2)", since.id, since.first_pose,
                                    cause_in_words(change.source), size_of(parts, change));

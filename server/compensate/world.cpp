@@ -42,14 +42,19 @@ Result<Pose> located(const CompensatedModel& model, const MeasurementBatch& sess
   return X_WB * X_SB->inverse();
 }
 
-constexpr double kOtherSetUp = 3;  // times what is left where the rows themselves put it
-constexpr double kSlack = 1e-4;    // m
+constexpr double kOtherSetUp = 3;          // times what is left where the rows themselves put it
+constexpr double kSlack = 1e-4;            // m
+constexpr int kAfterEverything = 1 << 20;  // index of a pose after all sessions
 
 /// m rms, of what the model leaves of the rows, seen from there.
-double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Pose& X_WS) {
+double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Pose& X_WS, int index) {
   MeasurementBatch rows = known_rows(model, session);
+  rows.as_then = true;
   if (rows.measurements.empty()) return 0;
-  for (Measurement& m : rows.measurements) m.p_W = X_WS * m.p_W;
+  for (Measurement& m : rows.measurements) {
+    m.p_W = X_WS * m.p_W;
+    m.context.index = index;
+  }
   return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
 }
 
@@ -58,7 +63,8 @@ double left_of(const CompensatedModel& model, const MeasurementBatch& session, c
 bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session, const SessionSetting& known) {
   const Result<Pose> X_WS = located(model, session);
   if (!X_WS) return true;
-  return left_of(model, session, known.X_WS) <= kOtherSetUp * left_of(model, session, *X_WS) + kSlack;
+  return left_of(model, session, known.X_WS, known.first) <=
+         kOtherSetUp * left_of(model, session, *X_WS, known.first) + kSlack;
 }
 
 /// The batch is one session.
@@ -67,7 +73,11 @@ MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& b
   const SessionSetting* known = known_session(model, batch, said);
   if (known == nullptr || !is_same_set_up(model, batch, *known)) return batch;
   MeasurementBatch here = batch;
-  for (Measurement& m : here.measurements) m.session = 0;
+  here.as_then = !model.parts().changes.empty();
+  for (Measurement& m : here.measurements) {
+    m.session = 0;
+    m.context.index = known->first;
+  }
   return aligned(std::move(here), {*known}, model.cell().tracker);
 }
 
@@ -76,6 +86,7 @@ MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& b
 Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (!has_sessions(batch)) return InWorld{of_one(model, batch)};
   std::vector<SessionSetting> settings = settings_of(batch);
+  std::vector<int> index(settings.size(), kAfterEverything);
   InWorld world;
   const std::vector<MeasurementBatch> sessions = by_session(batch);
   for (std::size_t s = 0; s < sessions.size(); ++s) {
@@ -84,6 +95,7 @@ Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatc
       settings[s].X_WS = known->X_WS;
       settings[s].own_noise = known->own_noise;
       settings[s].own_noise_rotation = known->own_noise_rotation;
+      index[s] = known->first;
       continue;
     }
     const Result<Pose> X_WS = located(model, sessions[s]);
@@ -92,6 +104,8 @@ Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatc
     world.located.push_back(batch.sessions[s]);
   }
   world.batch = aligned(batch, settings, model.cell().tracker);
+  world.batch.as_then = !model.parts().changes.empty();
+  for (Measurement& m : world.batch.measurements) m.context.index = index[static_cast<std::size_t>(m.session)];
   return world;
 }
 

@@ -15,7 +15,8 @@ struct InWorld {
 
 /// Moves each session of `batch` (checked against the model's cell) into the world of the model: where the model knows
 /// the session and the rows fit it, as it was found in training; else, where the batch has several, as its own rows fit
-/// the model best. A batch of one session that the model does not know was measured in that world. Refuses a session
+/// the model best. Poses of sessions that the model knows are placed in time, so that a change that came later does not
+/// count for them. A batch of one session that the model does not know was measured in that world. Refuses a session
 /// whose rows do not tell where its instrument stood.
 [[nodiscard]] Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch);
 

@@ -61,8 +61,8 @@ wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) 
 /// Its targets are known, its model is taken.
 class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetReply> {
  public:
-  PortionedCorrections(Subject subject, std::vector<Target> targets)
-      : subject_(std::move(subject)), targets_(std::move(targets)) {
+  PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent)
+      : subject_(std::move(subject)), targets_(std::move(targets)), recent_(recent) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
     reply_.corrections().resize(targets_.size());
   }
@@ -70,15 +70,26 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
   void compute(std::size_t first, std::size_t count) override {
     const CompensatedModel& model = subject_.served->model;
     for (std::size_t i = first; i < first + count; ++i) {
-      reply_.corrections()[i] =
-          to_wire(model.correct(targets_[i], subject_.tool, subject_.payload), model.cell().robot);
+      const Correction correction = model.correct(targets_[i], subject_.tool, subject_.payload);
+      reply_.corrections()[i] = to_wire(correction, model.cell().robot);
+      if (i == first && correction.q.size() > 0) remember(correction.q);  // one of each portion stands for it
     }
   }
   wire::CorrectTargetReply take() override { return std::move(reply_); }
 
  private:
   const Subject subject_;
+  void remember(const JointVector& q) {
+    PoseContext asked;
+    asked.q = q;
+    asked.tool = subject_.tool;
+    asked.payload = subject_.payload;
+    asked.served = true;
+    recent_.add(subject_.served->cell, std::move(asked));
+  }
+
   const std::vector<Target> targets_;
+  RecentPoses& recent_;  // of the trainer, which outlives every request
   wire::CorrectTargetReply reply_;
 };
 
@@ -97,7 +108,7 @@ Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& 
     if (!target) return tl::make_unexpected(target.error());
     targets.push_back(*target);
   }
-  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets));
+  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets), trainer_.recent_poses());
 }
 
 Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {

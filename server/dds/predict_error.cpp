@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 namespace trammel {
 namespace {
 
+constexpr std::size_t kPosesTold = 20;  // of a request, as what is asked for lately
 constexpr double kNotLearned = std::numeric_limits<double>::quiet_NaN();
 
 wire::PredictedError to_wire(const ErrorPrediction& prediction) {
@@ -93,6 +95,10 @@ Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& r
     if (!pose) return tl::make_unexpected(pose.error());
     poses.push_back(std::move(*pose));
   }
+  // The last ones stand for all.
+  const std::size_t told = std::min<std::size_t>(poses.size(), kPosesTold);
+  for (std::size_t i = poses.size() - told; i < poses.size(); ++i)
+    trainer_.recent_poses().add(request.about().cell(), poses[i]);
   return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses));
 }
 

@@ -6,12 +6,15 @@ namespace trammel {
 
 namespace {
 
-/// A joint loses its zero at a pose and keeps the new one.
+constexpr double kUsualSlip = 2e-3;  // rad
+
+/// A joint loses its zero at a pose and keeps the new one. A second number, mrad, says how far that usually is.
 class JointSlip final : public JointError {
  public:
   explicit JointSlip(const SourceSpec& spec)
       : JointError(spec.text, spec.joint,
-                   {angle_parameter(fmt::format("slip{}@{:.0f}", spec.joint + 1, spec.at[0]), 2e-3)}),
+                   {angle_parameter(fmt::format("slip{}@{:.0f}", spec.joint + 1, spec.at[0]),
+                                    spec.at.size() > 1 ? 1e-3 * spec.at[1] : kUsualSlip)}),
         first_(static_cast<int>(spec.at[0]) - 1) {}
   const CauseRecord& cause() const override { return causes::joint_slip(); }
   std::string explanation() const override {
@@ -48,6 +51,7 @@ const CauseRecord& causes::joint_slip() {
       .shown_by = remedies::kReflectors.text,
       .action = "check this joint's brake, coupling and calibration marks, and update its revolution counter",
       .figures = {{"slip", "rad", "how far the zero is off"}},
+      .takes_numbers = true,
       .whole_batch = WholeBatch{"joint {} lost its zero", false},
   };
   return record;

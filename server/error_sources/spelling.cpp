@@ -53,8 +53,9 @@ Result<SourceSpec> parse_spec(const std::string& text, const CauseRecord& known,
       spec.at.push_back(value);
     }
   }
+  const std::size_t most = known.takes_numbers ? 2 : 1;
   if (known.lasting == Lasting::kFromAPose &&
-      (spec.at.size() != 1 || spec.at[0] != std::floor(spec.at[0]) || spec.at[0] > kMostPoses)) {
+      (spec.at.empty() || spec.at.size() > most || spec.at[0] != std::floor(spec.at[0]) || spec.at[0] > kMostPoses)) {
     return failure(ErrorCode::kUsage, "error source '{}': expected {}@pose, the row of the batch at which it begins",
                    text, text.substr(0, at));
   }
@@ -145,7 +146,7 @@ std::string in_words(const CauseRecord& record, const std::string& spelling) {
   std::string words = plain_name(record, of_joint ? joint - 1 : -1);
   if (!behind.empty() && !of_joint) words += fmt::format(" ({})", behind);
   if (at != std::string::npos && record.lasting == Lasting::kFromAPose)
-    words += fmt::format(" from row {} on", spelling.substr(at + 1));
+    words += fmt::format(" from row {} on", spelling.substr(at + 1, spelling.find('+', at) - at - 1));
   return words;
 }
 

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -43,27 +44,31 @@ class Tool final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// From a pose on, the tool sits elsewhere on the flange: it was changed, or knocked.
+/// From a pose on, a tool sits elsewhere on the flange: it was changed, or knocked. `tool` is its name; empty: any.
 class ToolChanged final : public ErrorSource {
  public:
-  explicit ToolChanged(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {
-    add_six(parameters_, fmt::format("@{}", first_ + 1));
+  ToolChanged(const SourceSpec& spec, std::string tool)
+      : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1), tool_(std::move(tool)) {
+    add_six(parameters_, fmt::format("@{}{}", first_ + 1, tool_.empty() ? "" : "[" + tool_ + "]"));
   }
   const CauseRecord& cause() const override { return causes::tool_changed(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
-    return fmt::format("the tool was changed or knocked before pose {}", first_ + 1);
+    return fmt::format("the tool{} was changed or knocked before pose {}", tool_.empty() ? "" : " " + tool_,
+                       first_ + 1);
   }
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    if (context.from(first_)) move_tool(values, state, jacobian, first_column);
+    if (context.from(first_) && (tool_.empty() || context.tool == tool_))
+      move_tool(values, state, jacobian, first_column);
   }
 
  private:
   std::string name_;
   int first_;
+  std::string tool_;
   std::vector<Parameter> parameters_;
 };
 
@@ -73,8 +78,12 @@ std::vector<causes::Figure> tool_figures() {
 }
 
 Result<ErrorSourcePtr> make_tool(const SourceSpec&, const Cell& cell) { return std::make_shared<Tool>(cell); }
-Result<ErrorSourcePtr> make_tool_changed(const SourceSpec& spec, const Cell&) {
-  return std::make_shared<ToolChanged>(spec);
+Result<ErrorSourcePtr> make_tool_changed(const SourceSpec& spec, const Cell& cell) {
+  if (spec.at.size() < 2) return std::make_shared<ToolChanged>(spec, "");
+  if (spec.at[1] != std::floor(spec.at[1]) || spec.at[1] > static_cast<double>(cell.tools.size()))
+    return failure(ErrorCode::kUsage, "error source '{}': tool {:g} of {}, in the order of their names", spec.text,
+                   spec.at[1], cell.tools.size());
+  return std::make_shared<ToolChanged>(spec, std::next(cell.tools.begin(), static_cast<int>(spec.at[1]) - 1)->first);
 }
 
 }  // namespace
@@ -116,6 +125,7 @@ const CauseRecord& causes::tool_changed() {
       .shown_by = "a second tool, or reference reflectors on the flange",
       .action = "find out what knocked or changed the tool at that pose; measure again after it",
       .figures = tool_figures(),
+      .takes_numbers = true,
       .whole_batch = WholeBatch{"the tool is another one, or sits elsewhere on the flange", true},
   };
   return record;

@@ -41,6 +41,7 @@ struct MeasurementBatch {
   /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch is one. A session
   /// has a frame W of its own, because the tracker was set up anew.
   std::vector<std::string> sessions = {};
+  bool as_then = false;  ///< its poses are placed by their index among those of a model: what began later had not begun
 };
 
 /// The batch with measured_at set: the latest `time_s` if that column is Unix time, else `taken_in`. `taken_in` is when

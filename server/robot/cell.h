@@ -52,7 +52,8 @@ struct Cell {
   std::vector<std::pair<double, double>> joint_ranges;  ///< rad, of this cell; empty = the robot's limits
   std::optional<Workspace> workspace;
   SessionRule sessions;
-  std::string cell_yaml;  ///< the texts it was read from, kept so that a stored model is self-contained
+  std::optional<double> step_limit;  ///< m: a model that moves a pose recently asked for by more waits for a person
+  std::string cell_yaml;             ///< the texts it was read from, kept so that a stored model is self-contained
   std::string robot_yaml;
 };
 

@@ -201,6 +201,12 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
     if (map.has("sessions")) cell.sessions = read_sessions(map);
   });
   map.attempt([&] {
+    if (!map.has("step_limit_mm")) return;
+    cell.step_limit = from_mm(map.number("step_limit_mm"));
+    if (!(*cell.step_limit > 0))
+      map.refuse("step_limit_mm", refused("must be above 0").beyond(to_mm(*cell.step_limit), 0));
+  });
+  map.attempt([&] {
     if (!map.has("workspace_mm")) return;
     const YamlMap box = map.map("workspace_mm");
     box.only({"lower", "upper"});
@@ -228,7 +234,7 @@ CellRules read_rules(const YamlMap& map) {
 
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm", "sessions", "tolerance_mm", "prior"});
+            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)

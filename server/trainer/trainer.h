@@ -100,6 +100,8 @@ class Trainer {
   /// The batches that are kept out, without their text, of one cell or (empty) of all.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
+  /// Tell it what the cells are asked for.
+  [[nodiscard]] RecentPoses& recent_poses() { return history_.recent_poses(); }
   /// See ModelHistory. A version that was imported is judged first, as a new one would be: where it is worse on the
   /// same poses than the one in force it is refused with the figures, unless `force` says that it is wanted.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},

@@ -7,6 +7,7 @@
 #include <iostream>
 
 #include "server/base/units.h"
+#include "server/compensate/model_file.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 
@@ -28,6 +29,36 @@ struct Outcome {
   bool changed = false;
   std::string what;
 };
+
+/// What `attack` makes of a model of a good first day.
+Outcome outcome_of(const World& world, std::uint64_t seed, const std::function<std::string(LearningCell&)>& attack) {
+  LearningCell cell(world.cell);
+  cell.submit(measured_on(world.robot, {.seed = seed}));
+  Outcome outcome;
+  outcome.before = true_error(cell.model(), world.robot);
+  const int version = cell.in_force();
+  outcome.what = "\n      " + attack(cell);
+  outcome.after = true_error(cell.model(), world.robot);
+  outcome.changed = cell.in_force() != version;
+  return outcome;
+}
+
+/// A batch that comes with the question what is wrong, to be applied.
+std::string applied_inline(LearningCell& cell, MeasurementBatch batch) {
+  batch.source_text.clear();
+  const auto job = cell.trainer().diagnose("cell-7", "", to_csv(batch), true);
+  return job ? cell.finished(*job).what : sentence(job.error());
+}
+
+/// A model that was trained elsewhere, from few and noisy poses.
+std::string imported(LearningCell& cell, const World& world, std::uint64_t seed) {
+  LearningCell elsewhere(world.cell);
+  elsewhere.submit(measured_on(world.robot, {.poses = 40, .seed = seed, .noise = 3}));
+  const auto version = cell.trainer().import_model("cell-7", serialize(elsewhere.model()));
+  if (!version) return sentence(version.error());
+  const Status activated = cell.trainer().activate("cell-7", *version);
+  return activated ? "activated" : sentence(activated.error());
+}
 
 /// What `days` make of a model from `first`; judged by the robot as it is at the end.
 Outcome outcome(const World& world, const VirtualRobot& at_the_end, const std::vector<MeasurementBatch>& days,
@@ -91,13 +122,27 @@ std::vector<std::pair<std::string, Case>> attacks() {
                         {measured_on(world.robot, {.seed = seed}),
                          judged_by_copies(measured_on(world.robot, {.poses = 40, .seed = seed + 500, .corner = 0.3}))});
        }},
-      {"six batches of 60, noise 1.35 to 3.1",
+      {"ten batches of 60, noise 1.2 to 3",
        [](std::uint64_t seed) {
          const World world;
          std::vector<MeasurementBatch> days{measured_on(world.robot, {.seed = seed})};
-         for (const double noise : {1.35, 1.7, 2.05, 2.4, 2.75, 3.1})
-           days.push_back(measured_on(world.robot, {.poses = 60, .seed = seed + 37 * days.size(), .noise = noise}));
+         for (int k = 1; k <= 10; ++k) {
+           days.push_back(measured_on(
+               world.robot, {.poses = 60, .seed = seed + 37 * days.size(), .noise = 1 + 0.2 * k, .set_up_anew = true}));
+         }
          return outcome(world, world.robot, days);
+       }},
+      {"inline apply of a corner, tracker set up anew, 40 poses",
+       [](std::uint64_t seed) {
+         const World world;
+         const Day day{.poses = 40, .seed = seed + 500, .corner = 0.3, .set_up_anew = true};
+         return outcome_of(world, seed,
+                           [&](LearningCell& cell) { return applied_inline(cell, measured_on(world.robot, day)); });
+       }},
+      {"import of a model of 40 noisy poses",
+       [](std::uint64_t seed) {
+         const World world;
+         return outcome_of(world, seed, [&](LearningCell& cell) { return imported(cell, world, seed + 500); });
        }},
       {"80 poses of another tool alone, for the first tool",
        [](std::uint64_t seed) {
@@ -128,7 +173,14 @@ std::vector<std::pair<std::string, Case>> gains() {
                       measured_on(changed, {.poses = poses, .seed = seed + 500, .set_up_anew = anew})});
     };
   };
-  return {{"400 good poses after 40 noisy ones", more_poses(false)},
+  const auto better_noise = [](std::uint64_t seed) {
+    const World world;
+    return outcome(world, world.robot,
+                   {measured_on(world.robot, {.seed = seed, .noise = 3}),
+                    measured_on(world.robot, {.seed = seed + 500, .set_up_anew = true})});
+  };
+  return {{"200 poses after 200 with three times the noise, tracker set up anew", better_noise},
+          {"400 good poses after 40 noisy ones", more_poses(false)},
           {"the same, tracker set up anew", more_poses(true)},
           {"joint 2 changed by 1 mrad, 200 poses", joint_2(200, false)},
           {"the same, 120 poses", joint_2(120, false)},

@@ -31,7 +31,8 @@ TEST(JudgingRows, AreAFifthAndOfAHundredPosesAtLeastThirtyFour) {
   EXPECT_EQ(judging_rows(batch_of(100), kShare, 1).size(), 34U);
   EXPECT_EQ(judging_rows(batch_of(200), kShare, 1).size(), 40U);
   EXPECT_EQ(judging_rows(batch_of(200), kShare, 1), judging_rows(batch_of(200), kShare, 1));
-  EXPECT_TRUE(judging_rows(batch_of(1), kShare, 1).empty()) << "one row at least stays for training";
+  EXPECT_EQ(judging_rows(batch_of(8), kShare, 1).size(), 2U);
+  EXPECT_TRUE(judging_rows(batch_of(7), kShare, 1).empty()) << "each of a few poses is needed to learn from";
 }
 
 TEST(JudgingRows, AreThoseThatAPlainSplitDraws) {

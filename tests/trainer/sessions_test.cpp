@@ -175,5 +175,103 @@ TEST(Sessions, AFileOfOneThatTheModelKnowsIsEvaluatedWhereItsTrackerStood) {
   EXPECT_LT(model.evaluate(anew.batch).compensated.rms, 3e-5);
 }
 
+TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
+  const auto cell = test::cell_7();
+  VirtualRobot robot = test::chapter_5_robot(cell);
+  std::vector<CheckedBatch> batches;
+  const std::vector<double> steps = {0, 6e-5, -3e-5, 8e-5, 5e-5, -7e-5, 4e-5, 9e-5, 3e-5, 6e-5};
+  double moved = 0;
+  for (std::size_t s = 0; s < steps.size(); ++s) {
+    robot = test::with_zero_off(robot, 3, steps[s]);
+    moved += steps[s];
+    batches.push_back(checked(measured_on(robot, {.poses = 40, .seed = 50 + s, .set_up_anew = true}),
+                              fmt::format("day-{}", s + 1), *cell));
+  }
+  const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
+  ASSERT_EQ(model.parts().changes.size(), 1u);
+  const Change& drift = model.parts().changes.front();
+  EXPECT_NEAR(drift.rate, 6e-5, 4e-5);
+  EXPECT_EQ(drift.steps.size(), steps.size() - 1);
+  EXPECT_LT(true_error(model, robot), 1e-5);
+  EXPECT_NE(notes_of(model).front().find(fmt::format("it has moved by {:.2f}", 1e3 * moved)), std::string::npos)
+      << notes_of(model).front();
+  EXPECT_EQ(serialize(test::demand(deserialize(serialize(model), "again"))), serialize(model));
+}
+
+TEST(Sessions, TenPosesAfterAToolChangeRefitTheToolAlone) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  VirtualRobot after = robot;
+  after.truth.tools.at("spindle").translation() += Vector3(0.002, -0.001, 0.0015);
+  after.truth.tools.at("spindle").linear() =
+      (rotation_exp(Vector3(3e-3, 1e-3, -2e-3)) * after.truth.tools.at("spindle").linear()).eval();
+  const CheckedBatch many = checked(measured_on(robot, {.poses = 200, .seed = 3}), "many", *cell);
+  const CheckedBatch ten = checked(measured_on(after, {.poses = 10, .seed = 4, .set_up_anew = true}), "ten", *cell);
+  const CompensatedModel model = test::demand(train(cell, joined({many, ten}), kPhysics));
+  ASSERT_EQ(model.parts().changes.size(), 1u);
+  EXPECT_EQ(model.parts().changes.front().source, "tool_changed@201");
+  EXPECT_LT(true_error(model, after), 3e-5);
+  EXPECT_GT(true_error(test::demand(train(cell, many, kPhysics)), after), 2e-4);
+}
+
+TEST(Sessions, ThreePosesAfterACollisionNameTheJoint) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch many = checked(measured_on(robot, {.poses = 200, .seed = 3}), "many", *cell);
+  for (int joint = 2; joint <= 5; ++joint) {
+    const VirtualRobot after = test::with_zero_off(robot, joint, 2e-3);
+    const CheckedBatch three =
+        checked(measured_on(after, {.poses = 3, .seed = 4 + static_cast<std::uint64_t>(joint), .set_up_anew = true}),
+                "three", *cell);
+    const CompensatedModel model = test::demand(train(cell, joined({many, three}), kPhysics));
+    ASSERT_FALSE(model.parts().changes.empty()) << "joint " << joint;
+    EXPECT_EQ(model.parts().changes.front().source, fmt::format("joint_slip:{}@201", joint));
+    EXPECT_LT(true_error(model, after), 1e-4);
+  }
+}
+
+TEST(Sessions, OnePoseMoreDoesNoHarm) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch many = checked(measured_on(robot, {.poses = 60, .seed = 3}), "many", *cell);
+  const CheckedBatch one = checked(measured_on(robot, {.poses = 1, .seed = 5, .set_up_anew = true}), "one", *cell);
+  const double before = true_error(test::demand(train(cell, many, kPhysics)), robot);
+  EXPECT_LT(true_error(test::demand(train(cell, joined({many, one}), kPhysics)), robot), 1.01 * before);
+}
+
+TEST(Sessions, ASecondToolTellsATurnedToolFromALostZero) {
+  auto two = std::make_shared<Cell>(*test::cell_7());
+  Pose probe = *two->tools.at("spindle");
+  probe.translation() += Vector3(0.03, 0.05, 0.12);
+  two->tools["probe"] = probe;
+  const std::shared_ptr<const Cell> cell = two;
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const auto measured_by_both = [&](const VirtualRobot& arm, std::uint64_t seed, const std::string& id) {
+    MeasurementBatch both = measured_on(arm, {.poses = 60, .seed = seed, .tool = "spindle"});
+    for (Measurement m : measured_on(arm, {.poses = 60, .seed = seed + 1, .tool = "probe"}).measurements) {
+      m.pose_id = "probe-" + m.pose_id;
+      m.context.index = static_cast<int>(both.measurements.size());
+      both.measurements.push_back(std::move(m));
+    }
+    both.source_text.clear();
+    return checked(std::move(both), id, *cell);
+  };
+  VirtualRobot knocked = robot;
+  knocked.truth.tools.at("probe").linear() =
+      (rotation_exp(Vector3(0, 0, 1e-3)) * knocked.truth.tools.at("probe").linear()).eval();
+  const auto change_of = [&](const VirtualRobot& after) {
+    const CompensatedModel model = test::demand(
+        train(cell, joined({measured_by_both(robot, 1, "before"), measured_by_both(after, 11, "after")}), kPhysics));
+    return model.parts().changes;
+  };
+  const std::vector<Change> slipped = change_of(test::with_zero_off(robot, 6, 1e-3));
+  ASSERT_EQ(slipped.size(), 1u);
+  EXPECT_EQ(slipped.front().source, "joint_slip:6@121");
+  EXPECT_TRUE(slipped.front().could_also_be.empty());
+  const std::vector<Change> turned = change_of(knocked);
+  ASSERT_EQ(turned.size(), 1u);
+  EXPECT_EQ(turned.front().source, "tool_changed@121+1");
+}
+
 }  // namespace
 }  // namespace trammel

@@ -247,6 +247,7 @@ ordered_json changes_json(const CompensatedModel::Parts& parts) {
     json["source"] = change.source;
     json["strength"] = change.gain;
     json["p_value"] = change.p_value;
+    if (change.rate > 0) json["wanders_rad_per_session"] = change.rate;
     std::size_t next = 0;
     for (const ErrorSourcePtr& source : parts.physics.sources) {
       for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {

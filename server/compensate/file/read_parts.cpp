@@ -120,6 +120,9 @@ void read_sessions(const Json& content, ModelParts& parts) {
                                .gain = number_from(change, "gain"),
                                .p_value = number_from(change, "p_value"),
                                .could_also_be = change.at("could_also_be").get<std::vector<std::string>>()});
+      if (!change.contains("rate_rad")) continue;
+      parts.changes.back().rate = number_from(change, "rate_rad");
+      parts.changes.back().steps = change.at("steps").get<std::vector<std::string>>();
     }
   }
   if (!content.contains("sessions_left_out")) return;

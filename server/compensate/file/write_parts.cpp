@@ -105,11 +105,14 @@ Json json_of(const SessionSetting& session) {
 }
 
 Json json_of(const Change& change) {
-  return {{"source", change.source},
-          {"session", change.session},
-          {"gain", change.gain},
-          {"p_value", change.p_value},
-          {"could_also_be", change.could_also_be}};
+  Json json = {{"source", change.source},
+               {"session", change.session},
+               {"gain", change.gain},
+               {"p_value", change.p_value},
+               {"could_also_be", change.could_also_be}};
+  if (change.rate > 0) json["rate_rad"] = change.rate;
+  if (change.rate > 0) json["steps"] = change.steps;
+  return json;
 }
 
 Json json_of(const LeftOutSession& session) { return {{"id", session.id}, {"why", session.why}}; }

@@ -15,10 +15,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kSamePose = 1e-4;       // rad or m, in each joint
-constexpr double kSamePlace = 1e-6;      // m: of one measurement written twice; another one has noise of its own
-constexpr double kEnoughJudges = 34;     // poses: 30 after some turn out bad or out of range
-constexpr double kMostForJudges = 0.34;  // of the poses: fewer stay fewer
+constexpr double kSamePose = 1e-4;            // rad or m, in each joint
+constexpr double kSamePlace = 1e-6;           // m: of one measurement written twice; another one has noise of its own
+constexpr double kEnoughJudges = 34;          // poses: 30 after some turn out bad or out of range
+constexpr std::size_t kFewestToDrawFrom = 8;  // poses of a batch: of fewer each is needed to learn from
+constexpr double kMostForJudges = 0.34;       // of the poses: fewer stay fewer
 
 using Indices = std::vector<std::size_t>;
 
@@ -64,7 +65,7 @@ std::vector<Indices> drawn_poses(const MeasurementBatch& batch, double share, st
     return std::all_of(pose.begin(), pose.end(),
                        [&](std::size_t i) { return batch.measurements[i].set == MeasurementSet::kValidation; });
   });
-  if (poses.empty()) return {};
+  if (poses.size() < kFewestToDrawFrom) return {};
   MeasurementBatch drawn_from;
   drawn_from.measurements.resize(poses.size());
   const double wanted = judges_of(poses.size(), share) / static_cast<double>(poses.size());

@@ -12,9 +12,9 @@
 namespace trammel {
 
 /// The rows (Measurement::row) of `batch` that judge models: `share` of its poses and, of 100 poses and more, at
-/// least 34. Drawn by the service with `seed` from the rows that the submitter does not hold out himself (`set`), so
-/// that he can hold out more but not choose who judges. Repeats of a pose are drawn together: a copy of a judge is not
-/// learned from. Reproducible: same rows, share and seed, same judges.
+/// least 34; of fewer than 8 none. Drawn by the service with `seed` from the rows that the submitter does not hold out
+/// himself (`set`), so that he can hold out more but not choose who judges. Repeats of a pose are drawn together: a
+/// copy of a judge is not learned from. Reproducible: same rows, share and seed, same judges.
 [[nodiscard]] std::set<int> judging_rows(const MeasurementBatch& batch, double share, std::uint64_t seed);
 
 /// Holds out each row that judges, each copy of one that does, and what its submitter holds out (`set`).

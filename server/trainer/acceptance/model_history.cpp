@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/trainer/acceptance/fits_cell.h"
 
@@ -193,14 +194,30 @@ Result<int> ModelHistory::import_model(const std::string& cell, const std::strin
   return version;
 }
 
+GateVerdict ModelHistory::within_step_limit(GateVerdict verdict, const Candidate& candidate,
+                                            const ServedModel* present) const {
+  const std::optional<double>& limit = cells_.at(candidate.job.cell)->step_limit;
+  if (!verdict.put_in_force || present == nullptr || !limit) return verdict;
+  const auto step = farthest_step(present->model, candidate.model, recent_poses_.of(candidate.job.cell));
+  if (!step || *step <= *limit) return verdict;
+  verdict.put_in_force = false;
+  verdict.undecided = true;
+  verdict.why += fmt::format("; but a pose recently asked for would move by {:.4f} mm, limit {:g} mm", to_mm(*step),
+                             to_mm(*limit));
+  verdict.message = fmt::format("not in force: {}; version {} stays in force; activate the new one if it is wanted",
+                                verdict.why, present->version);
+  return verdict;
+}
+
 Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate, const Judging& judging,
                                                   const ServedModel* present) const {
   const auto may_release = store_.may_release(candidate.job.id);
   if (!may_release) return tl::make_unexpected(may_release.error());
   const auto others = opponents(candidate.job.cell, present);
   if (!others) return tl::make_unexpected(others.error());
-  const auto verdict = judging(*others);
-  if (!verdict) return tl::make_unexpected(verdict.error());
+  const auto judged_by_poses = judging(*others);
+  if (!judged_by_poses) return tl::make_unexpected(judged_by_poses.error());
+  const std::optional<GateVerdict> verdict = within_step_limit(*judged_by_poses, candidate, present);
   const bool released = *may_release && (verdict->put_in_force || verdict->undecided);
   std::string message = verdict->message + candidate.remarks;
   if (*may_release && !released)

@@ -13,6 +13,7 @@
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/gate.h"
+#include "server/trainer/acceptance/recent_poses.h"
 #include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/served_cells.h"
 
@@ -68,6 +69,10 @@ class ModelHistory {
   /// Cells that are not served with the model they should be served with, one sentence each.
   [[nodiscard]] std::vector<std::string> troubles() const;
 
+  /// What the cells were lately asked for: a candidate that moves one of these poses by more than the cell's step limit
+  /// is put in force by a person only.
+  [[nodiscard]] RecentPoses& recent_poses() { return recent_poses_; }
+
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
   /// Puts a stored version in force and publishes it. A version that is served already is not published again.
@@ -122,10 +127,15 @@ class ModelHistory {
   /// The version marked in force, where it could not be loaded.
   [[nodiscard]] Result<std::optional<RecordInForce>> record_not_loaded(const std::string& cell) const;
 
+  /// The verdict, unless the model would move what was lately asked for by more than the cell allows.
+  [[nodiscard]] GateVerdict within_step_limit(GateVerdict verdict, const Candidate& candidate,
+                                              const ServedModel* present) const;
+
   const ServedCells cells_;
   Store& store_;
   ModelRegistry& registry_;
   Listener listener_;
+  RecentPoses recent_poses_;
   std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
   mutable Mutex troubles_mutex_;           // taken last
   std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell

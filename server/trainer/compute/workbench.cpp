@@ -1,11 +1,13 @@
 #include "server/trainer/compute/workbench.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
+#include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnose.h"
 #include "server/diagnose/triage.h"
 #include "server/health/health_check.h"
@@ -87,6 +89,7 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const auto in_force = this->in_force();
   if (!in_force) return tl::make_unexpected(in_force.error());
   std::string seen;
+  bool changed = false;
   if (task_.hold_against_in_force) {
     const auto batch = batches_.first();
     if (!batch) return tl::make_unexpected(batch.error());
@@ -95,7 +98,8 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
     if (*in_force) {
       const Triage triaged = triage((*in_force)->model, *batch);
       if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
-      if (triaged.verdict != TriageVerdict::kClean) seen = "the batch: " + triaged.sentence;
+      changed = triaged.verdict != TriageVerdict::kClean;
+      if (changed) seen = "the batch: " + triaged.sentence;
     }
   }
   const auto batch = batches_.to_learn_from();
@@ -103,6 +107,9 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const bool as_usual = task_.level.empty() && task_.bias.empty();
   auto successor = train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(watch));
   if (!successor) return tl::make_unexpected(successor.error());
+  if (changed && !task_.earlier_ids.empty()) {
+    if (const Status chosen = choose_alone(*successor, watch); !chosen) return tl::make_unexpected(chosen.error());
+  }
   return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
 }
 
@@ -129,6 +136,25 @@ Result<Made> Workbench::checked(const ComputeWatch& watch) {
   made.outcome.why = health->sentence;
   made.message = to_string(health->verdict);
   return made;
+}
+
+Status Workbench::choose_alone(Successor& together, const ComputeWatch& watch) {
+  const auto own = batches_.first_without_older_judges();
+  if (!own) return tl::make_unexpected(own.error());
+  auto alone = train_successor(task_.cell, *own, in_force_.get(), train_options(watch));
+  if (!alone) return {};  // too little by itself
+  const std::vector<JudgingSession>& sessions = batches_.judging_sessions();
+  const auto session = std::find_if(sessions.begin(), sessions.end(),
+                                    [&](const JudgingSession& one) { return one.batch_id == own->id(); });
+  if (session == sessions.end()) return {};
+  const Eigen::Matrix3Xd before = located_errors(together.model, *session).position;
+  const Eigen::Matrix3Xd after = located_errors(alone->model, *session).position;
+  if (before.cols() == 0 || !before.allFinite() || !after.allFinite()) return {};
+  if (!paired_gain(before, after).beyond_chance()) return {};
+  alone->note += fmt::format("{}the arm has changed in more than one way: learned from this batch alone",
+                             alone->note.empty() ? "" : "; ");
+  together = std::move(*alone);
+  return {};
 }
 
 Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {

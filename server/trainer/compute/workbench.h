@@ -8,6 +8,7 @@
 #include "server/registry/model_registry.h"
 #include "server/trainer/compute/job_batches.h"
 #include "server/trainer/compute/task.h"
+#include "server/trainer/pipeline/successor.h"
 #include "server/trainer/pipeline/train.h"
 
 namespace trammel {
@@ -27,6 +28,9 @@ class Workbench : public Computing {
  private:
   [[nodiscard]] Result<Made> trained(const ComputeWatch& watch);
   [[nodiscard]] Result<Made> checked(const ComputeWatch& watch);
+  /// Puts a model of the own batch alone in place of one of all sessions where the arm has changed so that this one is
+  /// better beyond chance on the batch's judges.
+  [[nodiscard]] Status choose_alone(Successor& together, const ComputeWatch& watch);
   [[nodiscard]] Result<Made> diagnosed(const ComputeWatch& watch);
   /// With what the diagnosis of `batch` beside the sources `own` found.
   [[nodiscard]] Result<Made> extended(const CheckedBatch& batch, const std::vector<std::string>& own,

@@ -23,7 +23,7 @@ Result<IdentifiedSessions> without_idle_changes(const Identify& identify, Identi
                                                 const MeasurementBatch& batch) {
   for (std::size_t k = 0; k < found.changes.size() && found.changes.size() > 1;) {
     std::vector<std::string> fewer = names_of(found.calibration.model);
-    std::erase(fewer, found.changes[k].source);
+    for (const std::string& source : found.changes[k].sources()) std::erase(fewer, source);
     auto without = identify(fewer);
     if (!without) return tl::make_unexpected(without.error());
     const std::optional<Change> missed = strongest_change(*without, batch);
@@ -66,7 +66,7 @@ Result<IdentifiedSessions> identify_sessions(const Identify& identify, const std
     std::optional<Change> change = strongest_change(found.calibration, batch);
     if (!change) break;
     std::vector<std::string> more = names_of(found.calibration.model);
-    more.push_back(change->source);
+    for (std::string& source : change->sources()) more.push_back(std::move(source));
     auto with = identify(more);
     if (!with || with->log_likelihood <= found.calibration.log_likelihood) break;
     found.calibration = std::move(*with);
