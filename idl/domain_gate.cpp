@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "idl/guard/guard.h"
+#include "idl/heartbeat_pace.h"
 #include "idl/limits.h"
 #include "server/base/mutex.h"
 
@@ -111,6 +112,7 @@ class Gate final : public rtps::ChainingTransport {
       knows_itself_ = true;
     }
     if (guard_) guard_->sent(Bytes(buffer, size));
+    if (!pace_.lets_out(Bytes(buffer, size))) return true;
     return below->send(buffer, size, first, last, limit);
   }
 
@@ -158,6 +160,7 @@ class Gate final : public rtps::ChainingTransport {
   const std::uint32_t domain_;
   const std::shared_ptr<HeardOfItself> heard_;
   const std::unique_ptr<Guard> guard_;
+  HeartbeatPace pace_;
   std::atomic<bool> knows_itself_{false};
   Mutex mutex_;
   std::array<unsigned char, kPrefix> own_prefix_{};         // written once, before knows_itself_

@@ -53,7 +53,8 @@ void Watchdog::watch(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     never.wait_for(lock, stop, kTick, [] { return false; });
     const Clock::time_point now = Clock::now();
-    const auto stopped = stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(now - last));
+    const auto passed = std::min<Clock::duration>(now - last, kTick) * given_.since_last();
+    const auto stopped = stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(passed));
     last = now;
     if (!stopped.empty() && !stop.stop_requested()) end_hung(stopped);
   }

@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/dds/processor_share.h"
 #include "server/dds/stillness.h"
 
 namespace trammel {
@@ -16,7 +17,8 @@ inline constexpr int kExitHung = 70;
 /// no lock: the thread that hangs may hold any lock.
 [[noreturn]] void end_at_once(const char* line);
 
-/// Ends the process when one of `parts` stops moving. A daemon that has ended is started again by its supervisor; one
+/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was given the processor: one
+/// that is slow on a crowded machine does not hang. A daemon that has ended is started again by its supervisor; one
 /// that hangs is not. Checks from its own thread until it is destroyed.
 class Watchdog {
  public:
@@ -29,6 +31,7 @@ class Watchdog {
   void watch(const std::stop_token& stop);
 
   Stillness stillness_;
+  ProcessorShare given_;
   std::jthread thread_;
 };
 

@@ -50,7 +50,9 @@ std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job
 }
 
 constexpr const char* kJobColumns =
-    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, kind, started_at, finished_at, "
+    "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, "
+    "CASE WHEN EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, started_at, "
+    "finished_at, "
     "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s "
     "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON job_outcomes.job = jobs.id ";
 
@@ -70,17 +72,8 @@ JobOutcome outcome_of(SQLite::Statement& row) {
   return outcome;
 }
 
-std::string to_text(JobKind kind) {
-  switch (kind) {
-    case JobKind::kTrain:
-      return "train";
-    case JobKind::kDiagnose:
-      return "diagnose";
-    case JobKind::kCheck:
-      return "check";
-  }
-  return "train";
-}
+/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in health_checks, too.
+const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
 
 JobKind job_kind_of(const std::string& text) {
   return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
@@ -153,8 +146,10 @@ void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& 
 std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
   change(database,
          "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
-         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, to_text(job.kind));
-  return database.getLastInsertRowid();
+         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, stored_kind(job.kind));
+  const std::int64_t id = database.getLastInsertRowid();
+  if (job.kind == JobKind::kCheck) change(database, "INSERT INTO health_checks (job) VALUES (?)", id);
+  return id;
 }
 
 void insert_job_batches(SQLite::Database& database, std::int64_t job, const std::string& cell,
@@ -214,6 +209,18 @@ void record_job_end(SQLite::Database& database, std::int64_t id, const std::stri
   record_audit(database, {cell, "job", fmt::format("job {}", id), "open", verdict, message}, by);
 }
 
+const char* asked_for(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return "training asked";
+    case JobKind::kDiagnose:
+      return "diagnosis asked";
+    case JobKind::kCheck:
+      return "check asked";
+  }
+  return "training asked";
+}
+
 /// Queues the job that `insert` makes, or returns the one that was queued under this id before.
 template <typename Insert>
 Result<StoredJob> queue_once(SQLite::Database& database, const StoredJob& job, const ChangeId& change_id,
@@ -221,8 +228,7 @@ Result<StoredJob> queue_once(SQLite::Database& database, const StoredJob& job, c
   const auto queued = once(database, job.cell, change_id, [&] {
     return insert().map([&](const StoredJob& made) {
       record_audit(database,
-                   {made.cell, made.kind == JobKind::kDiagnose ? "diagnosis asked" : "training asked",
-                    fmt::format("job {}", made.id), "",
+                   {made.cell, asked_for(made.kind), fmt::format("job {}", made.id), "",
                     fmt::format("of {}{}{}", made.batch_ids.empty() ? "a batch sent with it" : "",
                                 fmt::join(made.batch_ids, ", "), made.level.empty() ? "" : ", level " + made.level)},
                    change_id);

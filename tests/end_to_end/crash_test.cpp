@@ -60,7 +60,7 @@ class CrashTest : public testing::Test {
       EXPECT_EQ(now.id, first_id_);
     } else {
       EXPECT_EQ(now.version, 2);
-      EXPECT_EQ(now.batch_id, "second");
+      EXPECT_EQ(now.batch_id, "first+second");
     }
   }
   /// With the service stopped: everything accepted is there, and everything is finished.

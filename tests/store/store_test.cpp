@@ -162,6 +162,17 @@ TEST_F(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
   EXPECT_EQ(store_->diagnosis(queued->id + 1).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
+  StoredJob asked = job();
+  asked.kind = JobKind::kCheck;
+  const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", false, "", ""});
+  ASSERT_TRUE(queued) << queued.error().message;
+  EXPECT_EQ(queued->kind, JobKind::kCheck);
+  reopen();
+  EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kCheck);
+  EXPECT_EQ(store_->audit()->rows.back().what, "check asked");
+}
+
 TEST_F(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
   std::vector<std::int64_t> jobs;
   for (int i = 0; i < 22; ++i) {

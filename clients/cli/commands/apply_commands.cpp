@@ -260,7 +260,7 @@ void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
   command
       .add_option("--tolerance", arguments.tolerance_mm,
-                  "Tell how many targets are expected within so many mm of where they are wanted, with 95 %")
+                  "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
       ->check(CLI::PositiveNumber)
       ->group(group);
   command

@@ -1,0 +1,67 @@
+// Of what the library repeats to everybody, only as much leaves as says something.
+#include "idl/heartbeat_pace.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/rtps_packet.h"
+
+namespace trammel::wire {
+namespace {
+
+using std::chrono::milliseconds;
+using test::Packet;
+using test::Prefix;
+
+constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kTheirReader = 0x000003c7;
+constexpr std::uint32_t kUserReader = 0x00000104, kUserWriter = 0x00000103;
+const HeartbeatPace::Time kStart{std::chrono::hours(1)};
+
+Packet offer(std::uint32_t writer) { return Packet(kSelf).heartbeat(kTheirReader, writer, 1, 9, 1); }
+
+TEST(HeartbeatPace, DiscoveryTellsEverybodyItsNumbersOnceInTwentyMilliseconds) {
+  HeartbeatPace pace;
+  int left = 0;
+  for (int ms = 0; ms < 1000; ++ms) {
+    left += pace.lets_out(offer(kPublications).bytes(), kStart + milliseconds(ms)) ? 1 : 0;
+  }
+  EXPECT_EQ(left, 50);
+}
+
+TEST(HeartbeatPace, WhatTheLibraryAppendsForItsStatisticsChangesNothing) {
+  HeartbeatPace pace;
+  const auto message = offer(kPublications).submessage(kStatistics, 1, test::PacketBytes(56)).bytes();
+  EXPECT_TRUE(pace.lets_out(message, kStart));
+  EXPECT_FALSE(pace.lets_out(message, kStart + milliseconds(1)));
+}
+
+TEST(HeartbeatPace, WritersAndReadersAreToldOfApart) {
+  HeartbeatPace pace;
+  EXPECT_TRUE(pace.lets_out(offer(kPublications).bytes(), kStart));
+  EXPECT_TRUE(pace.lets_out(offer(kSubscriptions).bytes(), kStart));
+  EXPECT_FALSE(pace.lets_out(offer(kSubscriptions).bytes(), kStart + milliseconds(1)));
+}
+
+TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
+  HeartbeatPace pace;
+  for (int i = 0; i < 3; ++i) {
+    const auto message = Packet(kSelf).to(kOther).heartbeat(kTheirReader, kPublications, 1, 9, 1).bytes();
+    EXPECT_TRUE(pace.lets_out(message, kStart));
+  }
+}
+
+TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
+  HeartbeatPace pace;
+  for (int i = 0; i < 3; ++i) {
+    test::DataFields data;
+    data.writer = kPublications;
+    EXPECT_TRUE(pace.lets_out(offer(kPublications).data(data).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out(Packet(kSelf).data(data).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out(Packet(kSelf).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out(Packet(kSelf).acknack(kTheirReader, kPublications, 1, 0, 1).bytes(), kStart));
+    EXPECT_TRUE(pace.lets_out({}, kStart));
+  }
+}
+
+}  // namespace
+}  // namespace trammel::wire
