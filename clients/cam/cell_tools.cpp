@@ -39,11 +39,6 @@ std::string difference_text(const ProgramTool& tool, const std::string& name, co
                      to_deg(angle(*tool.X_FT, X_FT)));
 }
 
-/// A load that programs state where they do not know it.
-bool is_placeholder(const StatedLoad& load) {
-  return load.mass <= 0 || (load.mass <= 1 && load.p_F.norm() <= 1e-3 + 1e-9);
-}
-
 bool same_load(const StatedLoad& load, const Payload& payload) {
   return std::abs(load.mass - payload.mass) <= std::max(0.1, kLoadMassTolerance * payload.mass) &&
          (load.p_F - payload.p_FoCog_F).norm() <= kLoadCentreTolerance;
@@ -158,6 +153,10 @@ class Choosing {
 };
 
 }  // namespace
+
+bool is_placeholder(const StatedLoad& load) {
+  return load.mass <= 0 || (load.mass <= 1 && load.p_F.norm() <= 1e-3 + 1e-9);
+}
 
 Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
                                              const CellTools& cell, const std::string& tool,

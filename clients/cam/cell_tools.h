@@ -27,6 +27,9 @@ constexpr double kToolRotationTolerance = 9e-5;  // rad, 0.005 deg; and what the
 constexpr double kLoadMassTolerance = 0.02;      // of the mass
 constexpr double kLoadCentreTolerance = 5e-3;    // m
 
+/// A load that programs state where they do not know it: at most 1 kg at most 1 mm from the flange.
+[[nodiscard]] bool is_placeholder(const StatedLoad& load);
+
 /// One choice a tool of the program; `used` says which of them targets need. `tool` and `payload` are what the user
 /// said, or empty. Refuses with both values and their difference: a tool that is not the cell's of that name, tools of
 /// which none is the cell's, a load that is not the cell's. A tool that is not in the files must be named as one of the

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/robot/wrist.h"
 
 namespace trammel::cam {
 
@@ -10,6 +11,7 @@ namespace {
 
 constexpr double kNoBranch = 1e9;
 constexpr int kBranches = 8;
+constexpr double kStretched = 1e-9;  // rad: a wrist that is open less is stretched
 
 /// The chain without joints in front.
 Result<Chain> arm_of(const Chain& robot, std::size_t first) {
@@ -134,7 +136,12 @@ std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pos
   }
   if (best == nullptr) return std::nullopt;
   chosen = best->conf;
-  return best->q;
+  if (!previous) return best->q;
+  // Where the wrist is stretched joint 4 may be anywhere: it stays.
+  const auto wrist = wrist_opening(arm, best->q, kStretched);
+  if (!wrist) return best->q;
+  const JointVector held = turned_idly(arm, best->q, *wrist, (*previous)(3));
+  return arm.joint_outside_limits(held) ? best->q : held;
 }
 
 NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, double>& external,

@@ -5,10 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "clients/cam/configuration.h"
 #include "clients/cam/edits.h"
+#include "clients/cam/nominal_targets.h"
+#include "clients/cam/path_check.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -28,20 +29,6 @@ Pose from_wire(const client::PoseMm& pose) {
   return make_pose(R.normalized().toRotationMatrix(), Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
 }
 
-client::PoseMm to_wire(const Pose& X_BT) {
-  const Eigen::Quaterniond R(X_BT.linear());
-  const Vector3 p = X_BT.translation() * to_mm(1);
-  return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
-}
-
-/// rad, of a rail mm.
-std::vector<double> to_wire(const JointVector& q, const Chain& robot) {
-  std::vector<double> wire;
-  for (int j = 0; j < robot.size(); ++j)
-    wire.push_back(robot.joint(j).type == JointType::kRevolute ? q(j) : to_mm(q(j)));
-  return wire;
-}
-
 JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
   JointVector q(robot.size());
   for (int j = 0; j < robot.size(); ++j) {
@@ -51,12 +38,6 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
   return q;
 }
 
-std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes) {
-  if (coordinates == Coordinates::kJointRadians) {
-    for (double& axis : axes) axis = to_deg(axis);
-  }
-  return axes;
-}
 /// Of degrees.
 std::vector<double> axes_of(Coordinates coordinates, std::vector<double> axes) {
   if (coordinates == Coordinates::kJointRadians) {
@@ -65,33 +46,31 @@ std::vector<double> axes_of(Coordinates coordinates, std::vector<double> axes) {
   return axes;
 }
 
-/// Targets of one tool and payload of the cell, asked for together.
-struct Group {
-  std::string tool, payload;
-  std::vector<std::size_t> targets;
-};
+Status check_marks(const Program& program) {
+  for (const SourceFile& file : program.files) {
+    const auto mark = find_mark(file.text);
+    if (!mark) continue;
+    return refused("it is corrected already, by model {} on {}", shown_short(mark->model), shown_short(mark->date))
+        .in(file.name)
+        .next("correct the original, or --again takes the one that is kept beside it");
+  }
+  return {};
+}
 
 class Correcting {
  public:
-  Correcting(const Program& program, const Chain& robot, const CellTools& cell, const CorrectProgramOptions& options)
+  Correcting(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
+             const CorrectProgramOptions& options, NominalTargets nominal)
       : program_(program),
-        arm_(robot),
+        arm_(arm),
         cell_(cell),
         options_(options),
-        asked_(program.targets.size()),
-        why_not_(program.targets.size()),
-        rows_(program.targets.size()) {}
+        nominal_(std::move(nominal)),
+        rows_(program.targets.size()) {
+    result_.notes = nominal_.notes;
+  }
 
   Result<CorrectedProgram> correct(const AskCorrections& ask) {
-    if (const Status fresh = check_marks(); !fresh) return tl::make_unexpected(fresh.error());
-    std::vector<bool> used(program_.tools.size(), false);
-    for (const ProgramTarget& target : program_.targets) used[target.tool] = true;
-    Result<std::vector<ToolChoice>> choices = choose_tools(program_, used, cell_, options_.tool, options_.payload);
-    if (!choices) return tl::make_unexpected(choices.error());
-    choices_ = std::move(*choices);
-    note_tools();
-    find_moving_axes();
-    find_joints();
     edits_.resize(program_.files.size());
     for (std::size_t t = 0; t < program_.targets.size(); ++t) begin_row(t);
     if (const Status answered = ask_all(ask); !answered) return tl::make_unexpected(answered.error());
@@ -99,98 +78,6 @@ class Correcting {
   }
 
  private:
-  [[nodiscard]] Status check_marks() const {
-    for (const SourceFile& file : program_.files) {
-      const auto mark = find_mark(file.text);
-      if (!mark) continue;
-      return refused("it is corrected already, by model {} on {}", shown_short(mark->model), shown_short(mark->date))
-          .in(file.name)
-          .next("correct the original, or --again takes the one that is kept beside it");
-    }
-    return {};
-  }
-
-  void note_tools() {
-    for (const ToolChoice& choice : choices_) {
-      if (!choice.note.empty()) result_.notes.push_back(choice.note);
-    }
-  }
-
-  /// External axes that the cell has no rail for: the robot stands still only where they do.
-  void find_moving_axes() {
-    std::map<int, std::set<double>> values;
-    for (const ProgramTarget& target : program_.targets) {
-      for (const auto& [axis, value] : target.external) values[axis].insert(value);
-    }
-    const int rails = arm_.has_rail() ? 1 : 0;
-    for (const auto& [axis, seen] : values) {
-      if (axis >= rails && seen.size() > 1) moving_axes_.insert(axis);
-    }
-  }
-
-  void find_joints() {
-    // In the order of the motions, since one motion may leave its configuration to the one before.
-    std::map<std::size_t, std::optional<JointVector>> last;
-    std::vector<bool> done(program_.targets.size(), false);
-    const auto one = [&](std::size_t t) {
-      std::optional<JointVector>& previous = last[program_.targets[t].file];
-      if (!done[t]) find_joints(t, previous);
-      done[t] = true;
-      if (joints_of_.contains(t)) previous = joints_of_[t];
-    };
-    for (const ProgramMove& move : program_.moves) {
-      for (const std::size_t t : move.targets) one(t);
-    }
-    for (std::size_t t = 0; t < program_.targets.size(); ++t) {
-      if (!done[t]) one(t);
-    }
-  }
-
-  void find_joints(std::size_t t, const std::optional<JointVector>& previous) {
-    const ProgramTarget& target = program_.targets[t];
-    const ToolChoice& choice = choices_[target.tool];
-    if (!choice.why_not.empty()) {
-      why_not_[t] = choice.why_not;
-      return;
-    }
-    for (const auto& [axis, value] : target.external) {
-      if (!moving_axes_.contains(axis)) continue;
-      why_not_[t] = fmt::format("external axis {} moves, and the cell has none", static_cast<char>('a' + axis));
-      return;
-    }
-    client::TargetMm& asked = asked_[t];
-    if (is_joints(target.coordinates)) {
-      const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
-      if (!q) {
-        why_not_[t] = "the program does not say where the rail is";
-        return;
-      }
-      asked.joint_target = true;
-      asked.seed_rad = to_wire(*q, arm_.robot());
-      joints_of_[t] = *q;
-      return;
-    }
-    const Pose X_BT = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers);
-    asked.pose = to_wire(X_BT);
-    const NominalJoints found =
-        arm_.joints(X_BT * cell_.tools.at(choice.tool).inverse(), target.configuration, target.external, previous);
-    if (found.q) {
-      asked.seed_rad = to_wire(*found.q, arm_.robot());
-      joints_of_[t] = *found.q;
-      if (outside(*found.q) && found.conf && !arm_.has_rail()) {
-        // So that the answer names the branches that would reach it.
-        asked.seed_rad.clear();
-        asked.conf = found.conf;
-      }
-    } else if (found.conf && !arm_.has_rail()) {
-      asked.conf = found.conf;
-    } else {
-      why_not_[t] = found.why_not;
-    }
-  }
-
-  [[nodiscard]] bool outside(const JointVector& q) const { return arm_.robot().joint_outside_limits(q).has_value(); }
-
   void begin_row(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     ReceiptRow& row = rows_[t];
@@ -205,33 +92,17 @@ class Correcting {
     row.before = target.numbers;
     row.folded = target.folded;
     row.status = "refused";
-    row.message = why_not_[t];
-    if (is_joints(target.coordinates) && joints_of_.contains(t)) {
-      const Pose X_FT = cell_.tools.at(choices_[target.tool].tool);
-      row.p_B = (arm_.robot().flange_pose(joints_of_[t]) * X_FT).translation();
-    }
-    if (!is_joints(target.coordinates))
-      row.p_B = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers).translation();
+    row.message = nominal_.targets[t].why_not;
+    if (const auto X_BT = wanted_pose(program_, arm_.robot(), cell_, nominal_, t)) row.p_B = X_BT->translation();
   }
 
   Status ask_all(const AskCorrections& ask) {
-    std::vector<Group> groups;
-    for (std::size_t t = 0; t < program_.targets.size(); ++t) {
-      if (!why_not_[t].empty()) continue;
-      const ToolChoice& choice = choices_[program_.targets[t].tool];
-      const auto same = std::find_if(groups.begin(), groups.end(), [&](const Group& group) {
-        return group.tool == choice.tool && group.payload == choice.payload;
-      });
-      if (same == groups.end())
-        groups.push_back({choice.tool, choice.payload, {t}});
-      else
-        same->targets.push_back(t);
-    }
-    for (const Group& group : groups) {
+    for (const TargetGroup& group : groups_of(program_, nominal_)) {
       std::vector<client::TargetMm> targets;
-      for (const std::size_t t : group.targets) targets.push_back(asked_[t]);
+      for (const std::size_t t : group.targets) targets.push_back(std::move(nominal_.targets[t].asked));
       const Result<client::Answer<client::CorrectedTarget>> answer = ask(group.tool, group.payload, targets);
       if (!answer) return tl::make_unexpected(answer.error());
+      targets = {};
       if (!result_.model_id.empty() && result_.model.hash != answer->model.hash)
         return failure(ErrorCode::kBusy, "the model changed while the program was corrected").next("try again");
       result_.model = answer->model;
@@ -257,14 +128,11 @@ class Correcting {
     row.iterations = item.iterations;
     if (item.status != "ok" && item.status != "out_of_domain") return;
     const Pose X_BT = from_wire(item.commanded);
-    const Pose X_TF = cell_.tools.at(choices_[target.tool].tool).inverse();
+    const Pose X_TF = cell_.tools.at(nominal_.tools[target.tool].tool).inverse();
     JointVector q = from_wire(item.q_rad, arm_.robot());
-    if (arm_.has_rail() && joints_of_.contains(t)) {
-      // The rail stays where the program has it.
-      JointVector seed = joints_of_[t];
-      q = arm_.near(X_BT * X_TF, seed);
-    }
-    row.joints = to_wire(q, arm_.robot());
+    // The rail stays where the program has it.
+    if (const auto& nominal = nominal_.targets[t].q; arm_.has_rail() && nominal) q = arm_.near(X_BT * X_TF, *nominal);
+    row.joints = joints_on_wire(q, arm_.robot());
     for (int j = 0; j < q.size(); ++j) {
       if (arm_.robot().joint(j).type == JointType::kRevolute) row.joints[static_cast<std::size_t>(j)] = to_deg(q(j));
     }
@@ -272,6 +140,7 @@ class Correcting {
         is_joints(target.coordinates)
             ? axes_of(target.coordinates, arm_.to_axes(q))
             : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
+    row.correction_B = X_BT.translation() - row.p_B;
     write(target, exact, row);
     row.rounding_mm = rounding(target, exact, row.after, q, X_TF);
     row.error_after_mm = std::hypot(row.error_after_mm, row.rounding_mm);
@@ -341,7 +210,8 @@ class Correcting {
                                                                   [&](std::size_t t) { return rows_[t].corrected(); });
       if (corrected) ++result_.moves_corrected;
     }
-    for (ReceiptRow& row : rows_) result_.rows.push_back(std::move(row));
+    check_path(program_, arm_.robot(), nominal_, rows_, result_);
+    result_.rows = std::move(rows_);
     for (const LeftAlone& left : program_.left) {
       ReceiptRow& row = result_.rows.emplace_back();
       row.name = left.name;
@@ -373,22 +243,18 @@ class Correcting {
     } else {
       edits_[f].insert_line(place.at, fmt::format("{}{}{}", place.begin, fmt::join(words, " "), place.end));
     }
-    Edits::Applied applied = edits_[f].apply(file.text);
+    Edits::Applied applied = std::move(edits_[f]).apply(file.text);
     for (Edits::Applied::Line& line : applied.inserted)
       result_.inserted.push_back({file.name, line.number, std::move(line.text)});
     result_.files.push_back({file.name, std::move(applied.text)});
   }
 
   const Program& program_;
-  const ArmOfProgram arm_;
+  const ArmOfProgram& arm_;
   const CellTools& cell_;
   const CorrectProgramOptions& options_;
-  std::vector<ToolChoice> choices_;
-  std::vector<client::TargetMm> asked_;
-  std::vector<std::string> why_not_;  ///< of each target; empty: asked
+  NominalTargets nominal_;
   std::vector<ReceiptRow> rows_;
-  std::map<std::size_t, JointVector> joints_of_;
-  std::set<int> moving_axes_;
   std::vector<Edits> edits_;
   CorrectedProgram result_;
 };
@@ -402,7 +268,11 @@ std::size_t CorrectedProgram::left_alone() const {
 
 Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot, const CellTools& cell,
                                          const AskCorrections& ask, const CorrectProgramOptions& options) {
-  return Correcting(program, robot, cell, options).correct(ask);
+  if (const Status fresh = check_marks(program); !fresh) return tl::make_unexpected(fresh.error());
+  const ArmOfProgram arm(robot);
+  Result<NominalTargets> nominal = nominal_targets(program, arm, cell, options.tool, options.payload);
+  if (!nominal) return tl::make_unexpected(nominal.error());
+  return Correcting(program, arm, cell, options, std::move(*nominal)).correct(ask);
 }
 
 }  // namespace trammel::cam

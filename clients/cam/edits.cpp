@@ -11,14 +11,15 @@ std::string line_end_of(const std::string& text) {
   return end != std::string::npos && end > 0 && text[end - 1] == '\r' ? "\r\n" : "\n";
 }
 
-Edits::Applied Edits::apply(const std::string& text) const {
-  std::vector<Replacement> replacements = replacements_;
-  std::vector<Line> lines = lines_;
+Edits::Applied Edits::apply(const std::string& text) && {
+  std::vector<Replacement> replacements = std::move(replacements_);
+  std::vector<Line> lines = std::move(lines_);
   std::stable_sort(replacements.begin(), replacements.end(),
                    [](const auto& a, const auto& b) { return a.span.begin < b.span.begin; });
   std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
   const std::string end = line_end_of(text);
   Applied made;
+  made.text.reserve(text.size() + text.size() / 8);
   std::size_t at = 0;
   int number = 1;
   const auto copy_to = [&](std::size_t to) {

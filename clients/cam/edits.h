@@ -23,7 +23,8 @@ class Edits {
     };
     std::vector<Line> inserted;
   };
-  [[nodiscard]] Applied apply(const std::string& text) const;
+  /// Uses them up.
+  [[nodiscard]] Applied apply(const std::string& text) &&;
 
  private:
   struct Replacement {

@@ -122,6 +122,7 @@ struct ProgramMove {
   int line = 0;
   std::vector<std::size_t> targets;  ///< of Program::targets, that it may go to; empty: left alone
   bool corrected_by_others = false;
+  std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
 };
 
 /// Where and how a dialect takes the mark of a correction.

@@ -64,6 +64,7 @@ int run_command_line(int argc, const char* const* argv) {
       "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong usage;\n"
       "3 refused data; 4 service unreachable or busy.");
   Action chosen;
+  add_backup_command(app, chosen);
   add_plan_command(app, chosen);
   add_pose_commands(app, chosen);
   add_measurement_commands(app, chosen);

@@ -3,8 +3,11 @@
 
 #include "server/base/units.h"
 #include "server/compensate/compensated_model.h"
+#include "server/compensate/correct_in_wrist.h"
 #include "server/measurement/pose_columns.h"
+#include "server/robot/flange_motion.h"
 #include "server/robot/inverse_kinematics.h"
+#include "server/robot/wrist.h"
 
 namespace trammel {
 
@@ -14,6 +17,7 @@ constexpr double kRotationTolerance = 1e-7;  // rad: 0.1 µm at 1 m
 constexpr int kHighestConf = 7;              // three signs, inverse_kinematics.h
 constexpr int kJointsNamed = 2;              // of those outside their limits, in one message: more is not read
 constexpr int kDecimalsTold = 9;             // more than a controller takes
+constexpr double kTurnTold = 1e-6;           // rad: less that is left of a rotation is not told
 
 /// A joint value with so many decimals that it differs from the limit it is beyond.
 std::string told_from(double limit, double value) {
@@ -68,12 +72,43 @@ CorrectionStatus status_of(InverseStatus status) {
   }
 }
 
+std::string direction_text(const Vector3& direction_B) {
+  const Vector3 d = direction_B.normalized();
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
+}
+
+/// Which way the flange cannot go, of the base.
+std::string immovable(const Chain& robot, const JointVector& q) {
+  const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeFullU);
+  const Vector6 lost = svd.matrixU().col(5);
+  if (lost.tail<3>().norm() > lost.head<3>().norm())
+    return "it cannot turn about " + direction_text(lost.tail<3>()) + " of its base";
+  return "it cannot move along " + direction_text(lost.head<3>()) + " of its base";
+}
+
+/// What an approach in the wrist left of the rotation; empty: nothing.
+std::string turn_left(const Vector3& missing_B) {
+  if (missing_B.norm() < kTurnTold) return "";
+  return fmt::format("at a singular wrist {:.4f} deg about {} of the base are left", to_deg(missing_B.norm()),
+                     direction_text(missing_B));
+}
+
+/// Whether the arm passes a singularity, to another configuration, from one of these joints to the other.
+bool changes_configuration(const Chain& robot, const JointVector& from, const JointVector& to) {
+  const auto determinant = [&](const JointVector& q) {
+    const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
+    return J.cols() == J.rows() ? J.determinant() : 1.0;
+  };
+  return determinant(from) * determinant(to) < 0;
+}
+
 std::string why_not(const Chain& robot, const InverseResult& joints, const std::optional<int>& conf) {
   switch (joints.status) {
     case InverseStatus::kJointLimit:
       return limits_text(robot, joints.q);
     case InverseStatus::kSingular:
-      return "the arm is singular there";
+      return "the arm is singular there: " + immovable(robot, joints.q);
     default:
       return conf ? fmt::format("no joints of conf {} bring the tool there", *conf) : "no joints bring the tool there";
   }
@@ -109,6 +144,27 @@ double turn_rms(const Vector3& mean, const std::optional<Vector3>& stddev, doubl
   return std::sqrt(mean.squaredNorm() + (stddev->array().square() - sigma * sigma).max(0.0).sum());
 }
 
+/// What to expect without correction.
+void expect_before(const ErrorPrediction& before, const Tracker& tracker, Correction& result) {
+  result.error_before =
+      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
+  result.error_after = result.error_before;
+  result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, tracker.sigma);
+  result.turn_before = turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
+                                before.rotation_stddev_B, tracker.sigma_rotation);
+  result.turn_after = result.turn_before;
+}
+
+/// What to expect where this much of the way is missing still. The standard deviation is that at the target: a
+/// correction moves it by far less than it is known.
+void expect_after(const ErrorPrediction& before, const Vector6& missing, const Tracker& tracker, Correction& result) {
+  result.error_after = rms(missing.head<3>(), before.true_stddev_B);
+  result.stddev = result.error_after / std::sqrt(3.0);
+  result.measured_stddev = measured(result.stddev, tracker.sigma);
+  result.turn_after = turn_rms(missing.tail<3>(), before.rotation_stddev_B, tracker.sigma_rotation);
+}
+
 }  // namespace
 
 Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, const Pose& X_TF) const {
@@ -137,6 +193,23 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   const Pose X_BT_calibrated = calibrated_pose_B(context);
   LearnedMotion learned{X_BT_predicted.translation() - X_BT_calibrated.translation(),
                         X_BT_predicted.linear() * X_BT_calibrated.linear().transpose()};
+  if (const auto wrist = closing_wrist(cell().robot, context.q)) {
+    const MissingAt missing_at = [&](const JointVector& q, bool anew) {
+      context.q = q;
+      if (anew) learned = learned_motion(context, bias_weight);
+      return pose_difference(X_BT_wanted, moved(calibrated_pose_B(context), learned));
+    };
+    const Pose X_FT = X_TF.inverse();
+    const CorrectedInWrist found =
+        correct_in_wrist(cell().robot, X_FT, *wrist, context.q, now.missing, missing_at, options);
+    now.X_BT_commanded = cell().robot.flange_pose(found.q) * X_FT;
+    now.joints.q = found.q;
+    if (cell().robot.joint_outside_limits(found.q)) now.joints.status = InverseStatus::kJointLimit;
+    now.missing = found.missing;
+    now.iterations = found.iterations;
+    now.settled = found.settled;
+    return now;
+  }
   while (!settled() && now.iterations < options.max_iterations) {
     ++now.iterations;
     now.X_BT_commanded.translation() += now.missing.head<3>();
@@ -197,16 +270,10 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   if (start->status == InverseStatus::kUnreachable) return not_reached(*start);
 
   const ErrorPrediction before = predict(context);
-  result.error_before =
-      rms(before.X_BT_predicted.translation() - result.X_BT_wanted.translation(), before.true_stddev_B);
-  result.error_after = result.error_before;
-  result.stddev = before.true_stddev_B.norm() / std::sqrt(3.0);
-  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
-  const double sigma_rotation = cell().tracker.sigma_rotation;
-  result.turn_before = turn_rms(pose_difference(result.X_BT_wanted, before.X_BT_predicted).tail<3>(),
-                                before.rotation_stddev_B, sigma_rotation);
-  result.turn_after = result.turn_before;
-  if (start->status != InverseStatus::kOk) return not_reached(*start);
+  expect_before(before, cell().tracker, result);
+  const bool in_wrist = closing_wrist(cell().robot, start->q).has_value();
+  const bool passes = in_wrist && start->status == InverseStatus::kSingular;
+  if (start->status != InverseStatus::kOk && !passes) return not_reached(*start);
 
   // The weight is that at the target: a correction moves too little to change it.
   const double bias_weight = before.bias_weight;
@@ -218,15 +285,15 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return end(CorrectionStatus::kNotConverged,
                fmt::format("{:.2e} mm left after {} iterations", to_mm(result.left), result.iterations));
   }
+  if (!in_wrist && changes_configuration(cell().robot, start->q, found.joints.q))
+    return end(CorrectionStatus::kSingular, "corrected, the arm would come to another configuration");
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
-  // The standard deviation is that at the target: a correction moves it by far less than it is known.
-  result.error_after = rms(found.missing.head<3>(), before.true_stddev_B);
-  result.stddev = result.error_after / std::sqrt(3.0);
-  result.measured_stddev = measured(result.stddev, cell().tracker.sigma);
-  result.turn_after = turn_rms(found.missing.tail<3>(), before.rotation_stddev_B, sigma_rotation);
-  if (before.in_domain) return end(CorrectionStatus::kOk, "");
-  return end(CorrectionStatus::kOutOfDomain, corrected_by(inside_->bias, bias_weight));
+  expect_after(before, found.missing, cell().tracker, result);
+  const std::string left = in_wrist ? turn_left(found.missing.tail<3>()) : "";
+  if (before.in_domain) return end(CorrectionStatus::kOk, left);
+  return end(CorrectionStatus::kOutOfDomain,
+             corrected_by(inside_->bias, bias_weight) + (left.empty() ? "" : "; " + left));
 }
 
 }  // namespace trammel

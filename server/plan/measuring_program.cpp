@@ -17,6 +17,9 @@ constexpr std::size_t kRapidName = 32;   // letters of a RAPID identifier
 constexpr std::size_t kKrlName = 24;     // letters of the name of a KRL program
 constexpr int kKrlTools = 16;            // tools in $TOOL_DATA
 constexpr std::size_t kLineLength = 80;  // of a RAPID line
+constexpr std::size_t kFanucName = 36;   // letters of the name of a TP program
+constexpr std::size_t kFanucRemark = 32;
+constexpr int kFanucTools = 29;
 
 bool is_name(const std::string& text, std::size_t longest) {
   const auto allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
@@ -109,6 +112,48 @@ std::string krl_motion(const Axes& axes, const JointVector& q) {
   return fmt::format("  PTP {{{}}}\n", fmt::join(values, ","));
 }
 
+/// Instructions and positions of a TP program; lines are numbered.
+class FanucText {
+ public:
+  FanucText(const Axes& axes, int tool) : axes_(axes), tool_(tool) {}
+
+  void line(const std::string& instruction) { lines_ += fmt::format("{:4}:  {} ;\n", ++count_, instruction); }
+  void remark(const std::string& text) { line(comment("!", text).substr(0, kFanucRemark)); }
+  void move(const JointVector& q, int percent) {
+    // The motion type stands where other instructions have a blank.
+    lines_ += fmt::format("{:4}:J P[{}] {}% FINE ;\n", ++count_, ++position_, percent);
+    positions_ += fmt::format("P[{}]{{\n   GP1:\n\tUF : 0, UT : {},\t\n", position_, tool_);
+    std::vector<std::string> values;
+    for (std::size_t k = 0; k < axes_.turning.size(); ++k)
+      values.push_back(fmt::format("\tJ{}= {:10.4f} deg", k + 1, to_deg(q(axes_.turning[k])) + 0.0));
+    if (axes_.rail) values.push_back(fmt::format("\tE1= {:10.4f}  mm", to_mm(q(*axes_.rail)) + 0.0));
+    positions_ += fmt::format("{}\n}};\n", fmt::join(values, ",\n"));
+  }
+  [[nodiscard]] std::string text(const std::string& name) const {
+    return fmt::format(
+        "/PROG  {}\n/ATTR\nOWNER\t\t= MNEDITOR;\nCOMMENT\t\t= \"measuring poses\";\nLINE_COUNT\t= {};\n"
+        "PROTECT\t\t= READ_WRITE;\nDEFAULT_GROUP\t= 1,*,*,*,*;\n/MN\n{}/POS\n{}/END\n",
+        name, count_, lines_, positions_);
+  }
+
+ private:
+  const Axes& axes_;
+  const int tool_;
+  std::string lines_, positions_;
+  int count_ = 0, position_ = 0;
+};
+
+std::string upper(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+std::string script_motion(const Axes& axes, const JointVector& q, double speed) {
+  std::vector<std::string> values;
+  for (const int j : axes.turning) values.push_back(fmt::format("{:.8f}", q(j) + 0.0));
+  return fmt::format("  movej([{}], a={:g}, v={:g})\n", fmt::join(values, ", "), 3 * speed, speed);
+}
+
 }  // namespace
 
 Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
@@ -175,6 +220,59 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
     text += "  WAIT SEC TRAMMEL_WAIT\n";
   }
   return text + "END\n";
+}
+
+Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
+  const Result<Axes> axes = axes_of(robot, options);
+  if (!axes) return tl::make_unexpected(axes.error());
+  if (options.fanuc_tool < 1 || options.fanuc_tool > kFanucTools) {
+    return refused("FANUC tool {}: expected 1 to {}", options.fanuc_tool, kFanucTools)
+        .of("fanuc_tool")
+        .beyond(options.fanuc_tool, options.fanuc_tool < 1 ? 1 : kFanucTools);
+  }
+  if (!is_name(options.name, kFanucName)) {
+    return refused("TP program '{}': expected a letter, then letters, digits or '_', {} at most", options.name,
+                   kFanucName)
+        .of("program")
+        .with_text(options.name);
+  }
+  FanucText text(*axes, options.fanuc_tool);
+  text.remark(fmt::format("{} poses for {}", plan.poses.size(), robot.name()));
+  text.line("UFRAME_NUM=0");
+  text.line(fmt::format("UTOOL_NUM={}", options.fanuc_tool));
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    if (const std::string change = change_before(plan, i); !change.empty()) {
+      text.remark(change);
+      text.line("PAUSE");
+    }
+    text.remark("pose " + plan.poses[i].id);
+    text.move(plan.poses[i].bump, 20);
+    text.move(plan.poses[i].context.q, 2);
+    text.line(fmt::format("WAIT {:6.2f}(sec)", options.wait_s));
+  }
+  return text.text(upper(options.name));
+}
+
+Result<std::string> to_urscript(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
+  const Result<Axes> axes = axes_of(robot, options);
+  if (!axes) return tl::make_unexpected(axes.error());
+  if (axes->rail)
+    return refused("robot {}: joint {} is prismatic, a script moves six turning joints", robot.name(), *axes->rail + 1)
+        .of(fmt::format("joint {}", *axes->rail + 1));
+  constexpr double kFast = 0.35, kSlow = 0.035;  // rad/s
+  const std::string name = module_name(options.name);
+  std::string text = fmt::format("def {}():\n  {}\n", name,
+                                 comment("#", fmt::format("{} poses for {}", plan.poses.size(), robot.name())));
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    if (const std::string change = change_before(plan, i); !change.empty()) {
+      text += fmt::format("  popup(\"{}\", blocking=True)\n", comment("", change).substr(1));
+    }
+    text += "  " + comment("#", "pose " + plan.poses[i].id) + "\n";
+    text += script_motion(*axes, plan.poses[i].bump, kFast);
+    text += script_motion(*axes, plan.poses[i].context.q, kSlow);
+    text += fmt::format("  sleep({:g})\n", options.wait_s);
+  }
+  return text + fmt::format("end\n{}()\n", name);
 }
 
 }  // namespace trammel

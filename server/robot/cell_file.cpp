@@ -229,12 +229,13 @@ CellRules read_rules(const YamlMap& map) {
       map.refuse("prior", refused("'{}', expected fleet or none", prior).with_text(prior));
     rules.fleet_prior = prior == "fleet";
   });
+  map.attempt([&] { rules.controller_compensates = map.boolean("controller_compensates", false); });
   return rules;
 }
 
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior"});
+            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior", "controller_compensates"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)

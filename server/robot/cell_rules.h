@@ -9,8 +9,9 @@ namespace trammel {
 
 /// What the owner of a cell demands of it, beside its description.
 struct CellRules {
-  std::optional<double> tolerance;  ///< m: what the cell must hold, 95 % of its positions
-  bool fleet_prior = false;         ///< robots of its type that were trained before say what to expect of it
+  std::optional<double> tolerance;      ///< m: what the cell must hold, 95 % of its positions
+  bool fleet_prior = false;             ///< robots of its type that were trained before say what to expect of it
+  bool controller_compensates = false;  ///< the controller corrects errors of its own; batches were measured so
 };
 /// As the cell file says; nothing is demanded of a cell without one.
 [[nodiscard]] Result<CellRules> rules_of(const Cell& cell);

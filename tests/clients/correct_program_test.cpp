@@ -28,8 +28,9 @@ class CorrectProgram : public testing::Test {
     const Result<Cell> cell = read_cell(TRAMMEL_SOURCE_DIR "/config/cell-7.yaml");
     folder_.write("cell.model", serialize(test::nominal_model(std::make_shared<const Cell>(*cell), 10)));
   }
-  int correct(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"trammel", "correct"});
+  int correct(std::vector<std::string> arguments) { return run("correct", std::move(arguments)); }
+  int run(const char* command, std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"trammel", command});
     std::vector<const char*> argv;
     for (const std::string& argument : arguments) argv.push_back(argument.c_str());
     return run_command_line(static_cast<int>(argv.size()), argv.data());
@@ -164,6 +165,28 @@ TEST_F(CorrectProgram, EveryShippedExampleIsCorrected) {
     EXPECT_EQ(json["moves"], json["moves_corrected"]) << example.back();
     EXPECT_GE(json["moves"].get<int>(), 2) << example.back();
   }
+}
+
+TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
+  const std::string before = module("m.mod", true);
+  EXPECT_EQ(run("predict", {"--model", model(), before, "-o", file("p.csv"), "--json", file("p.json")}), kNotAll)
+      << "CRobT() is decided at run time";
+  const CsvTable table = CsvTable::parse(text("p.csv"), "p.csv").value();
+  ASSERT_EQ(table.size(), 2u);
+  const auto field = [&](const char* column) { return table.field(0, table.find(column).value()); };
+  EXPECT_EQ(field("name"), "p10");
+  EXPECT_EQ(field("status"), "ok");
+  EXPECT_EQ(field("x_mm"), "1800.10000");
+  EXPECT_EQ(field("px_mm"), "1800.10000") << "this model knows of no errors";
+  EXPECT_EQ(field("error_mm"), "0.00000");
+  EXPECT_EQ(table.field(1, table.find("px_mm").value()), "");
+  EXPECT_EQ(nlohmann::json::parse(text("p.json"))["targets"][1]["status"], "refused");
+  ASSERT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--allow-failed"}), 0);
+  EXPECT_EQ(run("predict", {"--model", model(), file("out.mod"), "-o", file("q.csv")}), kNotAll)
+      << "a corrected one, too";
+  EXPECT_EQ(run("predict", {"--model", model(), "-o", file("q.csv")}), kWrongUsage);
+  EXPECT_EQ(run("predict", {"--model", model(), before, "--joints", before, "-o", file("q.csv")}), kWrongUsage);
+  EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}), kWrongUsage);
 }
 
 }  // namespace

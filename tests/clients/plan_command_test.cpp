@@ -2,9 +2,12 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "clients/cam/dialect.h"
 #include "clients/cli/command_line.h"
 #include "server/base/text_file.h"
+#include "server/base/units.h"
 #include "server/measurement/files/joint_list.h"
 #include "tests/support/temporary_folder.h"
 
@@ -53,6 +56,58 @@ TEST_F(PlanCommand, MakesAProgramOfPosesThatWereChosenElsewhere) {
   EXPECT_NE(text("p.mod").find("[10,20,-30,40,50,60]"), std::string::npos) << text("p.mod");
   EXPECT_EQ(plan({"--from", chosen, "--count", "3", "-o", file("p.csv")}), 2);
   EXPECT_EQ(plan({"-o", file("p.csv")}), 2);
+}
+
+TEST_F(PlanCommand, EveryProgramReadsBackAsThePlanInItsOrder) {
+  ASSERT_EQ(plan({"--count", "12", "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl", file("p.src"), "--fanuc",
+                  file("p.ls"), "--urscript", file("p.script"), "--fanuc-tool", "3"}),
+            0);
+  const JointList list = read_joint_csv(file("p.csv")).value();
+  ASSERT_EQ(list.poses.size(), 12u);
+  for (const char* name : {"p.mod", "p.src", "p.ls", "p.script"}) {
+    const cam::Program program = cam::read_program(*cam::dialect_of_file(name), {{name, text(name)}}, {});
+    std::vector<std::vector<double>> slow;  // the second of two motions is to the pose
+    for (std::size_t m = 1; m < program.moves.size(); m += 2) {
+      ASSERT_EQ(program.moves[m].targets.size(), 1u) << name;
+      const cam::ProgramTarget& target = program.targets[program.moves[m].targets[0]];
+      slow.push_back(target.numbers);
+      if (target.coordinates != cam::Coordinates::kJointRadians) continue;
+      for (double& axis : slow.back()) axis = to_deg(axis);
+    }
+    ASSERT_EQ(slow.size(), 12u) << name;
+    for (std::size_t i = 0; i < slow.size(); ++i) {
+      for (Eigen::Index j = 0; j < 6; ++j)
+        EXPECT_NEAR(slow[i][static_cast<std::size_t>(j)], to_deg(list.poses[i].context.q(j)), 1e-6) << name;
+    }
+  }
+  EXPECT_NE(text("p.ls").find("UT : 3"), std::string::npos);
+  EXPECT_EQ(plan({"--count", "5", "-o", file("q.csv"), "--fanuc", file("q.ls"), "--fanuc-tool", "0"}), 3);
+}
+
+TEST_F(PlanCommand, APlanWithAProgramIsInTheOrderOfLittleTravel) {
+  const std::vector<std::string> options = {"--count", "40", "--criterion", "observability", "--krl", file("p.src")};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), options.begin(), options.end());
+    return plan(more);
+  };
+  ASSERT_EQ(with({"-o", file("short.csv")}), 0);
+  ASSERT_EQ(with({"-o", file("long.csv"), "--keep-order"}), 0);
+  const JointList shorter = read_joint_csv(file("short.csv")).value(),
+                  longer = read_joint_csv(file("long.csv")).value();
+  const auto way = [](const JointList& list) {
+    double sum = 0;
+    for (std::size_t i = 1; i < list.poses.size(); ++i)
+      sum += (list.poses[i].context.q - list.poses[i - 1].context.q).cwiseAbs().maxCoeff();
+    return sum;
+  };
+  const auto ids = [](const JointList& list) {
+    std::set<std::string> all;
+    for (const CommandedPose& pose : list.poses) all.insert(pose.pose_id);
+    return all;
+  };
+  EXPECT_LT(way(shorter), 0.75 * way(longer));
+  EXPECT_EQ(ids(shorter), ids(longer));
+  EXPECT_EQ(shorter.poses[0].pose_id, longer.poses[0].pose_id);
 }
 
 TEST_F(PlanCommand, RefusesBeforeItWritesAnything) {

@@ -273,9 +273,9 @@ TEST_F(Compensated, EveryTargetThatCannotBeCorrectedSaysWhy) {
   EXPECT_EQ(correct(target_at(beyond)).status, CorrectionStatus::kJointLimit);
   EXPECT_NE(correct(target_at(beyond)).message.find("joint 3 would be at 75.0 deg, limit 70"), std::string::npos)
       << correct(target_at(beyond)).message;
-  JointVector straight = inside();
-  straight(4) = 0;
-  EXPECT_EQ(correct(target_at(straight)).status, CorrectionStatus::kSingular);
+  JointVector stretched = inside();
+  stretched(2) = -std::atan2(1.142, 0.2);  // the forearm in line with the upper arm
+  EXPECT_EQ(correct(target_at(stretched)).status, CorrectionStatus::kSingular);
   Target nothing = target_at(inside());
   nothing.seed.reset();
   EXPECT_EQ(correct(nothing).status, CorrectionStatus::kRefused);

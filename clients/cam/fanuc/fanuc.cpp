@@ -278,6 +278,7 @@ class File {
     if (statement.size() < 4 || !kMotions.contains(statement[0].text)) return;
     if (!statement[1].is("P") && !statement[1].is("PR")) return;
     program_.moves.push_back({index_, statement[0].line, {}, false});
+    note_speed(statement);
     std::string why;
     for (const Piece& piece : statement) {
       if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") || piece.is("TOOL_OFFSET") ||
@@ -297,6 +298,15 @@ class File {
         use(statement, name);
       }
       if (!statement[0].is("C")) return;
+    }
+  }
+
+  /// `250mm/sec`
+  void note_speed(const Pieces& statement) {
+    for (std::size_t at = 0; at + 3 < statement.size(); ++at) {
+      if (statement[at].kind == Piece::Kind::kNumber && statement[at + 1].is("mm") && statement[at + 2].is("/") &&
+          statement[at + 3].is("sec"))
+        program_.moves.back().speed_mm_s = number(statement[at]);
     }
   }
 
@@ -322,9 +332,8 @@ class File {
     for (const auto& known : positions_) {
       const auto& [begin, position] = known;
       const std::string& name = position.name;
-      const bool listed = std::any_of(program_.left.begin(), program_.left.end(), [&](const LeftAlone& left) {
-        return left.file == index_ && left.name == name;
-      });
+      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
+                                      [&](const LeftAlone& left) { return left.file == index_ && left.name == name; });
       if (!used_.contains(begin) && !listed)
         program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});
     }

@@ -69,7 +69,37 @@ class Reader {
       program_.mark_places.push_back(mark_place(file.text, modules_.back().head_end));
     }
     meaning_.emplace(program_.files, modules_);
-    program_.frames.push_back({"wobj0", Pose::Identity(), ""});
+    if (const auto base = options_.frames.find("robot_base"); base != options_.frames.end())
+      X_BW_ = base->second.inverse();
+    program_.frames.push_back({"wobj0", X_BW_, ""});
+  }
+
+  RapidData data() {
+    RapidData found;
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (const Declaration& declared : modules_[m].declarations) {
+        if (declared.routine >= 0 || !declared.value || declared.is_array) continue;
+        const Data data{&*declared.value, &own(m), declared.type, &declared};
+        if (declared.type == "tooldata") {
+          ProgramTool tool;
+          tool.name = spelled(m, declared);
+          tool.file = program_.files[m].name;
+          tool.line = declared.line;
+          read_tool(data, tool);
+          found.tools.push_back(std::move(tool));
+        } else if (declared.type == "wobjdata") {
+          ProgramFrame frame;
+          frame.name = spelled(m, declared);
+          const Told<Data> parts = aggregate(data, 5);
+          if (parts) read_frame(*parts, frame);
+          if (!parts) frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
+          found.frames.push_back(std::move(frame));
+        } else if (declared.type == "loaddata") {
+          if (const auto load = load_of(data)) found.loads.emplace_back(spelled(m, declared), *load);
+        }
+      }
+    }
+    return found;
   }
 
   Program read() {
@@ -93,7 +123,8 @@ class Reader {
   std::size_t known_tool(ProgramTool tool) {
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       const ProgramTool& known = program_.tools[k];
-      if (known.name == tool.name && known.file == tool.file && known.line == tool.line) return k;
+      if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line)
+        return k;
     }
     program_.tools.push_back(std::move(tool));
     return program_.tools.size() - 1;
@@ -101,8 +132,8 @@ class Reader {
 
   std::size_t known_frame(ProgramFrame frame) {
     for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (program_.frames[k].name == frame.name && program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12) &&
-          program_.frames[k].why_not == frame.why_not)
+      if (in_lower_case(program_.frames[k].name) == in_lower_case(frame.name) &&
+          program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12) && program_.frames[k].why_not == frame.why_not)
         return k;
     }
     program_.frames.push_back(std::move(frame));
@@ -196,13 +227,24 @@ class Reader {
     tool.X_FT = *X_FT;
     tool.rotation_rounding = 2 * std::pow(10.0, -decimals);
     if (!*held) tool.why_not = fmt::format("tool {} is not held by the robot", shown(tool.name));
-    const Told<Data> load = aggregate(part(*parts, 2), 6);
-    if (!load) return;
+    tool.load = load_of(part(*parts, 2));
+  }
+
+  std::optional<StatedLoad> load_of(const Data& data) const {
+    const Told<Data> load = aggregate(data, 6);
+    if (!load) return std::nullopt;
     int ignored = 0;
     const Told<double> mass = meaning_->number_of(load->node->parts[0], *load->scope);
     const Told<std::vector<double>> cog = meaning_->numbers_of(load->node->parts[1], 3, *load->scope, &ignored);
-    if (!mass || !cog) return;
-    tool.load = StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
+    if (!mass || !cog) return std::nullopt;
+    return StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
+  }
+
+  /// The name as it is written: RAPID does not tell cases apart.
+  std::string spelled(std::size_t module, const Declaration& declared) const {
+    const std::string statement = program_.files[module].text.substr(declared.begin, declared.end - declared.begin);
+    const std::size_t at = in_lower_case(statement).find(in_lower_case(declared.name), declared.type.size());
+    return at == std::string::npos ? declared.name : statement.substr(at, declared.name.size());
   }
 
   std::size_t frame_of(const Expression* argument, const Scope& scope) {
@@ -250,7 +292,7 @@ class Reader {
     } else if (!*fixed) {
       why = "a mechanical unit moves it";
     } else {
-      frame.X_BO = *user * *object;
+      frame.X_BO = X_BW_ * *user * *object;
       return;
     }
     frame.why_not = fmt::format("work object {}: {}", shown(frame.name), why);
@@ -297,7 +339,10 @@ class Reader {
       if (argument.label == kToolArgument) tool = &argument;
     }
     if (positional.empty()) return;
-    for (const Expression* argument : positional) note_names(*argument);
+    for (const Expression* argument : positional) {
+      note_names(*argument);
+      if (const auto speed = predefined_speed(*argument)) program_.moves.back().speed_mm_s = speed;
+    }
     const std::string first = meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]);
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
     const auto displaced = displaced_.find(&motion);
@@ -315,6 +360,15 @@ class Reader {
         use(module, motion, *positional[k], joints, tool_of(*with, *scope), frame_of(frame, *scope), *scope);
       }
     }
+  }
+
+  /// Of `v100`, mm/s; a controller predefines them.
+  static std::optional<double> predefined_speed(const Expression& argument) {
+    if (argument.kind != Kind::kName || !argument.name.text().starts_with('v')) return std::nullopt;
+    const std::string digits = argument.name.text().substr(1);
+    const auto number = read_number(digits);
+    const bool plain = digits.find_first_not_of("0123456789") == std::string::npos;
+    return number && plain ? std::optional<double>(number->value) : std::nullopt;
   }
 
   /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
@@ -600,6 +654,7 @@ class Reader {
   }
 
   ReadOptions options_;
+  Pose X_BW_ = Pose::Identity();  ///< the controller's world, seen from the robot's base
   Program program_;
   std::vector<Module> modules_;
   std::optional<Interpreter> meaning_;
@@ -612,6 +667,11 @@ class Reader {
 };
 
 }  // namespace
+
+RapidData read_rapid_data(std::vector<SourceFile> files) {
+  const ReadOptions options;
+  return Reader(std::move(files), options).data();
+}
 
 Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options) {
   return Reader(std::move(files), options).read();

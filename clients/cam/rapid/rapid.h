@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/cam/program.h"
@@ -11,5 +13,13 @@ namespace trammel::cam {
 /// procedures. What a variable, a loop, a sensor or another module decides is left, with the reason. W of the
 /// controller is taken as the robot's base.
 [[nodiscard]] Program read_rapid(std::vector<SourceFile> files, const ReadOptions& options);
+
+/// What modules declare, whether motions use it or not: tools, work objects and loads that are constant or persistent.
+struct RapidData {
+  std::vector<ProgramTool> tools;
+  std::vector<ProgramFrame> frames;
+  std::vector<std::pair<std::string, StatedLoad>> loads;
+};
+[[nodiscard]] RapidData read_rapid_data(std::vector<SourceFile> files);
 
 }  // namespace trammel::cam

@@ -292,6 +292,7 @@ class Parser {
       }
       made.arguments.push_back(std::move(argument));
     }
+    made.arguments.shrink_to_fit();
     made.end = is_sign(";") ? token().end : token().begin;
     const bool ends = take(";");
     if (ends) module_.instructions.push_back(std::move(made));
@@ -393,6 +394,7 @@ class Parser {
       if (!take(",") && !is_sign("]")) break;
     }
     if (!take("]")) made.kind = Kind::kUnknown;
+    made.parts.shrink_to_fit();  // a long program is mostly this
   }
 
   void name(Expression& made, int depth) {

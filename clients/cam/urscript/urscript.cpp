@@ -229,6 +229,17 @@ class Script {
       use(at, value);
       if (next < pieces_.size() && pieces_[next].is(",")) ++next;
     }
+    note_speed(at, next);
+  }
+
+  /// `v=0.1`, m/s, of a motion of the tool.
+  void note_speed(std::size_t at, std::size_t next) {
+    if (pieces_[at].is("movej")) return;
+    for (; next + 2 < pieces_.size() && pieces_[next].line == pieces_[at].line && !pieces_[next].is(")"); ++next) {
+      if (!pieces_[next].is("v") || !pieces_[next + 1].is("=")) continue;
+      if (const auto speed = read_number(pieces_[next + 2].text))
+        program_.moves.back().speed_mm_s = to_mm(speed->value);
+    }
   }
 
   void use(std::size_t at, const Value& value) {

@@ -3,11 +3,13 @@
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/commands/correct_program.h"
+#include "clients/cli/commands/predict_program.h"
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/files/target_file.h"
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
@@ -143,11 +145,14 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   if (const Status known = model->check_trained_with(*tool, *payload); !known)
     return tl::make_unexpected(known.error());
   Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}};
+  corrections.items.resize(file.rows.size());
   ProgressLine progress;
-  for (const TargetRow& row : file.rows) {
-    progress.show("correcting", static_cast<double>(corrections.items.size()) / static_cast<double>(file.rows.size()));
-    corrections.items.push_back(to_wire(model->correct(row.target, *tool, *payload), corrections.joint_types));
-  }
+  in_parallel(
+      file.rows.size(),
+      [&](std::size_t i) {
+        corrections.items[i] = to_wire(model->correct(file.rows[i].target, *tool, *payload), corrections.joint_types);
+      },
+      [&](double share) { progress.show("correcting", share); });
   return corrections;
 }
 
@@ -230,13 +235,54 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
   return model;
 }
 
+/// How a program is read.
+void add_reading_options(CLI::App& command, std::string& format, std::string& frames) {
+  const std::string group = "Programs";
+  command
+      .add_option("--format", format,
+                  fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
+      ->group(group);
+  command
+      .add_option("--frames", frames,
+                  "Values of tools and frames that the program leaves to the controller (CSV: "
+                  "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...)")
+      ->group(group);
+}
+
+/// What predict is asked for: joints, or a program.
+struct PredictArguments : ApplyArguments {
+  std::vector<std::string> inputs;
+  std::string format, frames;
+
+  [[nodiscard]] PredictProgramArguments of_program() const {
+    return {inputs, model, tool, payload, format, output, json, frames, service};
+  }
+};
+
+Status check_usage(const PredictArguments& arguments) {
+  const bool program = !arguments.inputs.empty();
+  if (program == !arguments.input.empty()) {
+    return failure(ErrorCode::kUsage, "{}", program ? "a program and --joints at once" : "nothing to predict")
+        .of("--joints")
+        .next("name a program, or joints by --joints");
+  }
+  if (program && (arguments.covariance || arguments.orientation)) {
+    return failure(ErrorCode::kUsage, "--covariance and --orientation are of joints, not of programs")
+        .of(arguments.covariance ? "--covariance" : "--orientation");
+  }
+  return {};
+}
+
 void add_predict(CLI::App& app, Action& chosen) {
-  const auto arguments = std::make_shared<ApplyArguments>();
+  const auto arguments = std::make_shared<PredictArguments>();
   CLI::App* command = app.add_subcommand("predict", "Predict where the tool will be, and how sure that is");
-  command->add_option("--joints", arguments->input, "Commanded joints (CSV: joints in deg, rails in mm)")->required();
+  command->add_option("program", arguments->inputs,
+                      "A robot program as it is, corrected or not: its files, its folder, or '-' for standard input");
+  command->add_option("--joints", arguments->input, "Or commanded joints (CSV: joints in deg, rails in mm)");
   command
       ->add_option("-o,--output", arguments->output,
-                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm)")
+                   "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm); of a "
+                   "program a line for each of its targets")
       ->required();
   command->add_flag(
       "--covariance", arguments->covariance,
@@ -246,27 +292,27 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--orientation", arguments->orientation,
       "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
       "file only");
+  add_reading_options(*command, arguments->format, arguments->frames);
   add_apply_options(*command, *arguments)->required();
-  command->callback([arguments, &chosen] { chosen = [arguments] { return predict(*arguments); }; });
+  command->callback([arguments, &chosen] {
+    chosen = [arguments]() -> Result<Extent> {
+      if (const Status usage = check_usage(*arguments); !usage) return tl::make_unexpected(usage.error());
+      if (!arguments->inputs.empty()) return predict_program(arguments->of_program());
+      if (const Status done = predict(*arguments); !done) return tl::make_unexpected(done.error());
+      return Extent::kAll;
+    };
+  });
 }
 
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
-  command
-      .add_option("--format", arguments.format,
-                  fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
-      ->group(group);
+  add_reading_options(command, arguments.format, arguments.frames);
   command.add_option("--receipt", arguments.receipt, "What became of each target, as CSV")->group(group);
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
   command
       .add_option("--tolerance", arguments.tolerance_mm,
                   "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
       ->check(CLI::PositiveNumber)
-      ->group(group);
-  command
-      .add_option("--frames", arguments.frames,
-                  "Values of tools and frames that the program leaves to the controller (CSV: "
-                  "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...)")
       ->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,

@@ -45,6 +45,7 @@ void add_measurement_commands(CLI::App& app, Action& chosen);  // convert, refer
 void add_structure_commands(CLI::App& app, Action& chosen);    // cpa, deflection
 void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluate, report
 void add_apply_commands(CLI::App& app, Action& chosen);        // predict, correct
+void add_backup_command(CLI::App& app, Action& chosen);        // import-backup
 void add_check_command(CLI::App& app, Action& chosen);
 void add_fleet_command(CLI::App& app, Action& chosen);
 void add_diagnose_command(CLI::App& app, Action& chosen);

@@ -8,9 +8,11 @@
 #include "clients/cam/mark.h"
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/service/answers.h"
+#include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/receipt_page.h"
 #include "clients/cli/text/receipt_text.h"
+#include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -30,8 +32,6 @@ std::string today() {
   ::gmtime_r(&now, &utc);
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
-
-cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
 
 /// As a server reads it, so that both give the same bytes.
 Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
@@ -53,20 +53,6 @@ Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
   return target;
 }
 
-client::ModelInfo info_of(const CompensatedModel& model) {
-  const ModelProvenance& provenance = model.provenance();
-  client::ModelInfo info;
-  info.cell = model.cell().name;
-  info.id = provenance.id;
-  info.hash = provenance.hash;
-  info.level = provenance.level;
-  info.batch_id = provenance.batch_id;
-  info.trained_at_unix_s = provenance.trained_at;
-  info.measured_at_unix_s = provenance.measured_at;
-  info.training_poses = provenance.training_poses;
-  return info;
-}
-
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {
@@ -77,11 +63,14 @@ cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progr
     if (const Status known = model.check_trained_with(*tool, *payload); !known)
       return tl::make_unexpected(known.error());
     client::Answer<client::CorrectedTarget> answer{info_of(model), {}};
+    answer.items.resize(targets.size());
     const std::vector<JointType> types = joint_types(model.cell().robot);
-    for (const client::TargetMm& target : targets) {
-      progress.show("correcting", static_cast<double>(answer.items.size()) / static_cast<double>(targets.size()));
-      answer.items.push_back(to_wire(model.correct(from_wire(target, model.cell().robot), *tool, *payload), types));
-    }
+    in_parallel(
+        targets.size(),
+        [&](std::size_t i) {
+          answer.items[i] = to_wire(model.correct(from_wire(targets[i], model.cell().robot), *tool, *payload), types);
+        },
+        [&](double share) { progress.show("correcting", share); });
     return answer;
   };
 }
@@ -98,38 +87,25 @@ Result<cam::CorrectedProgram> correct_here(const cam::Program& program, const Co
                               options_of(arguments));
 }
 
-/// Tools and robot come from the model that answers: it is fetched, and fetched again if another one has answered.
+/// Tools and robot come from the model that answers.
 Result<cam::CorrectedProgram> correct_by_service(const cam::Program& program,
                                                  const CorrectProgramArguments& arguments) {
-  constexpr int kAttempts = 5;
-  const Result<ModelReference> reference = parse_model_reference(arguments.model);
-  if (!reference) return tl::make_unexpected(reference.error());
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  ProgressLine progress;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    const Result<std::string> text = (*session)->export_model(reference->cell, reference->version);
-    if (!text) return tl::make_unexpected(text.error());
-    const Result<CompensatedModel> model = deserialize(*text, arguments.model);
-    if (!model) return tl::make_unexpected(model.error());
-    bool another = false;
-    const cam::AskCorrections ask = [&](const std::string& tool, const std::string& payload,
-                                        const std::vector<client::TargetMm>& targets) {
-      client::CallContext context;
-      context.cell = reference->cell;
-      context.tool = tool;
-      context.payload = payload;
-      if (reference->version > 0) context.model = fmt::format("@{}", reference->version);
-      auto answer =
-          (*session)->correct_targets(context, targets, [&](double share) { progress.show("correcting", share); });
-      another |= answer && answer->model.hash != model->provenance().hash;
-      return answer;
-    };
-    Result<cam::CorrectedProgram> corrected =
-        cam::correct_program(program, model->cell().robot, tools_of(*model), ask, options_of(arguments));
-    if (!another) return corrected;
-  }
-  return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", reference->cell, kAttempts);
+  return with_served_model<cam::CorrectedProgram>(
+      arguments.model, arguments.service,
+      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model, const SawModel& saw) {
+        ProgressLine progress;
+        const cam::AskCorrections ask = [&](const std::string& tool, const std::string& payload,
+                                            const std::vector<client::TargetMm>& targets) {
+          client::CallContext context = of;
+          context.tool = tool;
+          context.payload = payload;
+          auto answer =
+              session.correct_targets(context, targets, [&](double share) { progress.show("correcting", share); });
+          if (answer) saw(answer->model);
+          return answer;
+        };
+        return cam::correct_program(program, model.cell().robot, tools_of(model), ask, options_of(arguments));
+      });
 }
 
 /// Writes the files, and beside each that is changed what it was before.
@@ -169,16 +145,10 @@ Status write_receipts(const cam::CorrectedProgram& corrected, const CorrectProgr
   if (!arguments.receipt.empty()) {
     if (const Status written = write_output(arguments.receipt, receipt_csv(corrected)); !written) return written;
   }
-  nlohmann::ordered_json json = receipt_json(corrected);
-  if (arguments.tolerance_mm > 0) {
-    const ToleranceVerdict verdict = tolerance_verdict(corrected, arguments.tolerance_mm);
-    json["tolerance"] = {{"tolerance_mm", verdict.tolerance_mm},
-                         {"targets", verdict.targets},
-                         {"inside_before", verdict.before},
-                         {"inside_after", verdict.after},
-                         {"expected_inside_after", verdict.expected_after}};
-  }
-  return write_json(arguments.json, json);
+  if (arguments.json.empty()) return {};
+  std::optional<ToleranceVerdict> verdict;
+  if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(corrected, arguments.tolerance_mm);
+  return write_output(arguments.json, receipt_json(corrected, verdict));
 }
 
 }  // namespace

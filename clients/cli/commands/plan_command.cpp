@@ -12,6 +12,7 @@
 #include "server/measurement/pose_columns.h"
 #include "server/plan/measuring_program.h"
 #include "server/plan/plan.h"
+#include "server/plan/travel.h"
 
 namespace trammel::cli {
 
@@ -20,11 +21,15 @@ namespace {
 using nlohmann::ordered_json;
 
 struct PlanArguments {
-  std::string cell, from, criterion = "lhs", output, rapid, krl, json;
+  std::string cell, from, criterion = "lhs", output, rapid, krl, fanuc, urscript, json;
   PlanOptions options;
   ProgramOptions program;
-  bool positions_only = false;
+  bool positions_only = false, keep_order = false;
   int check = 0;  // poses of a check; 0: no check is planned
+
+  [[nodiscard]] bool writes_program() const {
+    return !(rapid.empty() && krl.empty() && fanuc.empty() && urscript.empty());
+  }
 };
 
 /// `lhs`, `observability`, or `separate:CAUSE,CAUSE`; a cause may hold a colon of its own.
@@ -78,6 +83,8 @@ Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& 
   };
   if (const Status rapid = add(arguments.rapid, to_rapid); !rapid) return tl::make_unexpected(rapid.error());
   if (const Status krl = add(arguments.krl, to_krl); !krl) return tl::make_unexpected(krl.error());
+  if (const Status fanuc = add(arguments.fanuc, to_fanuc); !fanuc) return tl::make_unexpected(fanuc.error());
+  if (const Status script = add(arguments.urscript, to_urscript); !script) return tl::make_unexpected(script.error());
   return outputs;
 }
 
@@ -192,16 +199,43 @@ Status plan(PlanArguments arguments) {
   Result<Cell> read = read_cell_to_train(arguments.cell, {.bias = false});
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<Plan> planned =
-      arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
+  Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
   if (!planned) return tl::make_unexpected(planned.error());
+  // A batch is measured in the order of the program, so the plan has it, too.
+  if (arguments.writes_program() && !arguments.keep_order)
+    planned = ordered_for_travel(cell->robot, std::move(*planned));
   const auto outputs = outputs_of(*cell, arguments, *planned);
   if (!outputs) return tl::make_unexpected(outputs.error());
   for (const auto& [path, text] : *outputs) {
     if (const Status written = write_output(path, text); !written) return written;
   }
-  tell(in_words(*cell, arguments, *planned), {arguments.output, arguments.rapid, arguments.krl, arguments.json});
+  tell(in_words(*cell, arguments, *planned),
+       {arguments.output, arguments.rapid, arguments.krl, arguments.fanuc, arguments.urscript, arguments.json});
   return write_json(arguments.json, as_json(*cell, arguments, *planned));
+}
+
+void add_program_options(CLI::App& command, PlanArguments& arguments) {
+  command.add_option("--rapid", arguments.rapid, "Program to write for an ABB controller (.mod)")->type_name("FILE");
+  command.add_option("--krl", arguments.krl, "Program to write for a KUKA controller (.src)")->type_name("FILE");
+  command.add_option("--fanuc", arguments.fanuc, "Program to write for a FANUC controller (.ls)")->type_name("FILE");
+  command.add_option("--urscript", arguments.urscript, "Program to write for a Universal Robots controller (.script)")
+      ->type_name("FILE");
+  command.add_flag("--keep-order", arguments.keep_order,
+                   "Leave the poses of programs, and of the plan beside them, in the order of their choice, not in one "
+                   "in which the arm travels little");
+  command
+      .add_option("--fanuc-tool", arguments.program.fanuc_tool,
+                  "Number of the tool frame in the FANUC controller that the program names")
+      ->capture_default_str();
+  command
+      .add_option("--rapid-tool", arguments.program.rapid_tool, "Tooldata of the ABB controller that the program names")
+      ->capture_default_str();
+  command
+      .add_option("--krl-tool", arguments.program.krl_tool,
+                  "Number of the tool in the KUKA controller that the program names")
+      ->capture_default_str();
+  command.add_option("--wait", arguments.program.wait_s, "How long a program waits at each pose, s")
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -248,18 +282,7 @@ void add_plan_command(CLI::App& app, Action& chosen) {
                    "Payload id of the cell; several, joined by commas, are planned for in turn")
       ->delimiter(',');
   command->add_option("-o,--output", arguments->output, "Plan to write (CSV: joints in deg, rails in mm)")->required();
-  command->add_option("--rapid", arguments->rapid, "Program to write for an ABB controller (.mod)")->type_name("FILE");
-  command->add_option("--krl", arguments->krl, "Program to write for a KUKA controller (.src)")->type_name("FILE");
-  command
-      ->add_option("--rapid-tool", arguments->program.rapid_tool,
-                   "Tooldata of the ABB controller that the program names")
-      ->capture_default_str();
-  command
-      ->add_option("--krl-tool", arguments->program.krl_tool,
-                   "Number of the tool in the KUKA controller that the program names")
-      ->capture_default_str();
-  command->add_option("--wait", arguments->program.wait_s, "How long a program waits at each pose, s")
-      ->capture_default_str();
+  add_program_options(*command, *arguments);
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return plan(*arguments); }; });
 }

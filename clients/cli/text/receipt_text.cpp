@@ -3,6 +3,8 @@
 #include <cmath>
 #include <map>
 
+#include "clients/cli/terminal/output.h"
+#include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 
@@ -24,6 +26,8 @@ std::string numbers(const std::vector<double>& values) {
   for (std::size_t k = 0; k < kNumbers; ++k) text += (k < values.size() ? csv_number(values[k]) : "") + ",";
   return text;
 }
+
+std::string speed(double mm_s) { return std::isfinite(mm_s) ? fmt::format("{:.1f}", mm_s) : ""; }
 
 const char* spelled(cam::Coordinates coordinates) {
   switch (coordinates) {
@@ -52,6 +56,35 @@ ordered_json json_of(double value) { return std::isfinite(value) ? ordered_json(
 /// To a tenth of a micrometre, as in the CSV.
 ordered_json json_mm(double value) { return json_of(std::isfinite(value) ? std::round(value * 1e5) / 1e5 : value); }
 
+ordered_json item_of(const ReceiptRow& row) {
+  ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
+                       {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
+                       {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
+  if (!row.suggestion.empty()) item["suggestion"] = row.suggestion;
+  if (!row.before.empty()) {
+    item["units"] = spelled(row.coordinates);
+    item["before"] = row.before;
+  }
+  if (row.corrected()) {
+    item["after"] = row.after;
+    item["joints"] = row.joints;
+    item["folded"] = row.folded;
+  }
+  if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+  item["error_before_mm"] = json_mm(row.error_before_mm);
+  item["error_after_mm"] = json_mm(row.error_after_mm);
+  item["sigma_mm"] = json_mm(row.sigma_mm);
+  item["sigma_measured_mm"] = json_mm(row.sigma_measured_mm);
+  item["rounding_mm"] = json_mm(row.rounding_mm);
+  item["domain"] = domain_of(row);
+  item["iterations"] = row.iterations;
+  if (std::isfinite(row.path_limit_after_mm_s)) {
+    item["path_limit_before_mm_s"] = json_of(row.path_limit_before_mm_s);
+    item["path_limit_after_mm_s"] = json_of(row.path_limit_after_mm_s);
+  }
+  return item;
+}
+
 }  // namespace
 
 std::string receipt_csv(const CorrectedProgram& program) {
@@ -60,7 +93,7 @@ std::string receipt_csv(const CorrectedProgram& program) {
   for (std::size_t k = 1; k <= kNumbers; ++k) text += fmt::format(",after_{}", k);
   text +=
       ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
-      "model_id,message,suggestion\n";
+      "path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,suggestion\n";
   for (const ReceiptRow& row : program.rows) {
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
                         csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
@@ -73,44 +106,45 @@ std::string receipt_csv(const CorrectedProgram& program) {
          {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm}) {
       text += millimetres(value) + ",";
     }
-    text += fmt::format("{},{},{},{},{}\n", domain_of(row), row.iterations, program.model_id, csv_field(row.message),
+    text += fmt::format("{},{},{},{},{},{},{}\n", domain_of(row), row.iterations, speed(row.path_limit_before_mm_s),
+                        speed(row.path_limit_after_mm_s), program.model_id, csv_field(row.message),
                         csv_field(row.suggestion));
   }
   return text;
 }
 
-ordered_json receipt_json(const CorrectedProgram& program) {
-  ordered_json rows = ordered_json::array();
-  for (const ReceiptRow& row : program.rows) {
-    ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
-                         {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
-                         {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
-    if (!row.suggestion.empty()) item["suggestion"] = row.suggestion;
-    if (!row.before.empty()) {
-      item["units"] = spelled(row.coordinates);
-      item["before"] = row.before;
-    }
-    if (row.corrected()) {
-      item["after"] = row.after;
-      item["joints"] = row.joints;
-      item["folded"] = row.folded;
-    }
-    if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
-    item["error_before_mm"] = json_mm(row.error_before_mm);
-    item["error_after_mm"] = json_mm(row.error_after_mm);
-    item["sigma_mm"] = json_mm(row.sigma_mm);
-    item["sigma_measured_mm"] = json_mm(row.sigma_measured_mm);
-    item["rounding_mm"] = json_mm(row.rounding_mm);
-    item["domain"] = domain_of(row);
-    item["iterations"] = row.iterations;
-    rows.push_back(std::move(item));
-  }
+std::string receipt_json(const CorrectedProgram& program, const std::optional<ToleranceVerdict>& verdict) {
   ordered_json inserted = ordered_json::array();
   for (const cam::InsertedLine& line : program.inserted)
     inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
-  return {{"model", program.model_id},          {"moves", program.moves}, {"moves_corrected", program.moves_corrected},
-          {"left_alone", program.left_alone()}, {"notes", program.notes}, {"targets", rows},
-          {"inserted_lines", inserted}};
+  ordered_json head = {{"model", program.model_id},
+                       {"moves", program.moves},
+                       {"moves_corrected", program.moves_corrected},
+                       {"left_alone", program.left_alone()},
+                       {"notes", program.notes},
+                       {"largest_step",
+                        {{"mm", json_mm(program.largest_step_mm)},
+                         {"file", program.largest_step_file},
+                         {"line", program.largest_step_line}}},
+                       {"inserted_lines", inserted}};
+  if (verdict) {
+    head["tolerance"] = {{"tolerance_mm", verdict->tolerance_mm},
+                         {"targets", verdict->targets},
+                         {"inside_before", verdict->before},
+                         {"inside_after", verdict->after},
+                         {"expected_inside_after", verdict->expected_after}};
+  }
+  // A line a target: all of them at once as a JSON value would take hundreds of megabytes of a long program.
+  std::string text = json_text(head);
+  text.erase(text.rfind("\n}"));
+  text += ",\n  \"targets\": [";
+  const char* separator = "\n    ";
+  for (const ReceiptRow& row : program.rows) {
+    text += separator;
+    text += shown_lines(item_of(row).dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+    separator = ",\n    ";
+  }
+  return text + "\n  ]\n}\n";
 }
 
 std::string receipt_summary(const CorrectedProgram& program) {

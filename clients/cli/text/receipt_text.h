@@ -1,9 +1,10 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "clients/cam/correct_program.h"
+#include "clients/cli/text/receipt_page.h"
 
 /// What became of a program, for people and programs.
 namespace trammel::cli {
@@ -11,7 +12,8 @@ namespace trammel::cli {
 /// One row a target: `file,line,name,motion,used_at,tool,frame,status`, the numbers before and after in the units of
 /// the file, `x_mm` ... of the position in the robot's base, errors to expect, `rounding_mm`, `message`, `suggestion`.
 [[nodiscard]] std::string receipt_csv(const cam::CorrectedProgram& program);
-[[nodiscard]] nlohmann::ordered_json receipt_json(const cam::CorrectedProgram& program);
+[[nodiscard]] std::string receipt_json(const cam::CorrectedProgram& program,
+                                       const std::optional<ToleranceVerdict>& verdict);
 /// `148 motions, 141 corrected; 60 targets: 55 ok, 5 refused`, and what is left with the reasons.
 [[nodiscard]] std::string receipt_summary(const cam::CorrectedProgram& program);
 [[nodiscard]] std::string left_alone_text(const cam::CorrectedProgram& program);

@@ -1,0 +1,319 @@
+#include "clients/cam/backup/backup.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "clients/cam/backup/parameters.h"
+#include "clients/cam/cell_tools.h"
+#include "clients/cam/number_text.h"
+#include "clients/cam/rapid/rapid.h"
+#include "server/base/name_check.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam {
+
+namespace {
+
+constexpr std::size_t kAxes = 6;
+constexpr double kSameMm = 0.01, kSameDeg = 0.005;  // of tools, base and frames
+constexpr double kSameMassKg = 0.05, kSameCentreMm = 1;
+constexpr double kSameLimitDeg = 0.05;
+
+const ParameterInstance* named(const std::vector<ParameterInstance>& all, const std::string& type,
+                               const std::string& name) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const ParameterInstance& one) {
+    return one.type == type && one.text("name") == name;
+  });
+  return found == all.end() ? nullptr : &*found;
+}
+
+class Backup {
+ public:
+  Backup(const std::string& parameters, std::string where)
+      : where_(std::move(where)), instances_(parameter_instances(parameters)) {}
+
+  Result<ControllerCell> read(const std::vector<SourceFile>& modules, const std::string& unit) {
+    const Result<const ParameterInstance*> robot = choose(unit);
+    if (!robot) return tl::make_unexpected(robot.error());
+    cell_.unit = (*robot)->text("name");
+    cell_.robot_type = (*robot)->text("use_robot_type");
+    for (const Status& read : {read_base(**robot), read_limits(**robot)}) {
+      if (!read) return tl::make_unexpected(read.error());
+    }
+    read_calibration(**robot);
+    if (const Status read = read_modules(modules); !read) return tl::make_unexpected(read.error());
+    return std::move(cell_);
+  }
+
+ private:
+  Result<const ParameterInstance*> choose(const std::string& unit) const {
+    std::vector<const ParameterInstance*> robots;
+    std::vector<std::string> names;
+    for (const ParameterInstance& one : instances_) {
+      if (one.type != "ROBOT") continue;
+      names.push_back(one.text("name"));
+      if (unit.empty() || unit == one.text("name")) robots.push_back(&one);
+    }
+    if (names.empty()) return refused("no robot in these system parameters").in(where_).of("ROBOT");
+    if (robots.size() == 1) return robots[0];
+    return refused("{} robots: {}", names.size(), shown(fmt::format("{}", fmt::join(names, ", "))))
+        .in(where_)
+        .of("ROBOT")
+        .with_text(unit)
+        .next("--unit says which");
+  }
+
+  /// The number of an attribute; `otherwise` where it is left at what the controller takes by default.
+  Status number(const ParameterInstance& of, const std::string& attribute, double otherwise, double& value) const {
+    value = otherwise;
+    const auto found = of.values.find(attribute);
+    if (found == of.values.end()) return {};
+    const auto written = read_number(found->second);
+    if (!written) {
+      return refused("-{} {} of {}: expected a number", attribute, shown_short(found->second), of.type)
+          .in(where_)
+          .at_row(of.line)
+          .of(attribute)
+          .with_text(found->second);
+    }
+    value = written->value;
+    return {};
+  }
+
+  Status read_base(const ParameterInstance& robot) {
+    static constexpr std::array<const char*, 7> kParts = {"pos_x",     "pos_y",     "pos_z",    "orient_u0",
+                                                          "orient_u1", "orient_u2", "orient_u3"};
+    std::array<double, 7> v{};
+    for (std::size_t k = 0; k < kParts.size(); ++k) {
+      if (Status read = number(robot, fmt::format("base_frame_{}", kParts[k]), k == 3 ? 1 : 0, v[k]); !read)
+        return read;
+    }
+    const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
+    if (std::abs(q.norm() - 1) > 1e-2) {
+      return refused("base frame: a quaternion of length {:.4f}", q.norm())
+          .in(where_)
+          .at_row(robot.line)
+          .of("base_frame_orient_u0")
+          .beyond(q.norm(), 1);
+    }
+    cell_.X_WB = make_pose(q.normalized().toRotationMatrix(), {v[0], v[1], v[2]});
+    if (!robot.text("base_frame_coordinated").empty())
+      cell_.notes.push_back(
+          fmt::format("{} carries the robot: its base frame moves", shown(robot.text("base_frame_coordinated"))));
+    return {};
+  }
+
+  Status read_limits(const ParameterInstance& robot) {
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      const std::string joint_name = robot.text(fmt::format("use_joint_{}", k));
+      const ParameterInstance* joint = named(instances_, "JOINT", joint_name);
+      const std::string arm_name =
+          joint != nullptr && !joint->text("use_arm").empty() ? joint->text("use_arm") : joint_name;
+      const ParameterInstance* arm = joint_name.empty() ? nullptr : named(instances_, "ARM", arm_name);
+      if (arm == nullptr || !arm->values.contains("upper_joint_bound") || !arm->values.contains("lower_joint_bound")) {
+        cell_.notes.push_back(
+            fmt::format("the bounds of axis {} are not in the parameters: no ranges are taken", k + 1));
+        cell_.limits.clear();
+        return {};
+      }
+      double lower = 0, upper = 0;
+      if (Status read = number(*arm, "lower_joint_bound", 0, lower); !read) return read;
+      if (Status read = number(*arm, "upper_joint_bound", 0, upper); !read) return read;
+      if (!(lower < upper)) {
+        return refused("axis {}: bounds {:g} and {:g} rad", k + 1, lower, upper)
+            .in(where_)
+            .at_row(arm->line)
+            .of("lower_joint_bound")
+            .beyond(lower, upper);
+      }
+      cell_.limits.emplace_back(lower, upper);
+    }
+    return {};
+  }
+
+  /// Absolute Accuracy is in use where the robot refers to its calibration, `r1_calib`, not to `r1_uncalib`.
+  void read_calibration(const ParameterInstance& robot) {
+    const std::string used = robot.text("use_robot_calib");
+    if (used.empty())
+      cell_.notes.push_back("the parameters do not name a calibration (use_robot_calib): it is taken as not in use");
+    cell_.controller_compensates = used.find("calib") != std::string::npos && used.find("uncalib") == std::string::npos;
+  }
+
+  Status read_modules(const std::vector<SourceFile>& modules) {
+    const RapidData data = read_rapid_data(modules);
+    const Pose X_BW = cell_.X_WB.inverse();
+    for (const ProgramTool& tool : data.tools) {
+      if (Status taken = take(tool); !taken) return taken;
+    }
+    for (const ProgramFrame& frame : data.frames) {
+      if (!frame.why_not.empty()) {
+        cell_.notes.push_back(frame.why_not);
+        continue;
+      }
+      const auto [known, fresh] = cell_.frames.emplace(frame.name, X_BW * frame.X_BO);
+      if (!fresh && !known->second.isApprox(X_BW * frame.X_BO, 1e-9)) return twice("work object", frame.name);
+    }
+    for (const auto& [name, load] : data.loads) {
+      if (!check_name(name, "payload")) continue;
+      const auto [known, fresh] = cell_.loads.emplace(name, load);
+      if (!fresh && (known->second.mass != load.mass || known->second.p_F != load.p_F)) return twice("load", name);
+    }
+    return {};
+  }
+
+  Status take(const ProgramTool& tool) {
+    if (!tool.why_not.empty() || !tool.X_FT) {
+      cell_.notes.push_back(tool.why_not);
+      return {};
+    }
+    if (const Status fine = check_name(tool.name, "tool"); !fine) {
+      cell_.notes.push_back(sentence(fine.error()));
+      return {};
+    }
+    StatedTool stated{*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line)};
+    if (stated.load && is_placeholder(*stated.load)) stated.load.reset();
+    const auto [known, fresh] = cell_.tools.emplace(tool.name, stated);
+    if (!fresh && !known->second.X_FT.isApprox(stated.X_FT, 1e-9)) return twice("tool", tool.name);
+    return {};
+  }
+
+  static Status twice(const char* what, const std::string& name) {
+    return refused("{} {} has two values in the modules", what, shown(name))
+        .of(what)
+        .with_text(name)
+        .next("--task says of which task they are taken");
+  }
+
+  const std::string where_;
+  const std::vector<ParameterInstance> instances_;
+  ControllerCell cell_;
+};
+
+std::string yaml_pose(const Pose& X) {
+  const Vector3 p = X.translation() * to_mm(1);
+  Eigen::Quaterniond q(X.linear());
+  if (q.w() < 0) q.coeffs() *= -1;
+  return fmt::format("{{xyz_mm: [{:.6g}, {:.6g}, {:.6g}], q_wxyz: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]}}", p.x() + 0.0,
+                     p.y() + 0.0, p.z() + 0.0, q.w() + 0.0, q.x() + 0.0, q.y() + 0.0, q.z() + 0.0);
+}
+
+std::string yaml_load(const StatedLoad& load) {
+  const Vector3 p = load.p_F * to_mm(1);
+  return fmt::format("{{mass_kg: {:.6g}, cog_mm: [{:.6g}, {:.6g}, {:.6g}]}}", load.mass, p.x() + 0.0, p.y() + 0.0,
+                     p.z() + 0.0);
+}
+
+std::string apart(const Pose& a, const Pose& b) {
+  return fmt::format("{:.3f} mm and {:.4f} deg apart", to_mm((a.translation() - b.translation()).norm()),
+                     to_deg(pose_difference(a, b).tail<3>().norm()));
+}
+
+bool same(const Pose& a, const Pose& b) {
+  return to_mm((a.translation() - b.translation()).norm()) <= kSameMm &&
+         to_deg(pose_difference(a, b).tail<3>().norm()) <= kSameDeg;
+}
+
+void compare_tools(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+  for (const auto& [name, tool] : controller.tools) {
+    const auto known = cell.tools.find(name);
+    if (known == cell.tools.end()) {
+      found.push_back(fmt::format("tool {} ({}) is not in the cell", shown(name), shown(tool.where)));
+    } else if (known->second && !same(tool.X_FT, *known->second)) {
+      found.push_back(fmt::format("tool {} is {} in the controller, {} in the cell: {}", shown(name),
+                                  yaml_pose(tool.X_FT), yaml_pose(*known->second), apart(tool.X_FT, *known->second)));
+    }
+  }
+  for (const auto& [name, X_FT] : cell.tools) {
+    if (!controller.tools.contains(name))
+      found.push_back(fmt::format("tool {} of the cell is not in the controller", name));
+  }
+}
+
+void compare_loads(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+  for (const auto& [name, tool] : controller.tools) {
+    const auto known = cell.payloads.find(name);
+    if (!tool.load || known == cell.payloads.end()) continue;
+    const double mass = std::abs(tool.load->mass - known->second.mass);
+    const double centre = to_mm((tool.load->p_F - known->second.p_FoCog_F).norm());
+    if (mass <= kSameMassKg && centre <= kSameCentreMm) continue;
+    found.push_back(fmt::format(
+        "load of tool {} is {} in the controller, {} in the cell: {:.3f} kg and {:.1f} mm apart", shown(name),
+        yaml_load(*tool.load), yaml_load({known->second.mass, known->second.p_FoCog_F}), mass, centre));
+  }
+}
+
+void compare_limits(const ControllerCell& controller, const Cell& cell, std::vector<std::string>& found) {
+  std::vector<int> turning;
+  for (int j = 0; j < cell.robot.size(); ++j) {
+    if (cell.robot.joint(j).type == JointType::kRevolute) turning.push_back(j);
+  }
+  if (controller.limits.size() != turning.size()) return;
+  for (std::size_t k = 0; k < turning.size(); ++k) {
+    const auto& [lower, upper] = controller.limits[k];
+    const Joint& joint = cell.robot.joint(turning[k]);
+    // The cell may plan for less than the controller allows, never for more.
+    const double low =
+        cell.joint_ranges.empty() ? joint.lower : cell.joint_ranges[static_cast<std::size_t>(turning[k])].first;
+    const double high =
+        cell.joint_ranges.empty() ? joint.upper : cell.joint_ranges[static_cast<std::size_t>(turning[k])].second;
+    if (to_deg(lower - low) <= kSameLimitDeg && to_deg(high - upper) <= kSameLimitDeg) continue;
+    found.push_back(
+        fmt::format("axis {} may go from {:.2f} to {:.2f} deg in the controller, from {:.2f} to {:.2f} in the cell",
+                    k + 1, to_deg(lower), to_deg(upper), to_deg(low), to_deg(high)));
+  }
+}
+
+}  // namespace
+
+Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
+                                   const std::vector<SourceFile>& modules, const std::string& unit) {
+  return Backup(parameters, where).read(modules, unit);
+}
+
+std::string cell_file_of(const ControllerCell& controller, const std::string& name, const std::string& robot) {
+  std::string text = fmt::format("# From the backup of an ABB controller: {}, {}.\nversion: 1\ncell: {}\nrobot: {}\n",
+                                 shown(controller.unit), shown(controller.robot_type), name, robot);
+  text += fmt::format("base: {}   # in the controller's world; of the tracker's: null finds it from the data\n",
+                      yaml_pose(controller.X_WB));
+  text += "tools:\n";
+  for (const auto& [tool, stated] : controller.tools) text += fmt::format("  {}: {}\n", tool, yaml_pose(stated.X_FT));
+  std::string payloads;
+  for (const auto& [tool, stated] : controller.tools) {
+    if (stated.load) payloads += fmt::format("  {}: {}\n", tool, yaml_load(*stated.load));
+  }
+  for (const auto& [load, stated] : controller.loads) {
+    if (!controller.tools.contains(load)) payloads += fmt::format("  {}: {}\n", load, yaml_load(stated));
+  }
+  if (!payloads.empty()) text += "payloads:\n" + payloads;
+  if (!controller.limits.empty()) {
+    std::vector<std::string> ranges;
+    for (std::size_t k = 0; k < controller.limits.size(); ++k)
+      ranges.push_back(fmt::format("q{}: [{:.6g}, {:.6g}]", k + 1, to_deg(controller.limits[k].first),
+                                   to_deg(controller.limits[k].second)));
+    text += fmt::format("joint_ranges_deg: {{{}}}\n", fmt::join(ranges, ", "));
+  }
+  return text + fmt::format("controller_compensates: {}\n", controller.controller_compensates);
+}
+
+std::vector<std::string> differences(const ControllerCell& controller, const Cell& cell, bool cell_compensates) {
+  std::vector<std::string> found;
+  if (cell.X_WB && !same(controller.X_WB, *cell.X_WB)) {
+    found.push_back(fmt::format("the base is {} in the controller, {} in the cell: {}", yaml_pose(controller.X_WB),
+                                yaml_pose(*cell.X_WB), apart(controller.X_WB, *cell.X_WB)));
+  }
+  compare_tools(controller, cell, found);
+  compare_loads(controller, cell, found);
+  compare_limits(controller, cell, found);
+  if (controller.controller_compensates != cell_compensates) {
+    found.push_back(fmt::format("the controller's own calibration is {} use, the cell says controller_compensates: {}",
+                                controller.controller_compensates ? "in" : "not in", cell_compensates));
+  }
+  return found;
+}
+
+}  // namespace trammel::cam

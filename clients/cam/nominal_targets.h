@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/cam/cell_tools.h"
+#include "clients/cam/configuration.h"
+#include "clients/cam/program.h"
+#include "clients/session/session_types.h"
+
+namespace trammel::cam {
+
+/// A target of a program as the controller takes it.
+struct NominalTarget {
+  client::TargetMm asked;        ///< as a model is asked to correct it
+  std::optional<JointVector> q;  ///< the controller's joints; empty: not found
+  std::string why_not;           ///< why it cannot be corrected; empty: it may be
+};
+
+struct NominalTargets {
+  std::vector<ToolChoice> tools;       ///< of each tool of the program
+  std::vector<NominalTarget> targets;  ///< of each target of the program
+  std::vector<std::string> notes;
+};
+
+/// In the order of the motions, since one motion may leave its configuration to the one before. Refuses what
+/// choose_tools() refuses.
+[[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm,
+                                                     const CellTools& cell, const std::string& tool,
+                                                     const std::string& payload);
+
+/// X_BT of a target; empty for joints that were not found.
+[[nodiscard]] std::optional<Pose> wanted_pose(const Program& program, const Chain& robot, const CellTools& cell,
+                                              const NominalTargets& nominal, std::size_t target);
+
+/// Targets of one tool and payload of the cell, to be asked for together; those that cannot be corrected left out.
+struct TargetGroup {
+  std::string tool, payload;
+  std::vector<std::size_t> targets;
+};
+[[nodiscard]] std::vector<TargetGroup> groups_of(const Program& program, const NominalTargets& nominal);
+
+/// rad, of a rail mm.
+[[nodiscard]] std::vector<double> joints_on_wire(const JointVector& q, const Chain& robot);
+/// Axes of a joint target in degrees, whatever its dialect writes.
+[[nodiscard]] std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes);
+
+}  // namespace trammel::cam

@@ -1,0 +1,98 @@
+#include "clients/cam/predict_program.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "clients/cam/configuration.h"
+#include "clients/cam/nominal_targets.h"
+
+namespace trammel::cam {
+
+namespace {
+
+PredictedTarget begun(const Program& program, std::size_t t) {
+  const ProgramTarget& target = program.targets[t];
+  PredictedTarget row;
+  row.name = target.name;
+  row.file = program.files[target.file].name;
+  row.line = target.line;
+  row.motion = target.motion;
+  row.used_at = target.used_at;
+  row.tool = program.tools[target.tool].name;
+  row.frame = program.frames[target.frame].name;
+  row.status = "refused";
+  return row;
+}
+
+PredictedTarget left(const Program& program, const LeftAlone& left) {
+  PredictedTarget row;
+  row.name = left.name;
+  row.file = program.files[left.file].name;
+  row.line = left.line;
+  row.motion = left.motion;
+  row.status = "refused";
+  row.message = left.why;
+  return row;
+}
+
+void take(const client::PredictedError& predicted, const Chain& robot, const JointVector& q, PredictedTarget& row) {
+  row.predicted = predicted;
+  row.status = predicted.in_domain ? "ok" : "out_of_domain";
+  if (!predicted.in_domain)
+    row.message = fmt::format("too far from the training poses: {:.0f} % of the learned bias are taken",
+                              100 * predicted.bias_share);
+  if (const auto joint = robot.joint_outside_limits(q)) {
+    row.status = "joint_limit";
+    row.message = fmt::format("joint {} is outside its limits", *joint + 1);
+  }
+}
+
+}  // namespace
+
+Result<PredictedProgram> predict_program(const Program& program, const Chain& robot, const CellTools& cell,
+                                         const AskPredictions& ask, const std::string& tool,
+                                         const std::string& payload) {
+  const ArmOfProgram arm(robot);
+  const Result<NominalTargets> nominal = nominal_targets(program, arm, cell, tool, payload);
+  if (!nominal) return tl::make_unexpected(nominal.error());
+  PredictedProgram result;
+  result.notes = nominal->notes;
+  for (std::size_t t = 0; t < program.targets.size(); ++t) {
+    result.targets.push_back(begun(program, t));
+    result.targets[t].message = nominal->targets[t].why_not;
+    if (const auto X_BT = wanted_pose(program, robot, cell, *nominal, t)) result.targets[t].p_B = X_BT->translation();
+  }
+  for (const TargetGroup& group : groups_of(program, *nominal)) {
+    std::vector<std::size_t> found;
+    std::vector<client::CommandedJoints> poses;
+    for (const std::size_t t : group.targets) {
+      const auto& q = nominal->targets[t].q;
+      if (!q) {
+        result.targets[t].status = "unreachable";
+        result.targets[t].message = "no joints bring the tool there";
+        continue;
+      }
+      found.push_back(t);
+      poses.push_back({joints_on_wire(*q, robot), {}});
+    }
+    if (poses.empty()) continue;
+    const auto answer = ask(group.tool, group.payload, poses);
+    if (!answer) return tl::make_unexpected(answer.error());
+    if (!result.model_id.empty() && result.model.hash != answer->model.hash)
+      return failure(ErrorCode::kBusy, "the model changed while the program was predicted").next("try again");
+    result.model = answer->model;
+    result.model_id = answer->model.id;
+    for (std::size_t k = 0; k < found.size(); ++k)
+      take(answer->items[k], robot, *nominal->targets[found[k]].q, result.targets[found[k]]);
+  }
+  for (const LeftAlone& one : program.left) result.targets.push_back(left(program, one));
+  std::stable_sort(result.targets.begin(), result.targets.end(),
+                   [](const PredictedTarget& a, const PredictedTarget& b) {
+                     return std::tie(a.file, a.line) < std::tie(b.file, b.line);
+                   });
+  return result;
+}
+
+}  // namespace trammel::cam

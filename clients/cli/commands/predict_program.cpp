@@ -1,0 +1,120 @@
+#include "clients/cli/commands/predict_program.h"
+
+#include <algorithm>
+
+#include "clients/cam/predict_program.h"
+#include "clients/cli/files/program_files.h"
+#include "clients/cli/service/answers.h"
+#include "clients/cli/service/model_answers.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/prediction_text.h"
+#include "clients/cli/work/in_parallel.h"
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+#include "server/compensate/model_file.h"
+#include "server/measurement/pose_columns.h"
+
+namespace trammel::cli {
+
+namespace {
+
+constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
+
+PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot, const std::string& tool,
+                       const std::string& payload) {
+  PoseContext context;
+  context.q = JointVector(robot.size());
+  for (int j = 0; j < robot.size(); ++j) {
+    const double value = pose.q_rad[static_cast<std::size_t>(j)];
+    context.q(j) = robot.joint(j).type == JointType::kPrismatic ? from_mm(value) : value;
+  }
+  context.tool = tool;
+  context.payload = payload;
+  context.served = true;
+  return context;
+}
+
+cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progress) {
+  return [&](const std::string& asked_tool, const std::string& asked_payload,
+             const std::vector<client::CommandedJoints>& poses) -> Result<client::Answer<client::PredictedError>> {
+    const Result<std::string> tool = resolve_tool(model.cell(), asked_tool);
+    if (!tool) return tl::make_unexpected(tool.error());
+    const Result<std::string> payload = resolve_payload(model.cell(), asked_payload);
+    if (!payload) return tl::make_unexpected(payload.error());
+    if (const Status known = model.check_trained_with(*tool, *payload); !known)
+      return tl::make_unexpected(known.error());
+    client::Answer<client::PredictedError> answer{info_of(model), {}};
+    answer.items.resize(poses.size());
+    const auto portion = [&](std::size_t k) {
+      std::vector<PoseContext> contexts;
+      const std::size_t first = k * kPosesTogether, last = std::min(first + kPosesTogether, poses.size());
+      for (std::size_t i = first; i < last; ++i)
+        contexts.push_back(context_of(poses[i], model.cell().robot, *tool, *payload));
+      const std::vector<ErrorPrediction> all = model.predict_all(contexts);
+      for (std::size_t i = first; i < last; ++i) answer.items[i] = to_wire(all[i - first]);
+    };
+    in_parallel((poses.size() + kPosesTogether - 1) / kPosesTogether, portion,
+                [&](double share) { progress.show("predicting", share); });
+    return answer;
+  };
+}
+
+Result<cam::PredictedProgram> predict_here(const cam::Program& program, const PredictProgramArguments& arguments) {
+  const Result<CompensatedModel> model = load_model(arguments.model);
+  if (!model) return tl::make_unexpected(model.error());
+  ProgressLine progress;
+  return cam::predict_program(program, model->cell().robot, tools_of(*model), ask_model(*model, progress),
+                              arguments.tool, arguments.payload);
+}
+
+Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
+                                                 const PredictProgramArguments& arguments) {
+  return with_served_model<cam::PredictedProgram>(
+      arguments.model, arguments.service,
+      [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model, const SawModel& saw) {
+        ProgressLine progress;
+        const cam::AskPredictions ask = [&](const std::string& tool, const std::string& payload,
+                                            const std::vector<client::CommandedJoints>& poses) {
+          client::CallContext context = of;
+          context.tool = tool;
+          context.payload = payload;
+          auto answer =
+              session.predict_error_at(context, poses, [&](double share) { progress.show("predicting", share); });
+          if (answer) saw(answer->model);
+          return answer;
+        };
+        return cam::predict_program(program, model.cell().robot, tools_of(model), ask, arguments.tool,
+                                    arguments.payload);
+      });
+}
+
+}  // namespace
+
+Result<Extent> predict_program(const PredictProgramArguments& arguments) {
+  const Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format);
+  if (!files) return tl::make_unexpected(files.error());
+  cam::ReadOptions reading;
+  reading.split = true;  // nothing is written, so a point may be used in several ways
+  if (!arguments.frames.empty()) {
+    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
+    if (!frames) return tl::make_unexpected(frames.error());
+    reading.frames = std::move(*frames);
+  }
+  const cam::Program program = cam::read_program(files->dialect, files->files, reading);
+  const Result<cam::PredictedProgram> predicted =
+      arguments.service.service ? predict_by_service(program, arguments) : predict_here(program, arguments);
+  if (!predicted) return tl::make_unexpected(predicted.error());
+  if (const Status written = write_output(arguments.output, prediction_csv(*predicted)); !written)
+    return tl::make_unexpected(written.error());
+  fmt::print(stderr, "{}", shown_lines(prediction_summary(*predicted)));
+  if (!arguments.json.empty()) {
+    if (const Status written = write_json(arguments.json, prediction_json(*predicted)); !written)
+      return tl::make_unexpected(written.error());
+  }
+  const bool all = std::none_of(predicted->targets.begin(), predicted->targets.end(), [](const auto& target) {
+    return target.status == "refused" || target.status == "unreachable";
+  });
+  return all ? Extent::kAll : Extent::kPart;
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "server/base/result.h"
+
+namespace trammel::cli {
+
+/// What `predict` is asked for where the input is a program.
+struct PredictProgramArguments {
+  std::vector<std::string> inputs;
+  std::string model, tool, payload, format, output, json, frames;
+  ServiceOptions service;
+};
+
+/// A target that nothing can be said of makes it Extent::kPart.
+[[nodiscard]] Result<Extent> predict_program(const PredictProgramArguments& arguments);
+
+}  // namespace trammel::cli

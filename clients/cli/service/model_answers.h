@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "clients/cam/cell_tools.h"
+#include "clients/cli/service/answers.h"
+#include "clients/cli/terminal/options.h"
+#include "server/compensate/compensated_model.h"
+#include "server/compensate/model_file.h"
+
+/// What programs need of a model, whether it is a file or behind a service.
+namespace trammel::cli {
+
+[[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);
+[[nodiscard]] client::ModelInfo info_of(const CompensatedModel& model);
+
+/// Tells which model answered a call.
+using SawModel = std::function<void(const client::ModelInfo&)>;
+
+/// Calls `work(session, context, model, saw)` with the model that the service answers with: it is fetched, and fetched
+/// again if another one has answered meanwhile. kBusy: that happened again and again.
+template <typename T, typename Work>
+[[nodiscard]] Result<T> with_served_model(const std::string& name, const ServiceOptions& service, const Work& work) {
+  constexpr int kAttempts = 5;
+  const Result<ModelReference> reference = parse_model_reference(name);
+  if (!reference) return tl::make_unexpected(reference.error());
+  const auto session = open_session(service);
+  if (!session) return tl::make_unexpected(session.error());
+  client::CallContext context;
+  context.cell = reference->cell;
+  if (reference->version > 0) context.model = fmt::format("@{}", reference->version);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const Result<std::string> text = (*session)->export_model(reference->cell, reference->version);
+    if (!text) return tl::make_unexpected(text.error());
+    const Result<CompensatedModel> model = deserialize(*text, name);
+    if (!model) return tl::make_unexpected(model.error());
+    bool another = false;
+    const SawModel saw = [&](const client::ModelInfo& answered) {
+      another |= answered.hash != model->provenance().hash;
+    };
+    Result<T> done = work(**session, context, *model, saw);
+    if (!another) return done;
+  }
+  return failure(ErrorCode::kBusy, "cell {}: the model changed during each of {} attempts", reference->cell, kAttempts);
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,108 @@
+#include "clients/cli/text/prediction_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/base/units.h"
+#include "server/measurement/files/csv_table.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using cam::PredictedProgram;
+using cam::PredictedTarget;
+using nlohmann::ordered_json;
+
+bool has_prediction(const PredictedTarget& target) {
+  return target.status != "refused" && target.status != "unreachable";
+}
+
+/// mm, to a hundredth of a micrometre: more nobody knows.
+std::string millimetres(double value) { return std::isfinite(value) ? fmt::format("{:.5f}", value) : ""; }
+double rounded(double value) { return std::round(value * 1e5) / 1e5; }
+
+double error_mm(const PredictedTarget& target) {
+  return std::hypot(target.predicted.dx_mm, target.predicted.dy_mm, target.predicted.dz_mm);
+}
+
+/// rms of the error to expect: its mean and what is not known of it.
+double expected_mm(const PredictedTarget& target) {
+  const client::PredictedError& item = target.predicted;
+  return std::hypot(error_mm(target), std::hypot(item.slx_mm, item.sly_mm, item.slz_mm));
+}
+
+}  // namespace
+
+std::string prediction_csv(const PredictedProgram& program) {
+  std::string text =
+      "file,line,name,motion,used_at,tool,frame,status,x_mm,y_mm,z_mm,px_mm,py_mm,pz_mm,dx_mm,dy_mm,dz_mm,error_mm,"
+      "slx_mm,sly_mm,slz_mm,expected_mm,model_id,message\n";
+  for (const PredictedTarget& row : program.targets) {
+    text += fmt::format("{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
+                        csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
+                        csv_field(row.tool), csv_field(row.frame), row.status);
+    const client::PredictedError& item = row.predicted;
+    std::vector<double> values = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+    const std::vector<double> known = {item.predicted.x_mm, item.predicted.y_mm, item.predicted.z_mm, item.dx_mm,
+                                       item.dy_mm,          item.dz_mm,          error_mm(row),       item.slx_mm,
+                                       item.sly_mm,         item.slz_mm,         expected_mm(row)};
+    const std::vector<double> unknown(known.size(), cam::kNotKnown);
+    values.insert(values.end(), has_prediction(row) ? known.begin() : unknown.begin(),
+                  has_prediction(row) ? known.end() : unknown.end());
+    for (const double value : values) text += millimetres(value) + ",";
+    text += fmt::format("{},{}\n", program.model_id, csv_field(row.message));
+  }
+  return text;
+}
+
+ordered_json prediction_json(const PredictedProgram& program) {
+  ordered_json targets = ordered_json::array();
+  for (const PredictedTarget& row : program.targets) {
+    ordered_json item = {{"file", row.file},     {"line", row.line},       {"name", row.name},
+                         {"motion", row.motion}, {"used_at", row.used_at}, {"tool", row.tool},
+                         {"frame", row.frame},   {"status", row.status},   {"message", row.message}};
+    if (std::isfinite(row.p_B.x())) item["position_mm"] = {to_mm(row.p_B.x()), to_mm(row.p_B.y()), to_mm(row.p_B.z())};
+    if (has_prediction(row)) {
+      const client::PredictedError& of = row.predicted;
+      item["predicted_mm"] = {of.predicted.x_mm, of.predicted.y_mm, of.predicted.z_mm};
+      item["error_mm"] = {rounded(of.dx_mm), rounded(of.dy_mm), rounded(of.dz_mm)};
+      item["sigma_mm"] = {rounded(of.slx_mm), rounded(of.sly_mm), rounded(of.slz_mm)};
+      item["expected_mm"] = rounded(expected_mm(row));
+    }
+    targets.push_back(std::move(item));
+  }
+  return {{"model", program.model_id}, {"notes", program.notes}, {"targets", targets}};
+}
+
+std::string prediction_summary(const PredictedProgram& program) {
+  std::map<std::string, int> counts;
+  double squares = 0, most = 0;
+  int known = 0;
+  std::string left;
+  for (const PredictedTarget& row : program.targets) {
+    ++counts[row.status];
+    if (!has_prediction(row)) {
+      left += fmt::format("  {} line {}: {}{}: {}\n", row.file, row.line, row.name.empty() ? "" : row.name + ": ",
+                          row.status, row.message);
+      continue;
+    }
+    ++known;
+    squares += expected_mm(row) * expected_mm(row);
+    most = std::max(most, expected_mm(row));
+  }
+  std::string text = fmt::format("{} targets:", program.targets.size());
+  const char* separator = " ";
+  for (const auto& [status, count] : counts) {
+    text += fmt::format("{}{} {}", separator, count, status);
+    separator = ", ";
+  }
+  if (known > 0)
+    text += fmt::format("; expected error {:.3f} mm rms, {:.3f} mm at most", std::sqrt(squares / known), most);
+  text += "\n";
+  for (const std::string& note : program.notes) text += "note: " + note + "\n";
+  return text + left;
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,118 @@
+#include "server/compensate/correct_in_wrist.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trammel {
+
+namespace {
+
+// Within 6 deg of the singularity a turn of 1 mrad would need 10 mrad of joints 4 and 6 and more.
+constexpr double kBorder = 0.105;
+constexpr double kMostDamping = 0.06;   // of the idle motion, at the singularity: its square is more than what is left
+constexpr int kFreeSteps = 6;           // that choose the idle motion; then it stays, and the rest settles
+constexpr double kMostOfOpening = 0.9;  // that a correction may take: the wrist never opens to the other side
+constexpr double kSettled = 1e-8;       // rad, of a step
+constexpr double kRegular = 1e-12;
+
+/// Whatever a correction asks for, cut smoothly so that it never reaches the whole opening.
+double cut(double asked, double opening) {
+  const double most = kMostOfOpening * std::abs(opening);
+  const double free = most / 2;
+  if (std::abs(asked) <= free) return asked;
+  return std::copysign(free + (most - free) * std::tanh((std::abs(asked) - free) / (most - free)), asked);
+}
+
+/// Steps of the joints: the point comes to where it is missing, of the rotation as much as may be had:
+/// min |J_r d - e_r|² + λ² (idle · (so far + d))²  with  J_p d = e_p,  rails held. After kFreeSteps  idle · d = 0: what
+/// is left of the rotation would keep the idle motion from settling.
+class WristSteps {
+ public:
+  WristSteps(const Chain& robot, const Vector3& p_FT, const WristOpening& wrist)
+      : robot_(robot), p_FT_(p_FT), wrist_(wrist) {
+    const double share = std::abs(wrist.angle) / kBorder;
+    const double damping = share < 1 ? kMostDamping * std::pow(1 - share * share, 2) : 0.0;
+    square_ = damping * damping;
+  }
+
+  JointVector step(const JointVector& q, const JointVector& so_far, const Vector6& missing) {
+    if (steps_++ == kFreeSteps) held_ = true;
+    if (!opened_) {
+      const double asked = wrist_.by_joint.dot(solve(q, so_far, missing, std::nullopt));
+      const double allowed = cut(asked, wrist_.angle);
+      opened_ = allowed == asked ? Opened{std::nullopt} : Opened{allowed};
+    }
+    return solve(q, so_far, missing, opened_->change);
+  }
+
+ private:
+  struct Opened {
+    std::optional<double> change;  ///< rad, of the wrist's angle in all; empty: as it comes
+  };
+
+  JointVector solve(const JointVector& q, const JointVector& so_far, const Vector6& missing,
+                    const std::optional<double>& change) const {
+    const Eigen::MatrixXd J = robot_.jacobian(q, p_FT_);
+    const Eigen::MatrixXd turn = J.bottomRows<3>();
+    const Eigen::Index n = J.cols();
+    Eigen::MatrixXd held = J.topRows<3>();
+    Eigen::VectorXd values = missing.head<3>();
+    const auto hold = [&](const Eigen::VectorXd& row, double value) {
+      held.conservativeResize(held.rows() + 1, n);
+      held.row(held.rows() - 1) = row.transpose();
+      values.conservativeResize(values.size() + 1);
+      values(values.size() - 1) = value;
+    };
+    for (int j = 0; j < robot_.size(); ++j) {
+      if (robot_.joint(j).type == JointType::kPrismatic) hold(Eigen::VectorXd::Unit(n, j), 0);
+    }
+    if (held_) hold(wrist_.idle, 0);
+    if (change) hold(wrist_.by_joint, *change - wrist_.by_joint.dot(so_far));
+    const Eigen::Index m = held.rows();
+    Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n + m, n + m);
+    K.topLeftCorner(n, n) = turn.transpose() * turn + square_ * wrist_.idle * wrist_.idle.transpose();
+    K.topLeftCorner(n, n).diagonal().array() += kRegular;
+    K.topRightCorner(n, m) = held.transpose();
+    K.bottomLeftCorner(m, n) = held;
+    Eigen::VectorXd right(n + m);
+    right << turn.transpose() * missing.tail<3>() - square_ * wrist_.idle.dot(so_far) * wrist_.idle, values;
+    return K.fullPivLu().solve(right).head(n);
+  }
+
+  const Chain& robot_;
+  const Vector3 p_FT_;
+  const WristOpening& wrist_;
+  double square_ = 0;
+  int steps_ = 0;
+  bool held_ = false;  ///< the idle motion is chosen
+  std::optional<Opened> opened_;
+};
+
+}  // namespace
+
+std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector& q) {
+  return wrist_opening(robot, q, kBorder);
+}
+
+CorrectedInWrist correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
+                                  const JointVector& from, const Vector6& missing_at_start,
+                                  const MissingAt& missing_at, const CorrectOptions& options) {
+  const JointVector start = from;  // what `missing_at` writes to may be what the caller handed over
+  CorrectedInWrist now{start, missing_at_start};
+  bool asked_here = true;  // what was learned
+  WristSteps steps(robot, X_FT.translation(), wrist);
+  while (true) {
+    const JointVector step = steps.step(now.q, now.q - start, now.missing);
+    const bool still = step.norm() < kSettled && now.missing.head<3>().norm() < options.tolerance;
+    now.settled = still && asked_here;
+    if (now.settled || now.iterations == kFreeSteps + options.max_iterations) return now;
+    if (!still) {
+      now.q += step;
+      ++now.iterations;
+    }
+    asked_here = still;
+    now.missing = missing_at(now.q, still);
+  }
+}
+
+}  // namespace trammel

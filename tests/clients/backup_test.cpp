@@ -1,0 +1,115 @@
+#include "clients/cam/backup/backup.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "clients/cli/command_line.h"
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/robot/cell_rules.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel::cli {
+namespace {
+
+const std::string kBackup = TRAMMEL_SOURCE_DIR "/config/programs/backup";
+const std::string kRobot = TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml";
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), by);
+}
+
+class ImportBackup : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::copy(kBackup, file("backup"), std::filesystem::copy_options::recursive); }
+  int run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"trammel", "import-backup", file("backup")});
+    std::vector<const char*> argv;
+    for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+    return run_command_line(static_cast<int>(argv.size()), argv.data());
+  }
+  std::string file(const std::string& name) const { return folder_.file(name); }
+  std::string text(const std::string& name) const { return read_text_file(file(name)).value(); }
+  void change(const std::string& name, const std::string& what, const std::string& by) {
+    ASSERT_TRUE(write_text_file(file(name), replaced(text(name), what, by)));
+  }
+  std::vector<std::string> differing(const std::string& cell) {
+    EXPECT_NE(run({"--compare", cell, "--json", file("d.json")}), 3);
+    return nlohmann::json::parse(text("d.json"))["differences"].get<std::vector<std::string>>();
+  }
+  const std::string moc = "backup/SYSPAR/MOC.cfg", user = "backup/RAPID/TASK1/SYSMOD/user.sys";
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(ImportBackup, MakesACellOfWhatTheControllerHas) {
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "cell-7", "--robot", kRobot, "--frames", file("frames.csv")}), 0);
+  const Cell cell = read_cell(file("cell.yaml")).value();
+  EXPECT_EQ(cell.name, "cell-7");
+  ASSERT_TRUE(cell.tools.at("spindle"));
+  EXPECT_LT((cell.tools.at("spindle")->translation() - Vector3(.1, 0, .15)).norm(), 1e-9);
+  EXPECT_NEAR(cell.payloads.at("spindle").mass, 100, 1e-9);
+  EXPECT_NEAR(cell.payloads.at("lPanel").mass, 12.5, 1e-9);
+  ASSERT_EQ(cell.joint_ranges.size(), 6u);
+  EXPECT_NEAR(to_deg(cell.joint_ranges[2].second), 70, 1e-3);
+  EXPECT_FALSE(rules_of(cell)->controller_compensates);
+  EXPECT_NE(text("frames.csv").find("wPanel,1800,-250,800,1,0,0,0"), std::string::npos) << text("frames.csv");
+  EXPECT_TRUE(differing(file("cell.yaml")).empty());
+}
+
+TEST_F(ImportBackup, TellsWhereACellDiffersWithBothValuesAndHowFar) {
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "cell-7", "--robot", kRobot}), 0);
+  change(user, "[100,0,150]", "[100,0,153.5]");
+  change(user, "[100,[0,0,100]", "[112,[0,0,100]");
+  change(moc, "r1_uncalib", "r1_calib");
+  change(moc, "-base_frame_pos_x 0 ", "-base_frame_pos_x 0.25 ");
+  change(moc, "-upper_joint_bound 1.48353", "-upper_joint_bound 1.2");
+  const std::vector<std::string> found = differing(file("cell.yaml"));
+  ASSERT_EQ(found.size(), 5u) << fmt::format("{}", fmt::join(found, "\n"));
+  EXPECT_NE(found[0].find("250.000 mm and 0.0000 deg apart"), std::string::npos) << found[0];
+  EXPECT_NE(found[1].find("tool spindle"), std::string::npos);
+  EXPECT_NE(found[1].find("3.500 mm and 0.0000 deg apart"), std::string::npos) << found[1];
+  EXPECT_NE(found[2].find("12.000 kg"), std::string::npos) << found[2];
+  EXPECT_NE(found[3].find("axis 2"), std::string::npos) << found[3];
+  EXPECT_NE(found[4].find("controller_compensates: false"), std::string::npos) << found[4];
+  EXPECT_EQ(run({"--compare", file("cell.yaml")}), 1);
+  ASSERT_EQ(run({"-o", file("now.yaml"), "--name", "cell-7", "--robot", kRobot}), 0);
+  EXPECT_TRUE(differing(file("now.yaml")).empty());
+  EXPECT_TRUE(rules_of(read_cell(file("now.yaml")).value())->controller_compensates);
+}
+
+TEST_F(ImportBackup, RefusesWhatDoesNotMakeACell) {
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c"}), 2) << "no robot file";
+  EXPECT_EQ(run({}), 2);
+  const std::string good = text(moc);
+  change(moc, "-base_frame_orient_u0 1", "-base_frame_orient_u0 2");
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
+  folder_.write(moc, replaced(good, "-base_frame_pos_x 0", "-base_frame_pos_x zero"));
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
+  folder_.write(moc, "MOC:CFG_1.0:6:1::\n");
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
+  folder_.write(moc, good + "#\nROBOT:\n\n  -name \"ROB_2\"\n");
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3) << "which of two?";
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1"}), 0);
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1", "--task", "T"}), 3);
+  std::filesystem::create_directories(file("backup/RAPID/TASK2/SYSMOD"));
+  folder_.write("backup/RAPID/TASK2/SYSMOD/user.sys", replaced(text(user), "[100,0,150]", "[1,0,150]"));
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1"}), 3) << "two spindles";
+  EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1", "--task", "task1"}), 0);
+}
+
+TEST_F(ImportBackup, AnythingMayStandInTheParameters) {
+  const std::string good = text(moc);
+  for (std::size_t cut = 0; cut < good.size(); cut += 7)
+    static_cast<void>(cam::read_backup(good.substr(0, cut), "MOC.cfg", {}, ""));
+  for (const char* odd :
+       {"", "\\", "ROBOT:", "ROBOT:\n-", "ROBOT:\n-name \"", "ROBOT:\n-name\\", ":\n-a b", "\n\n\\\n"})
+    EXPECT_FALSE(cam::read_backup(odd, "MOC.cfg", {}, "ROB_1")) << odd;
+}
+
+}  // namespace
+}  // namespace trammel::cli

@@ -1,0 +1,42 @@
+/PROG  CIRCLES
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "panel";
+PROG_SIZE	= 612;
+CREATE		= DATE 26-11-22  TIME 10:31:04;
+LINE_COUNT	= 4;
+DEFAULT_GROUP	= 1,*,*,*,*;
+/APPL
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:L P[1] 100mm/sec FINE     ;
+   4:C P[2]    
+    :  P[3] 80mm/sec FINE     ;
+   5:A P[4] 80mm/sec CNT20     ;
+/POS
+P[1]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =       .000  mm,	Y =    150.000  mm,	Z =       .000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+P[2]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =       .000  mm,	Y =    170.000  mm,	Z =     20.000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+P[3]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =       .000  mm,	Y =    190.000  mm,	Z =       .000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+P[4]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =       .000  mm,	Y =    170.000  mm,	Z =    -20.000  mm,
+	W =      .000 deg,	P =    90.000 deg,	R =      .000 deg
+};
+/END
