@@ -573,7 +573,7 @@ TEST_F(HandlersTest, BatchesAreListedAndReadAsTheyCame) {
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->text(), csv);
   request.batch_id("lt-08");
-  EXPECT_EQ(refusal(request).code, ErrorCode::kNotFound);
+  EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
