@@ -263,8 +263,8 @@ DatedJob from_wire(const wire::Job& job, const std::string& server) {
   return dated;
 }
 
-QuarantinedBatch from_wire(const wire::BatchInfo& batch) {
-  return {batch.cell(), batch.id(), batch.quarantine(), batch.poses()};
+BatchOfService from_wire(const wire::BatchInfo& batch) {
+  return {batch.cell(), batch.id(), batch.quarantine(), batch.poses(), batch.accepted_at_unix_s(), batch.hash()};
 }
 
 ServerStatus from_wire(const wire::ServiceStatus& status) {

@@ -19,7 +19,7 @@ namespace trammel::client {
 [[nodiscard]] JobStatus status_of(const wire::Job& job);
 [[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
 [[nodiscard]] DatedJob from_wire(const wire::Job& job, const std::string& server);
-[[nodiscard]] QuarantinedBatch from_wire(const wire::BatchInfo& batch);
+[[nodiscard]] BatchOfService from_wire(const wire::BatchInfo& batch);
 /// The error in a reply that is not RESULT_OK.
 [[nodiscard]] Error error_of(const wire::ReplyHeader& header);
 

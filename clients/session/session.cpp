@@ -365,14 +365,32 @@ Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t
   return DiagnosisAnswer{std::move(reply->text()), std::move(reply->page_html()), from_wire(reply->in_force())};
 }
 
-Result<std::vector<QuarantinedBatch>> Session::quarantine(const std::string& cell) {
-  const auto replies = participant_->read_all(cell, wire::READ_QUARANTINE);
-  if (!replies) return tl::make_unexpected(replies.error());
-  std::vector<QuarantinedBatch> batches;
-  for (const wire::ReadModelsReply& reply : *replies) {
+namespace {
+
+std::vector<BatchOfService> batches_in(const std::vector<wire::ReadModelsReply>& replies) {
+  std::vector<BatchOfService> batches;
+  for (const wire::ReadModelsReply& reply : replies) {
     for (const wire::BatchInfo& batch : reply.batches()) batches.push_back(from_wire(batch));
   }
   return batches;
+}
+
+}  // namespace
+
+Result<std::vector<BatchOfService>> Session::quarantine(const std::string& cell) {
+  return participant_->read_all(cell, wire::READ_QUARANTINE).map(batches_in);
+}
+
+Result<std::vector<BatchOfService>> Session::batches(const std::string& cell) {
+  return participant_->read_all(cell, wire::READ_BATCHES).map(batches_in);
+}
+
+Result<std::string> Session::export_batch(const std::string& cell, const std::string& batch_id) {
+  wire::ReadModelsRequest request;
+  request.batch_id(batch_id);
+  auto reply = participant_->read(cell, {}, wire::READ_BATCH, request);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
 }
 
 Status Session::release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {

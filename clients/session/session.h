@@ -62,7 +62,11 @@ class Session {
                                                   const ChangeOptions& change = {});
   [[nodiscard]] Result<DiagnosisAnswer> diagnosis(const std::string& cell, std::int64_t job, bool page);
   /// From every server, for one cell or (empty) for all.
-  [[nodiscard]] Result<std::vector<QuarantinedBatch>> quarantine(const std::string& cell);
+  [[nodiscard]] Result<std::vector<BatchOfService>> quarantine(const std::string& cell);
+  /// All that the servers have, as quarantine(), oldest first.
+  [[nodiscard]] Result<std::vector<BatchOfService>> batches(const std::string& cell);
+  /// The batch's text as it came.
+  [[nodiscard]] Result<std::string> export_batch(const std::string& cell, const std::string& batch_id);
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});
   /// Nothing takes the batch any more.
   [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeOptions& change = {});

@@ -132,9 +132,13 @@ struct DiagnosisAnswer {
 };
 
 /// A batch in quarantine, and why.
-struct QuarantinedBatch {
-  std::string cell, batch, reason;
+/// A batch that a service has.
+struct BatchOfService {
+  std::string cell, batch;
+  std::string reason;  ///< why it is kept out; empty: it is not
   int poses = 0;
+  std::int64_t accepted_unix_s = 0;
+  std::string hash;  ///< SHA-256 of its text
 };
 
 struct ServerStatus {

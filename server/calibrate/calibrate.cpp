@@ -1,5 +1,6 @@
 #include "server/calibrate/calibrate.h"
 
+#include <algorithm>
 #include <map>
 
 #include "server/calibrate/frames/frames.h"
@@ -7,11 +8,14 @@
 #include "server/calibrate/identify/identify.h"
 #include "server/calibrate/identify/order_search.h"
 #include "server/calibrate/sessions/locate_sessions.h"
+#include "server/error_sources/catalogue.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
 
 namespace {
+
+constexpr double kWeighed = 20;  // nat: so much more likely must the data be with the links' weights
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
@@ -84,13 +88,12 @@ std::vector<std::vector<std::string>> combinations(const std::vector<std::string
   return all;
 }
 
-}  // namespace
-
-Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
-                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+/// The most likely of the calibrations with the sources of each candidate.
+Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
+                                      std::vector<std::vector<std::string>> candidates, const MeasurementBatch& batch,
+                                      const CalibrateOptions& options) {
   Result<CalibrationResult> best = tl::make_unexpected(Error{});
   std::map<std::string, std::string> found;  // sources that were searched for, with what the first form found
-  std::vector<std::vector<std::string>> candidates = combinations(specs, *cell);
   for (std::vector<std::string>& candidate : candidates) {
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;
@@ -103,6 +106,39 @@ Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, con
     if (!best || result->log_likelihood > best->log_likelihood) best = std::move(result);
   }
   return best;
+}
+
+/// With the links' weights beside `compliance`, in each of its forms; the other sources as they were found.
+std::vector<std::vector<std::string>> with_link_weights(const CalibrationResult& without) {
+  const CauseRecord& compliance = cause_spelled("compliance");
+  std::vector<std::vector<std::string>> candidates;
+  for (const causes::Form& form : compliance.forms) {
+    std::vector<std::string>& names = candidates.emplace_back();
+    for (const ErrorSourcePtr& source : without.model.sources)
+      names.emplace_back(&source->cause() == &compliance ? std::string(form.spelling) : source->name());
+    names.emplace_back(cause_spelled("link_weights").spelling);
+  }
+  return candidates;
+}
+
+/// Whether the data may decide on the links' weights: compliance is asked for in any form, and no mass is told.
+bool may_weigh_links(const Cell& cell, const std::vector<std::string>& specs, const CalibrateOptions& options) {
+  const auto has = [&](const CauseRecord& cause) {
+    return std::find(specs.begin(), specs.end(), cause.spelling) != specs.end();
+  };
+  return options.weigh_links && !cell.robot.has_link_masses() && has(cause_spelled("compliance")) &&
+         !has(cause_spelled("link_weights"));
+}
+
+}  // namespace
+
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+  Result<CalibrationResult> without = most_likely(cell, combinations(specs, *cell), batch, options);
+  if (!without || !may_weigh_links(*cell, specs, options)) return without;
+  Result<CalibrationResult> with = most_likely(cell, with_link_weights(*without), batch, options);
+  const bool asked_for = with && with->log_evidence > without->log_evidence + kWeighed;
+  return asked_for ? with : without;
 }
 
 }  // namespace trammel

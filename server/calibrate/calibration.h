@@ -25,8 +25,9 @@ struct CalibrationProblem {
 
 struct CalibrateOptions {
   int max_iterations = 100;
-  std::vector<bool> held;  ///< a flag for each parameter that stays as it is; empty: none
-  bool robust = true;      ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
+  std::vector<bool> held;    ///< a flag for each parameter that stays as it is; empty: none
+  bool weigh_links = false;  ///< `compliance` may add `link_weights` where no link mass is told and the data ask for it
+  bool robust = true;        ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
 };
 
 /// A pose whose residual is far above its sigma.
@@ -54,6 +55,7 @@ struct CalibrationResult {
   std::vector<UnidentifiableCombination> unidentifiable;
   double condition_number = 0;      ///< of the identified directions, prior units
   double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
+  double log_evidence = 0;          ///< nat: the same with the parameters integrated over their priors (Laplace)
   double rms = 0;                   ///< m, Euclidean residual of the training positions
   double discrepancy = 0;           ///< m per axis: what the model leaves beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis

@@ -81,6 +81,17 @@ std::string what_would_give_way() {
   return text;
 }
 
+/// Which way the data went about weights that the robot file does not tell.
+void add_link_weights(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  const CauseRecord& weights = cause_spelled("link_weights");
+  const bool weighed = std::any_of(parts.physics.sources.begin(), parts.physics.sources.end(),
+                                   [&](const ErrorSourcePtr& source) { return &source->cause() == &weights; });
+  if (!weighed || parts.physics.cell->robot.has_link_masses()) return;
+  notes.emplace_back(
+      "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance acts on link "
+      "weights that were found from the poses (link_weights); without them it would act on the payload alone");
+}
+
 std::string idle_sentence(const CompensatedModel::Parts& parts, const ErrorSource& source) {
   const CauseRecord& cause = source.cause();
   const std::string name = in_words(source.name());
@@ -195,6 +206,7 @@ std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
   add_changes(model.parts(), notes);
   add_sessions(model.parts(), notes);
+  add_link_weights(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_moved_tools(model, notes);
   return notes;

@@ -82,7 +82,7 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
-  [[nodiscard]] Result<wire::ReadModelsReply> quarantine_of(const std::string& cell) const;
+  [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell, const std::string& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> audit_of(const std::string& cell, std::int64_t since,
                                                        std::size_t most) const;

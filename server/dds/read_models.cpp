@@ -21,6 +21,14 @@ std::size_t first_of_last(const std::vector<Item>& all, std::size_t most) {
   return all.size() > most ? all.size() - most : 0;
 }
 
+Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches) {
+  if (!batches) return tl::make_unexpected(batches.error());
+  ReadModelsReply reply;
+  for (std::size_t i = first_of_last(*batches, wire::MAX_VERSIONS); i < batches->size(); ++i)
+    reply.batches().push_back(to_wire((*batches)[i]));
+  return reply;
+}
+
 Status check_fits(const std::string& what, std::size_t bytes) {
   if (bytes <= wire::kMaxText) return {};
   return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, bytes, wire::kMaxText)
@@ -32,10 +40,10 @@ Status check_fits(const std::string& what, std::size_t bytes) {
 Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const std::string& cell = request.about().cell();
   const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
-                      request.what() == wire::READ_AUDIT;
+                      request.what() == wire::READ_BATCHES || request.what() == wire::READ_AUDIT;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
   if (request.what() == wire::READ_FLEET) return fleet();
-  if (request.what() > wire::READ_FINDINGS && request.what() != wire::READ_AUDIT)
+  if (request.what() == wire::READ_HEALTH || request.what() > wire::READ_AUDIT)
     return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
     if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
@@ -55,7 +63,11 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
     case wire::READ_JOBS:
       return jobs_of(cell);
     case wire::READ_QUARANTINE:
-      return quarantine_of(cell);
+      return list_of(trainer_.quarantined(cell));
+    case wire::READ_BATCHES:
+      return list_of(trainer_.batches(cell));
+    case wire::READ_BATCH:
+      return batch_of(cell, request.batch_id());
     case wire::READ_FINDINGS:
       return findings_of(cell, request.job(), request.page());
     case wire::READ_AUDIT:
@@ -116,12 +128,13 @@ Result<ReadModelsReply> Handlers::jobs_of(const std::string& cell) const {
   return reply;
 }
 
-Result<ReadModelsReply> Handlers::quarantine_of(const std::string& cell) const {
-  const auto batches = trainer_.quarantined(cell);
-  if (!batches) return tl::make_unexpected(batches.error());
+Result<ReadModelsReply> Handlers::batch_of(const std::string& cell, const std::string& id) const {
+  auto batch = store_.batch(cell, id);
+  if (!batch) return tl::make_unexpected(batch.error());
   ReadModelsReply reply;
-  for (std::size_t i = first_of_last(*batches, wire::MAX_VERSIONS); i < batches->size(); ++i)
-    reply.batches().push_back(to_wire((*batches)[i]));
+  if (const Status fits = check_fits("batch " + id, batch->csv.size()); !fits) return tl::make_unexpected(fits.error());
+  reply.batches().push_back(to_wire(*batch));
+  reply.text(std::move(batch->csv));
   return reply;
 }
 

@@ -23,6 +23,9 @@
   CAUSE(joint_slip)                   \
   CAUSE(gear_transmission)            \
   CAUSE(joint_map)                    \
+  CAUSE(link_weights)                 \
+  CAUSE(balancer)                     \
+  CAUSE(base_yielding)                \
   CAUSE(outlier)                      \
   CAUSE(drift)                        \
   CAUSE(unknown)

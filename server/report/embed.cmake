@@ -20,3 +20,4 @@ find_file(CHART_JS chart.min.js PATHS /usr/share/javascript/chart.js REQUIRED NO
 trammel_embed(trammel_report chart_js ${CHART_JS})
 trammel_embed(trammel_report model_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/model_page.html)
 trammel_embed(trammel_report diagnosis_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/diagnosis_page.html)
+trammel_embed(trammel_report history_page_html ${CMAKE_CURRENT_SOURCE_DIR}/report/history_page.html)

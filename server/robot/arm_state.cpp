@@ -81,7 +81,7 @@ Eigen::MatrixXd StateJacobian::times(StateMatrix<6> by_state) const {
 }
 
 ArmKinematics::ArmKinematics(const ArmState& state)
-    : chain_(state.chain), X_WB_(state.X_WB), gravity_W_(state.gravity_W) {
+    : chain_(state.chain), spring_torque_(state.spring_torque), X_WB_(state.X_WB), gravity_W_(state.gravity_W) {
   TRAMMEL_CHECK(chain_ != nullptr && state.links.size() == static_cast<std::size_t>(chain_->size()));
   Vector3 x = state.X_WB.linear().col(0);
   Vector3 y = state.X_WB.linear().col(1);
@@ -94,12 +94,18 @@ ArmKinematics::ArmKinematics(const ArmState& state)
     to = c * to - s * from;
     from = turned;
   };
+  first_moment_count_ = static_cast<int>(state.first_moments.cols());
+  TRAMMEL_CHECK(first_moment_count_ == 0 || first_moment_count_ == chain_->size());
   for (std::size_t i = 0; i < state.links.size(); ++i) {
     const LinkGeometry& geometry = state.links[i];
     Link& link = links_[i];
     link.z = z;
     link.p = p;
     turn(x, y, geometry.theta);
+    if (first_moment_count_ > 0) {
+      const auto moment = state.first_moments.col(static_cast<Eigen::Index>(i));
+      first_moments_[i] = {x * moment.x() + y * moment.y(), x, y};
+    }
     p += z * geometry.d + x * geometry.a;
     turn(y, z, geometry.alpha);
     link.x = x;
@@ -230,6 +236,15 @@ JointArray ArmKinematics::gravity_torque() const {
                                                                  : link.z.dot(body.force);
     }
   }
+  const Vector3 gravity = kGravity * gravity_W_;
+  for (int i = 0; i < first_moment_count_; ++i) {
+    const Vector3 turning = first_moments_[static_cast<std::size_t>(i)].moment.cross(gravity);
+    for (int j = 0; j <= i; ++j) {
+      if (chain_->joint(j).type == JointType::kRevolute)
+        torque(j) += links_[static_cast<std::size_t>(j)].z.dot(turning);
+    }
+  }
+  if (spring_torque_.size() > 0) torque += spring_torque_;
   return torque;
 }
 
@@ -257,7 +272,66 @@ JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
       T.block<1, 3>(j, rows.cog(0)) += by_cog.transpose() * X_WF_.linear();
     }
   }
+  add_first_moments(turn, T);
   return T;
+}
+
+void ArmKinematics::add_first_moments(const LinkVectors& turn, JointStateMatrix& T) const {
+  const StateRows rows(chain_->size());
+  const Vector3 gravity = kGravity * gravity_W_;
+  for (int i = 0; i < first_moment_count_; ++i) {
+    const FirstMoment& first = first_moments_[static_cast<std::size_t>(i)];
+    for (int j = 0; j <= i; ++j) {
+      if (chain_->joint(j).type != JointType::kRevolute) continue;
+      const Vector3& z = links_[static_cast<std::size_t>(j)].z;
+      // As of a body: a rotation upstream of the joint turns axis and moment together, one beyond it the moment alone.
+      const Vector3 by_turn = z.cross(first.moment).cross(gravity);
+      const Vector3 by_moment = gravity.cross(z);
+      for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));
+      const Vector3 by_turn_beyond = first.moment.cross(by_moment);
+      for (int row = rows.theta(j); row <= rows.theta(i); ++row) T(j, row) += by_turn_beyond.dot(turn.col(row));
+      T.block<1, 3>(j, rows.base(3)) += by_turn.transpose();
+      T(j, rows.first_moment(i, 0)) += by_moment.dot(first.x);
+      T(j, rows.first_moment(i, 1)) += by_moment.dot(first.y);
+    }
+  }
+  for (int j = 0; j < spring_torque_.size(); ++j) T(j, rows.spring(j)) = 1;
+}
+
+Vector3 ArmKinematics::base_moment() const {
+  Vector3 moment = Vector3::Zero();
+  for (int k = 0; k < body_count_; ++k) {
+    const Body& body = bodies_[static_cast<std::size_t>(k)];
+    moment += (body.p - X_WB_.translation()).cross(body.force);
+  }
+  for (int i = 0; i < first_moment_count_; ++i)
+    moment += first_moments_[static_cast<std::size_t>(i)].moment.cross(kGravity * gravity_W_);
+  return moment;
+}
+
+StateMatrix<3> ArmKinematics::base_moment_jacobian() const {
+  const StateRows rows(chain_->size());
+  const Vector3 gravity = kGravity * gravity_W_;
+  StateMatrix<3> D = StateMatrix<3>::Zero(3, rows.size());
+  for (int k = 0; k < body_count_; ++k) {
+    const Body& body = bodies_[static_cast<std::size_t>(k)];
+    const int moving = 5 * (body.last + 1);
+    D.leftCols(moving) -= skew(body.force) * velocities_of(body.p).leftCols(moving);
+    D.block<3, 3>(0, rows.base(3)) += skew(body.force) * skew(body.p - X_WB_.translation());
+  }
+  const Vector3 lever = p_cog_W_ - X_WB_.translation();
+  D.col(rows.mass()) = kGravity * lever.cross(gravity_W_);
+  D.block<3, 3>(0, rows.cog(0)) = -skew(force_W_) * X_WF_.linear();
+  const LinkVectors turn = turns();
+  for (int i = 0; i < first_moment_count_; ++i) {
+    const FirstMoment& first = first_moments_[static_cast<std::size_t>(i)];
+    const Matrix3 by_turn = skew(gravity) * skew(first.moment);
+    D.leftCols(rows.theta(i) + 1) += by_turn * turn.leftCols(rows.theta(i) + 1);
+    D.block<3, 3>(0, rows.base(3)) += by_turn;
+    D.col(rows.first_moment(i, 0)) = first.x.cross(gravity);
+    D.col(rows.first_moment(i, 1)) = first.y.cross(gravity);
+  }
+  return D;
 }
 
 ArmKinematics::LoadedLink ArmKinematics::loaded_link(int joint) const {

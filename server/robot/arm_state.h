@@ -17,6 +17,10 @@ struct Payload {
 
 constexpr double kGravity = 9.80665;  // m/s^2
 
+/// kg m, of each link: first moment of everything that it carries as one piece, about its joint's axis. Along x of the
+/// link, and along z x x, z the joint's axis. Without columns: nothing but the payload and the links' told masses.
+using FirstMoments = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxJoints>;
+
 /// The state that the error sources change, one after the other: nominal at first, the real arm at the end.
 struct ArmState {
   const Chain* chain = nullptr;     ///< not owned
@@ -26,14 +30,16 @@ struct ArmState {
   Payload payload;
   Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
   Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation; rotation vector] in W
+  FirstMoments first_moments;       ///< beyond the told masses; 2 x n or empty
+  JointArray spring_torque;         ///< n or empty, Nm (N): what springs add to the gravity torque
 
   /// Adds `delta` (rad, m) to the joint as its encoder would: through signs and couplings.
   void add_to_joint(int joint, double delta);
 };
 
-/// The row of each number of an ArmState in a derivative: five rows per link, then base, tool, payload, tip. Base and
-/// tool rows are small motions [translation; rotation vector]. The base motion is that of B in W, about the origin of
-/// B; the tool motion is that of T in F, about the origin of F.
+/// The row of each number of an ArmState in a derivative: five rows per link, then base, tool, payload, tip, first
+/// moments, springs. Base and tool rows are small motions [translation; rotation vector]. The base motion is that of B
+/// in W, about the origin of B; the tool motion is that of T in F, about the origin of F.
 class StateRows {
  public:
   explicit StateRows(int joints) : joints_(joints) {}
@@ -52,13 +58,15 @@ class StateRows {
   [[nodiscard]] int cog(int k) const { return 5 * joints_ + 13 + k; }
   [[nodiscard]] int tip(int k) const { return 5 * joints_ + 16 + k; }
   [[nodiscard]] std::vector<int> whole_tip() const { return {tip(0), tip(1), tip(2), tip(3), tip(4), tip(5)}; }
-  [[nodiscard]] int size() const { return 5 * joints_ + 22; }
+  [[nodiscard]] int first_moment(int link, int k) const { return 5 * joints_ + 22 + 2 * link + k; }
+  [[nodiscard]] int spring(int joint) const { return 7 * joints_ + 22 + joint; }
+  [[nodiscard]] int size() const { return 8 * joints_ + 22; }
 
  private:
   int joints_;
 };
 
-constexpr int kMaxStateRows = 5 * kMaxJoints + 22;
+constexpr int kMaxStateRows = 8 * kMaxJoints + 22;
 
 /// The derivative of `Rows` numbers by the state: one column for each of StateRows.
 template <int Rows>
@@ -115,12 +123,17 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: moment of all weights about the axis of each joint, Nm (for a prismatic joint the force along it, N). The
-  /// weights are the payload's and, if the robot file gives them, the links', each at its centre of gravity (the
-  /// physical wrench). Eq. (3.6) without C and the outer J.
+  /// n: moment of all weights about the axis of each joint, Nm (for a prismatic joint the force along it, N), and of
+  /// the springs. The weights are the payload's and, if the robot file gives them, the links', each at its centre of
+  /// gravity (the physical wrench), and those that the links' first moments stand for, which push no prismatic joint.
+  /// Eq. (3.6) without C and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
+  /// Moment of all weights about the origin of B, Nm in W. Of first moments without what lies along the first axis.
+  [[nodiscard]] Vector3 base_moment() const;
+  /// Derivative of base_moment().
+  [[nodiscard]] StateMatrix<3> base_moment_jacobian() const;
   /// 6 x n: the tool's motion in W per joint deflection (signs and couplings do not enter), the J of eq. (3.6).
   using DeflectionJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints>;
   [[nodiscard]] DeflectionJacobian deflection_jacobian() const;
@@ -145,16 +158,25 @@ class ArmKinematics {
     Vector3 p, force;  ///< in W
     int last;
   };
+  /// The first moment of a link in W, and per unit of its two numbers.
+  struct FirstMoment {
+    Vector3 moment, x, y;
+  };
   using LinkVectors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 5 * kMaxJoints>;
   /// One column per link row: the velocity in W of `point`, fixed to what is downstream of the link.
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
   /// One column per link row: the rotation of everything downstream of the link.
   [[nodiscard]] LinkVectors turns() const;
+  /// Adds to `T` what the first moments and springs change of the torque.
+  void add_first_moments(const LinkVectors& turn, JointStateMatrix& T) const;
 
   const Chain* chain_;
   std::array<Link, kMaxJoints> links_;
   std::array<Body, kMaxJoints + 1> bodies_;  // the links', then the payload's
   int body_count_ = 0;
+  std::array<FirstMoment, kMaxJoints> first_moments_;
+  int first_moment_count_ = 0;  // n or 0
+  JointArray spring_torque_;
   Pose X_WB_, X_WF_, X_WT_;
   Vector3 kinematic_tip_W_, tip_rotation_W_;  // the tool point before the tip's own motion, and that motion's rotation
   Vector3 p_cog_W_, force_W_, gravity_W_;

@@ -155,6 +155,8 @@ bool is_of_the_disk(const SQLite::Exception& error) {
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
     case SQLITE_PROTOCOL:
+    case SQLITE_BUSY:  // another program holds it locked
+    case SQLITE_LOCKED:
       return true;
     default:
       return false;

@@ -28,7 +28,8 @@ struct OpenedDatabase {
 /// Looks at the file alone, not at a journal beside it, and leaves both as they are.
 [[nodiscard]] Status check_state(const std::string& path, const std::optional<StoreMark>& mark);
 
-/// Whether the error says that the disk does not let it be written now: full, read-only, broken.
+/// Whether the error says that the file cannot be written now: the disk is full, read-only or broken, or another
+/// program holds it locked.
 [[nodiscard]] bool is_of_the_disk(const SQLite::Exception& error);
 
 /// The failure for a caller: kBusy where the disk may let it be written again, kInternal where the file is damaged.

@@ -445,16 +445,22 @@ Status Trainer::discard(const std::string& cell_name, const std::string& batch_i
   return store_.discard(cell_name, batch_id, id);
 }
 
-Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
+Result<std::vector<StoredBatch>> Trainer::batches(const std::string& cell_name) const {
   std::vector<StoredBatch> all;
   for (const auto& [name, known] : cells_) {
     if (!cell_name.empty() && name != cell_name) continue;
     auto batches = store_.batches(name);
     if (!batches) return batches;
-    std::copy_if(batches->begin(), batches->end(), std::back_inserter(all),
-                 [](const StoredBatch& batch) { return !batch.quarantine.empty() && !batch.discarded; });
+    std::move(batches->begin(), batches->end(), std::back_inserter(all));
   }
   return all;
+}
+
+Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_name) const {
+  return batches(cell_name).map([](std::vector<StoredBatch> all) {
+    std::erase_if(all, [](const StoredBatch& batch) { return batch.quarantine.empty() || batch.discarded; });
+    return all;
+  });
 }
 
 Result<StoredDiagnosis> Trainer::diagnosis(std::int64_t job) const {

@@ -97,7 +97,9 @@ class Trainer {
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// Nothing takes the batch any more.
   [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
-  /// The batches that are kept out, without their text, of one cell or (empty) of all.
+  /// All batches, without their text, of one cell or (empty) of all, oldest first.
+  [[nodiscard]] Result<std::vector<StoredBatch>> batches(const std::string& cell) const;
+  /// Those that are kept out.
   [[nodiscard]] Result<std::vector<StoredBatch>> quarantined(const std::string& cell) const;
   /// See ModelHistory.
   /// Tell it what the cells are asked for.

@@ -63,12 +63,32 @@ TEST(BatchCheck, AToolOfAnotherNameIsNamed) {
   probe.translation() += Vector3(0.03, 0.05, 0.12);
   cell->tools["probe"] = probe;
   MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
-  for (Measurement& m : batch.measurements)
-    m.p_W += *m.R_WT * (probe.translation() - cell->tools.at("spindle")->translation());
+  const Pose spindle = *cell->tools.at("spindle");
+  const Vector3 apart = spindle.linear().transpose() * (probe.translation() - spindle.translation());  // in T
+  for (Measurement& m : batch.measurements) m.p_W += *m.R_WT * apart;
   for (Measurement& m : batch.measurements) m.context.tool = "spindle";
   const auto said = test::said_of(std::move(batch), *cell);
   ASSERT_TRUE(said);
   EXPECT_EQ(said->text, "those of tool 'probe'") << sentence(*said);
+}
+
+TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  Pose probe = *cell->tools.at("spindle");
+  probe.translation() += Vector3(0.03, 0.05, 0.12);
+  cell->tools["probe"] = probe;
+  const Vector3 apart = cell->tools.at("spindle")->linear().transpose() * Vector3(0.03, 0.05, 0.12);  // in T
+  const MeasurementBatch of_one = test::measured(test::chapter_5_robot(test::cell_7()), 160, 5);
+  for (const std::size_t every : {2u, 3u, 5u, 80u, 159u}) {
+    MeasurementBatch batch = of_one;
+    for (std::size_t i = every - 1; i < batch.measurements.size(); i += every) {
+      Measurement& m = batch.measurements[i];
+      m.context.tool = "probe";
+      m.p_W += *m.R_WT * apart;
+    }
+    const auto said = test::said_of(std::move(batch), *cell);
+    EXPECT_FALSE(said) << "each " << every << ": " << sentence(*said);
+  }
 }
 
 TEST(BatchCheck, WhatIsRefusedForALimitSaysUnderWhichReadingItWouldNotBe) {

@@ -383,8 +383,10 @@ TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
   EXPECT_EQ(
       refused_bias("se" + repeated(" + se", 50), 20),
       Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(51, 32).text("se" + repeated(" + se", 50)));
+  EXPECT_EQ(refused_bias(repeated("(", 2'000), 20),
+            Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(2000, 1000));
   EXPECT_EQ(refused_bias(repeated("(", 100'000), 20),
-            Refusal("cell.model", {}, "bias").of(ErrorCode::kTooLarge).beyond(100000, 1000));
+            Refusal("cell.model", {}, "kernel").of(ErrorCode::kTooLarge).beyond(100000, 4096));
   EXPECT_EQ(refusal_with(spoiled([&](json& c) {
               c["bias"] = bias_of("se", 20);
               c["bias"]["hyperparameters"]["values"][0] = 1e300;

@@ -396,11 +396,13 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_REPLAY}) {
+  for (const auto what : {wire::READ_HEALTH, wire::READ_REPLAY}) {
     expect("what is not built yet", wire::RESULT_UNSUPPORTED, what);
   }
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });
   expect("version -1", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(-1); });
+  expect("an unknown batch", wire::RESULT_NOT_FOUND, wire::READ_BATCH, [](Request& r) { r.batch_id("nobody"); });
+  expect("a batch without a name", wire::RESULT_NOT_FOUND, wire::READ_BATCH);
   expect("an unknown job", wire::RESULT_NOT_FOUND, wire::READ_JOB, [](Request& r) { r.job(99); });
   expect("findings of an unknown job", wire::RESULT_NOT_FOUND, wire::READ_FINDINGS, [](Request& r) { r.job(99); });
   expect("findings of a training", wire::RESULT_NOT_FOUND, wire::READ_FINDINGS, [](Request& r) { r.job(1); });

@@ -555,12 +555,33 @@ TEST_F(HandlersTest, ADiagnosisToApplyIsATrainingAndTakesOneBatch) {
   EXPECT_EQ(refusal(request), Refusal("", {}, "batch_ids").of(ErrorCode::kUsage).beyond(2, 1));
 }
 
+TEST_F(HandlersTest, BatchesAreListedAndReadAsTheyCame) {
+  const std::string csv = test::small_batch_csv(*backend_.cell, {});
+  ASSERT_TRUE(backend_.trainer->submit("cell-7", "lt-07", csv, "client:1"));
+  auto request = read_request(wire::READ_BATCHES);
+  for (const char* cell : {"cell-7", ""}) {
+    request.about().cell(cell);
+    const auto listed = handlers_.answer(request);
+    ASSERT_TRUE(listed) << listed.error().message;
+    ASSERT_EQ(listed->batches().size(), 1u);
+    EXPECT_EQ(listed->batches()[0].id(), "lt-07");
+    EXPECT_TRUE(listed->text().empty());
+  }
+  request = read_request(wire::READ_BATCH);
+  request.batch_id("lt-07");
+  const auto read = handlers_.answer(request);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->text(), csv);
+  request.batch_id("lt-08");
+  EXPECT_EQ(refusal(request).code, ErrorCode::kNotFound);
+}
+
 TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
   ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, 1e-4), 0, false, ""));
   const auto is_unsupported = [](const auto& reply) {
     return reply && reply->header().result() == wire::RESULT_UNSUPPORTED && reply->header().problems().size() == 1;
   };
-  for (const auto what : {wire::READ_BATCHES, wire::READ_BATCH, wire::READ_HEALTH, wire::READ_REPLAY}) {
+  for (const auto what : {wire::READ_HEALTH, wire::READ_REPLAY}) {
     EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
   }
   EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));

@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_cell.h"
 
 namespace trammel {
@@ -67,6 +70,50 @@ TEST_F(DaemonTest, ASubmittedBatchBecomesTheModelThatPredicts) {
   double largest = 0;
   for (const auto& item : answer->items) largest = std::max(largest, std::abs(item.dx_mm));
   EXPECT_GT(largest, 0.1) << "the virtual robot misses by millimetres";
+}
+
+TEST_F(DaemonTest, JobsBatchesAndVersionsAreListedShownAndFetched) {
+  wait_for(submit("lt-07", 60));
+  const auto asked = [this](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
+    for (const std::string& more : {std::string("--port"), std::to_string(daemon_.port()), std::string("--domain"),
+                                    std::to_string(daemon_.domain())})
+      arguments.push_back(more);
+    return test::run(arguments);
+  };
+  const auto jobs = nlohmann::json::parse(asked({"jobs", "--json", "-"}).out)["jobs"];
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0]["kind"], "train");
+  EXPECT_EQ(jobs[0]["verdict"], "in_force");
+  const auto batches = nlohmann::json::parse(asked({"batches", "--json", "-"}).out)["batches"];
+  ASSERT_EQ(batches.size(), 1u);
+  EXPECT_EQ(batches[0]["batch"], "lt-07");
+  EXPECT_EQ(batches[0]["poses"], 60);
+  EXPECT_FALSE(batches[0]["in_quarantine"].get<bool>());
+  EXPECT_EQ(asked({"batches", "--cell", "cell-7", "--batch", "lt-07", "-o", "-"}).out, test::virtual_batch_csv(60, 1));
+  EXPECT_EQ(asked({"batches", "--cell", "cell-7", "--batch", "lt-08", "-o", "-"}).exit_code, 3);
+  const auto shown = asked({"show", "--model", "cell-7@1"});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_NE(shown.out.find("lt-07"), std::string::npos) << shown.out;
+  EXPECT_NE(shown.out.find("compensated"), std::string::npos) << shown.out;
+}
+
+TEST_F(DaemonTest, TheHistoryOfACellIsAPageWithItsVersionsTrainingsAndEvents) {
+  wait_for(submit("lt-07", 60));
+  ASSERT_TRUE(session_->activate("cell-7", 1));
+  test::TemporaryFolder folder;
+  const test::Finished told = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "history", "--cell", "cell-7", "--port",
+                                         std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain()),
+                                         "-o", folder.file("history.html"), "--json", "-"});
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  const auto json = nlohmann::json::parse(told.out);
+  ASSERT_EQ(json["versions"].size(), 1u);
+  EXPECT_TRUE(json["versions"][0]["in_force"].get<bool>());
+  EXPECT_GT(json["versions"][0]["parameters"].size(), 20u);
+  ASSERT_EQ(json["trainings"].size(), 1u);
+  EXPECT_EQ(json["trainings"][0]["batches"], "lt-07");
+  EXPECT_GT(json["events"].size(), 1u);
+  EXPECT_NE(test::read_file(folder.file("history.html")).find("Version 1 is in force"), std::string::npos);
 }
 
 TEST_F(DaemonTest, ServesTheSameModelAfterARestart) {

@@ -115,8 +115,12 @@ ArmState moved(ArmState state, int row, double step) {
     state.payload.mass += step;
   } else if (row < rows.tip(0)) {
     state.payload.p_FoCog_F(row - rows.cog(0)) += step;
-  } else {
+  } else if (row < rows.first_moment(0, 0)) {
     state.tip_W(row - rows.tip(0)) += step;
+  } else if (row < rows.spring(0)) {
+    state.first_moments.reshaped()(row - rows.first_moment(0, 0)) += step;
+  } else {
+    state.spring_torque(row - rows.spring(0)) += step;
   }
   return state;
 }
@@ -135,11 +139,14 @@ ArmState loaded_arm(const Chain& chain, std::mt19937_64& random) {
 TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
   std::mt19937_64 random(2);
   for (const Chain& chain : {shipped("abb_irb6640-205-275.yaml"), shipped("universal-robots_ur10.yaml"), odd_arm()}) {
-    const ArmState state = loaded_arm(chain, random);
+    ArmState state = loaded_arm(chain, random);
+    state.first_moments = FirstMoments::Random(2, chain.size());
+    state.spring_torque = JointArray::Random(chain.size());
     const ArmKinematics kinematics(state);
     const Eigen::VectorXd deflection = Eigen::VectorXd::LinSpaced(chain.size(), 1e-3, 5e-3);
     const Eigen::MatrixXd J = kinematics.pose_jacobian();
     const Eigen::MatrixXd T = kinematics.gravity_torque_jacobian();
+    const Eigen::MatrixXd M = kinematics.base_moment_jacobian();
     const Eigen::MatrixXd D = kinematics.deflection_jacobian_derivative(deflection);
     for (int row = 0; row < StateRows(chain.size()).size(); ++row) {
       constexpr double kStep = 1e-5;
@@ -150,6 +157,8 @@ TEST(ArmKinematics, EveryDerivativeFitsCentralDifferencesToOneInAMillion) {
       const Eigen::VectorXd torque_change = (ahead.gravity_torque() - behind.gravity_torque()) / (2 * kStep);
       EXPECT_LT((T.col(row) - torque_change).norm(), 1e-6 * (1 + torque_change.norm()))
           << chain.name() << " row " << row;
+      const Vector3 base_change = (ahead.base_moment() - behind.base_moment()) / (2 * kStep);
+      EXPECT_LT((M.col(row) - base_change).norm(), 1e-6 * (1 + base_change.norm())) << chain.name() << " row " << row;
       const Vector6 deflected_change =
           (ahead.deflection_jacobian() - behind.deflection_jacobian()) * deflection / (2 * kStep);
       EXPECT_LT((D.col(row) - deflected_change).norm(), 1e-6) << chain.name() << " row " << row;
@@ -200,6 +209,34 @@ TEST(ArmKinematics, LinksWeighOnTheJointsBeforeThem) {
     }
   }
   EXPECT_LT((torque - work).norm(), 1e-5 * work.norm());
+}
+
+TEST(ArmKinematics, TwoFirstMomentsALinkStandForAllWeightsOfTheLinks) {
+  // Told masses, and the first moments that follow from them: what a link carries as one piece.
+  std::mt19937_64 random(5);
+  const Chain heavy = shipped("universal-robots_ur10.yaml");
+  std::vector<Joint> weightless;
+  FirstMoments moments = FirstMoments::Zero(2, 6);
+  double beyond = 0;
+  Vector3 along = Vector3::Zero();  // the next link's moment along its own axis, at the far end of this link
+  for (int i = 5; i >= 0; --i) {
+    const Joint& joint = heavy.joint(i);
+    const Matrix3 R = Eigen::AngleAxisd(joint.link.alpha, Vector3::UnitX()).toRotationMatrix();
+    const Vector3 to_end(joint.link.a, 0, joint.link.d);
+    const Vector3 moment = joint.mass * (to_end + R * joint.p_cog) + beyond * to_end + R * along;
+    moments.col(i) = moment.head<2>();
+    along = Vector3(0, 0, moment.z());
+    beyond += joint.mass;
+    weightless.insert(weightless.begin(), joint);
+    weightless.front().mass = 0;
+  }
+  const Chain light = *Chain::make("light", weightless);
+  ArmState state = loaded_arm(heavy, random);
+  const Eigen::VectorXd torque = ArmKinematics(state).gravity_torque();
+  state.chain = &light;
+  EXPECT_GT((ArmKinematics(state).gravity_torque() - torque).norm(), 0.05 * torque.norm());
+  state.first_moments = moments;
+  EXPECT_LT((ArmKinematics(state).gravity_torque() - torque).norm(), 1e-9 * torque.norm());
 }
 
 TEST(Chain, RefusesWhatIsNoRobot) {

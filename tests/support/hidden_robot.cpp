@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace trammel::hidden {
 
@@ -46,6 +47,7 @@ Matrix3d axes(const Matrix4d& frame) { return frame.block<3, 3>(0, 0); }
 struct Deflection {
   Joints joints = Joints::Zero();
   std::array<Matrix4d, kJoints> bends;
+  Matrix4d tilt = Matrix4d::Identity();
   bool bent = false;
   Deflection() { bends.fill(Matrix4d::Identity()); }
 };
@@ -53,7 +55,7 @@ struct Deflection {
 /// frames[0] is the base, frames[i] what follows link i.
 std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q, const Deflection& deflection) {
   std::array<Matrix4d, kJoints + 1> frames;
-  frames[0] = arm.base;
+  frames[0] = arm.base * deflection.tilt;
   for (std::size_t i = 0; i < kJoints; ++i) {
     const auto joint = static_cast<Eigen::Index>(i);
     frames[i + 1] = frames[i] * link_frame(arm.links[i], q(joint) + deflection.joints(joint));
@@ -64,14 +66,53 @@ std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q, con
 
 Vector3d weight_of(const Load& load) { return {0, 0, -kWeight * load.mass_kg}; }
 
-Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Load& load) {
-  const Vector3d force = weight_of(load);
-  const Vector3d cog = origin(frames[kJoints]) + axes(frames[kJoints]) * load.cog_mm;
-  Joints moments;
+/// What weighs: the payload at the last frame, each link at its own.
+struct Weight {
+  Vector3d at, force;
+  std::size_t last;  ///< joint that still feels it
+};
+
+std::vector<Weight> weights_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm) {
+  std::vector<Weight> all = {
+      {origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm, weight_of(arm.load), kJoints - 1}};
   for (std::size_t i = 0; i < kJoints; ++i) {
-    moments(static_cast<Eigen::Index>(i)) = frames[i].block<3, 1>(0, 2).dot((cog - origin(frames[i])).cross(force));
+    if (arm.weights[i].mass_kg == 0) continue;
+    all.push_back({origin(frames[i + 1]) + axes(frames[i + 1]) * arm.weights[i].cog_mm, weight_of(arm.weights[i]), i});
   }
+  return all;
+}
+
+/// Torque of a spring whose pins are at (fixed, 0) and, turned by the angle, at (moving, 0): from the length between.
+double torque_of(const Spring& spring, double q) {
+  if (spring.fixed_mm == 0) return 0;
+  const double angle = q + spring.phase;
+  const double length = std::sqrt(spring.fixed_mm * spring.fixed_mm + spring.moving_mm * spring.moving_mm -
+                                  2 * spring.fixed_mm * spring.moving_mm * std::cos(angle));
+  const double pull = spring.force_N + spring.stiffness_N_mm * (length - spring.rest_mm);
+  return -pull * spring.fixed_mm * spring.moving_mm * std::sin(angle) / length;  // -d(length)/d(angle)
+}
+
+Joints moments_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm, const Joints& q) {
+  Joints moments = Joints::Zero();
+  for (const Weight& weight : weights_in(frames, arm)) {
+    for (std::size_t i = 0; i <= weight.last; ++i) {
+      moments(static_cast<Eigen::Index>(i)) +=
+          frames[i].block<3, 1>(0, 2).dot((weight.at - origin(frames[i])).cross(weight.force));
+    }
+  }
+  moments(1) += torque_of(arm.spring, q(1));
   return moments;
+}
+
+/// How the foot tilts under the moment of all that weighs.
+Matrix4d tilt_in(const std::array<Matrix4d, kJoints + 1>& frames, const Arm& arm) {
+  Vector3d moment = Vector3d::Zero();
+  for (const Weight& weight : weights_in(frames, arm)) moment += (weight.at - origin(arm.base)).cross(weight.force);
+  const Vector3d in_base = axes(arm.base).transpose() * moment;
+  const Vector3d turn(arm.foot.x() * in_base.x(), arm.foot.y() * in_base.y(), 0);
+  Matrix4d tilt = Matrix4d::Identity();
+  if (turn.norm() > 0) tilt.block<3, 3>(0, 0) = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  return tilt;
 }
 
 /// A beam that is a little thinner towards its far end, clamped at its joint, pulled and turned at the far end.
@@ -107,13 +148,14 @@ bool bends(const Arm& arm) {
 Deflection settled(const Arm& arm, const Joints& q) {
   Deflection deflection;
   deflection.bent = bends(arm);
-  if (arm.give.isZero(0) && !deflection.bent) return deflection;
+  if (arm.give.isZero(0) && arm.foot.isZero(0) && !deflection.bent) return deflection;
   const Vector3d force = weight_of(arm.load);
   for (int round = 0; round < kMostRounds; ++round) {
     const auto frames = frames_of(arm, q, deflection);
-    const Joints next = arm.give.cwiseProduct(moments_in(frames, arm.load));
+    const Joints next = arm.give.cwiseProduct(moments_in(frames, arm, q));
     double moved = (next - deflection.joints).cwiseAbs().maxCoeff();
     deflection.joints = next;
+    deflection.tilt = tilt_in(frames, arm);
     const Vector3d cog = origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm;
     for (std::size_t i = 0; deflection.bent && i < kJoints; ++i) {
       if (arm.flex[i] == 0) continue;
@@ -150,9 +192,7 @@ Matrix4d motion(const Vector3d& shift_mm, double about_z, double about_y, double
   return frame;
 }
 
-Joints load_moments(const Arm& arm, const Joints& q) {
-  return moments_in(frames_of(arm, q, settled(arm, q)), arm.load);
-}
+Joints load_moments(const Arm& arm, const Joints& q) { return moments_in(frames_of(arm, q, settled(arm, q)), arm, q); }
 
 Matrix4d tool_frame(const Arm& arm, const Joints& q) { return frames_of(arm, q, settled(arm, q))[kJoints] * arm.tool; }
 

@@ -24,14 +24,27 @@ struct Load {
   Eigen::Vector3d cog_mm = Eigen::Vector3d::Zero();  ///< in the flange
 };
 
+/// A gas spring or balancer at a joint: it pulls a pin on the link that follows towards a pin on the link before.
+struct Spring {
+  double force_N = 0;         ///< where its pins are `rest_mm` apart
+  double stiffness_N_mm = 0;  ///< what it pulls more a mm beyond
+  double rest_mm = 0;
+  double fixed_mm = 0;   ///< from the axis to the pin that stays
+  double moving_mm = 0;  ///< from the axis to the pin that moves
+  double phase = 0;      ///< rad, between the pins at joint angle 0
+};
+
 /// Everything that decides where the tool stands.
 struct Arm {
   std::array<Link, kJoints> links;
   Eigen::Matrix4d base = Eigen::Matrix4d::Identity();  ///< world from base
   Eigen::Matrix4d tool = Eigen::Matrix4d::Identity();  ///< flange from tool
   Load load;
-  Joints give = Joints::Zero();           ///< rad/Nmm, of each gearbox
-  std::array<double, kJoints> flex = {};  ///< 1/(N mm2), 1/EI of each link in its middle; 0: rigid
+  Joints give = Joints::Zero();            ///< rad/Nmm, of each gearbox
+  std::array<Load, kJoints> weights = {};  ///< of the links, in the frame that follows each
+  Spring spring;                           ///< at joint 2
+  Eigen::Vector2d foot = {0, 0};           ///< rad/Nmm, how the base tilts about its x and y axes
+  std::array<double, kJoints> flex = {};   ///< 1/(N mm2), 1/EI of each link in its middle; 0: rigid
 };
 
 /// The ABB IRB 6640 as its maker draws it, carrying nothing.
@@ -40,7 +53,7 @@ struct Arm {
 /// Tx Ty Tz Rz Ry Rx.
 [[nodiscard]] Eigen::Matrix4d motion(const Eigen::Vector3d& shift_mm, double about_z, double about_y, double about_x);
 
-/// Moment of the load about every joint axis, Nmm, in the loaded posture.
+/// Moment of load, links and spring about every joint axis, Nmm, in the loaded posture.
 [[nodiscard]] Joints load_moments(const Arm& arm, const Joints& q);
 /// World from tool, gearboxes and links having given way until moments and deflections agree.
 [[nodiscard]] Eigen::Matrix4d tool_frame(const Arm& arm, const Joints& q);

@@ -118,11 +118,12 @@ TEST_F(GateTest, EverNoisierBatchesDoNotAddUpToAWorseModel) {
 class TwoToolsTest : public GateTest {
  protected:
   TwoToolsTest() {
-    Cell cell = *test::cell_7();
-    Pose probe = *cell.tools.at("spindle");
-    probe.translation() += Vector3(0.03, 0.05, 0.12);
-    cell.tools["probe"] = probe;
-    use(std::move(cell));
+    const Cell one_tool = *test::cell_7();
+    std::string text = one_tool.cell_yaml;
+    const std::string tools = "\ntools:\n";
+    text.insert(text.find(tools) + tools.size(),
+                "  probe: {xyz_mm: [130, 50, 270], q_wxyz: [0.923879532511287, 0, -0.382683432365090, 0]}\n");
+    use(test::demand(parse_cell(text, one_tool.robot_yaml, "cell.yaml")));
   }
 };
 

@@ -268,7 +268,7 @@ TEST_F(TrainerTest, RefusedInputStoresNothing) {
   EXPECT_FALSE(trainer_->submit("cell-7", "", good, "r"));
   for (const char* id : {"two\nlines", "\xff", "caf\xe9", "\x1b[2J", "\xc2\x9b", "\xe2\x80\xae"})
     EXPECT_FALSE(trainer_->submit("cell-7", id, good, "r")) << id;
-  EXPECT_FALSE(trainer_->submit("cell-7", std::string(200, 'x'), good, "r"));
+  EXPECT_FALSE(trainer_->submit("cell-7", std::string(257, 'x'), good, "r"));
   EXPECT_FALSE(trainer_->submit("cell-7", "a", "no,batch\n1,2\n", "r"));
   std::string beyond = good;
   beyond.replace(beyond.find('\n') + 1, beyond.find(',', beyond.find('\n')) - beyond.find('\n') - 1, "999.0");
@@ -313,8 +313,8 @@ TEST_F(TrainerTest, WhatNoTrainingMayAskForIsRefusedWithTheLimitWhenItIsAskedFor
   };
   EXPECT_EQ(refused_with({"a"}, "", kernel), 32);
   EXPECT_EQ(refused_with({"a"}, "", std::string(100'000, '(')), 1000);
-  EXPECT_EQ(refused_with({"a"}, sources, ""), 500);
-  EXPECT_EQ(refused_with({"a"}, std::string(1'000'000, 'x'), ""), 16384);
+  EXPECT_EQ(refused_with({"a"}, sources, ""), 4096);
+  EXPECT_EQ(refused_with({"a"}, std::string(1'000'000, 'x'), ""), 4096);
   EXPECT_EQ(refused_with(std::vector<std::string>(1001, "a"), "", ""), 1000);
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }

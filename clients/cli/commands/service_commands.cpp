@@ -5,8 +5,10 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/evaluation_text.h"
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
+#include "server/compensate/model_file.h"
 
 namespace trammel::cli {
 
@@ -96,7 +98,7 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   if (!servers) return tl::make_unexpected(servers.error());
   const Result<std::vector<client::ModelInfo>> models = session.model_status();
   if (!models) return tl::make_unexpected(models.error());
-  const Result<std::vector<client::QuarantinedBatch>> apart = session.quarantine("");
+  const Result<std::vector<client::BatchOfService>> apart = session.quarantine("");
   if (!apart) return tl::make_unexpected(apart.error());
   const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
   if (!jobs) return tl::make_unexpected(jobs.error());
@@ -124,6 +126,31 @@ Status list_models(client::Session& session, const ServiceArguments& arguments) 
   if (!models) return tl::make_unexpected(models.error());
   tell(models_text(*models), {arguments.json});
   return write_json(arguments.json, {{"cell", *cell}, {"models", models_json(*models)}});
+}
+
+Status list_jobs(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<std::vector<client::DatedJob>> jobs = session.jobs(*cell);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  tell(all_jobs_text(*jobs), {arguments.json});
+  return write_json(arguments.json, {{"jobs", jobs_json(*jobs)}});
+}
+
+Status list_batches(client::Session& session, const ServiceArguments& arguments) {
+  const Result<std::string> cell = arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  if (arguments.batch_id.empty() != arguments.output.empty())
+    return failure(ErrorCode::kUsage, "--batch and --output go together: the batch is written there").of("--batch");
+  if (!arguments.batch_id.empty()) {
+    const Result<std::string> csv = session.export_batch(*cell, arguments.batch_id);
+    if (!csv) return tl::make_unexpected(csv.error());
+    return write_output(arguments.output, *csv);
+  }
+  const Result<std::vector<client::BatchOfService>> batches = session.batches(*cell);
+  if (!batches) return tl::make_unexpected(batches.error());
+  tell(batches_text(*batches), {arguments.json});
+  return write_json(arguments.json, {{"batches", batches_json(*batches)}});
 }
 
 Status now_in_force(const std::string& cell, const Result<int>& version, const ServiceArguments& arguments) {
@@ -179,6 +206,19 @@ Status rollback(client::Session& session, const ServiceArguments& arguments) {
   return now_in_force(*cell, session.rollback(*cell, because(arguments)), arguments);
 }
 
+/// What a stored version is, as train tells of a new one.
+Status show_model(client::Session& session, const ServiceArguments& arguments) {
+  const Result<ModelReference> asked = parse_model_reference(arguments.model);
+  if (!asked) return tl::make_unexpected(asked.error());
+  const auto text = session.export_model(asked->cell, asked->version);
+  if (!text) return tl::make_unexpected(text.error());
+  const Result<CompensatedModel> model = deserialize(*text, "the service's model of cell " + asked->cell);
+  if (!model) return tl::make_unexpected(model.error());
+  const auto& judged = model->parts().validation;
+  tell(model_text(*model) + (judged ? evaluation_table(*judged) : ""), {arguments.json});
+  return write_json(arguments.json, model_json(*model));
+}
+
 Status export_model(client::Session& session, const ServiceArguments& arguments) {
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
@@ -230,6 +270,10 @@ class ServiceCommands {
 
 void add_cell(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it")->required();
+}
+
+void add_any_cell(CLI::App& command, ServiceArguments& arguments) {
+  command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it; left out: all cells");
 }
 
 void add_reason(CLI::App& command, ServiceArguments& arguments) {
@@ -322,6 +366,20 @@ void add_service_commands(CLI::App& app, Action& chosen) {
                      ->capture_default_str();
                });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
+  commands.add(
+      "show", "Tell what a stored version of a cell's model is, and how large its errors were", show_model,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--model", arguments.model, "Cell id (its model in force) or CELL@VERSION")->required();
+      });
+  commands.add("jobs", "List jobs that wait, run, and ended lately, and how", list_jobs, add_any_cell);
+  commands.add("batches", "List the batches that a service has, or fetch one as a file", list_batches,
+               [](CLI::App& command, ServiceArguments& arguments) {
+                 add_any_cell(command, arguments);
+                 command.add_option("--batch", arguments.batch_id, "Id of the batch to fetch");
+                 command.add_option(
+                     "-o,--output", arguments.output,
+                     "File to write it to (CSV, as it came: joints in deg, rails in mm; positions in mm)");
+               });
   add_model_changes(commands);
 }
 

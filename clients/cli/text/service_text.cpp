@@ -42,10 +42,13 @@ ordered_json model_json(const client::ModelInfo& model) {
           {"validation_rms_mm", if_known(model.validation_rms_mm)}};
 }
 
+std::string kind_in_words(const std::string& kind) {
+  return kind == "diagnose" ? "diagnosis" : kind == "check" ? "check" : "training";
+}
+
 std::string job_line(const client::DatedJob& job) {
   const client::JobStatus& status = job.status;
-  std::string text =
-      fmt::format("job {} of cell {} ({}", status.job, status.cell, job.kind == "diagnose" ? "diagnosis" : "training");
+  std::string text = fmt::format("job {} of cell {} ({}", status.job, status.cell, kind_in_words(job.kind));
   if (!job.batches.empty()) text += fmt::format(" of {}", fmt::join(job.batches, ", "));
   text += fmt::format(") {}", status.stage);
   if (status.stage == "training" || status.stage == "storing") text += fmt::format(" {:.0f} %", 100 * status.share);
@@ -104,6 +107,13 @@ std::string jobs_text(const std::vector<client::DatedJob>& jobs) {
   return text + failed;
 }
 
+std::string all_jobs_text(const std::vector<client::DatedJob>& jobs) {
+  if (jobs.empty()) return "no jobs\n";
+  std::string text;
+  for (const client::DatedJob& job : jobs) text += job_line(job);
+  return text;
+}
+
 ordered_json models_json(const std::vector<client::ModelInfo>& models) {
   ordered_json json = ordered_json::array();
   for (const client::ModelInfo& model : models) json.push_back(model_json(model));
@@ -149,19 +159,43 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"queued_jobs", server.queued_jobs}};
 }
 
-std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches) {
+std::string quarantine_text(const std::vector<client::BatchOfService>& batches) {
   std::string text;
-  for (const client::QuarantinedBatch& one : batches) {
+  for (const client::BatchOfService& one : batches) {
     text +=
         fmt::format("in quarantine: batch {} of cell {} ({} poses): {}\n", one.batch, one.cell, one.poses, one.reason);
   }
   return text;
 }
 
-ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches) {
+ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches) {
   ordered_json list = ordered_json::array();
-  for (const client::QuarantinedBatch& one : batches) {
+  for (const client::BatchOfService& one : batches) {
     list.push_back({{"cell", one.cell}, {"batch", one.batch}, {"poses", one.poses}, {"reason", one.reason}});
+  }
+  return list;
+}
+
+std::string batches_text(const std::vector<client::BatchOfService>& batches) {
+  if (batches.empty()) return "no batches\n";
+  std::string text = fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", "cell", "batch", "poses", "accepted", "state");
+  for (const client::BatchOfService& one : batches) {
+    text += fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", one.cell, one.batch, one.poses, date_text(one.accepted_unix_s),
+                        one.reason.empty() ? "learned from" : "in quarantine: " + one.reason);
+  }
+  return text + "(dates in UTC)\n";
+}
+
+ordered_json batches_json(const std::vector<client::BatchOfService>& batches) {
+  ordered_json list = ordered_json::array();
+  for (const client::BatchOfService& one : batches) {
+    list.push_back({{"cell", one.cell},
+                    {"batch", one.batch},
+                    {"poses", one.poses},
+                    {"accepted_unix_s", one.accepted_unix_s},
+                    {"hash", one.hash},
+                    {"in_quarantine", !one.reason.empty()},
+                    {"reason", one.reason}});
   }
   return list;
 }

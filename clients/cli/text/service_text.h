@@ -13,6 +13,8 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json jobs_json(const std::vector<client::DatedJob>& jobs);
 /// A line a job: those that run and wait, of those that are done the last one of each cell, those that failed.
 [[nodiscard]] std::string jobs_text(const std::vector<client::DatedJob>& jobs);
+/// A line each, with how those that are over ended.
+[[nodiscard]] std::string all_jobs_text(const std::vector<client::DatedJob>& jobs);
 
 [[nodiscard]] nlohmann::ordered_json models_json(const std::vector<client::ModelInfo>& models);
 [[nodiscard]] std::string models_text(const std::vector<client::ModelInfo>& models);
@@ -20,8 +22,12 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
 
-[[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::QuarantinedBatch>& batches);
-[[nodiscard]] std::string quarantine_text(const std::vector<client::QuarantinedBatch>& batches);
+[[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches);
+[[nodiscard]] std::string quarantine_text(const std::vector<client::BatchOfService>& batches);
+
+[[nodiscard]] nlohmann::ordered_json batches_json(const std::vector<client::BatchOfService>& batches);
+/// A line a batch.
+[[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches);
 
 /// What to do next where a job did not put a model in force, by its verdict; empty where there is nothing.
 [[nodiscard]] std::string next_step(const client::JobStatus& job);

@@ -20,6 +20,11 @@ constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step lea
 constexpr double kMostDamping = 1e9;
 constexpr double kNoDamping = 1e-6;
 
+// Of numbers of which the poses show the product alone, damped steps follow a bent valley for a hundred steps, and all
+// that falls is how well the priors like it.
+constexpr double kIdleFall = 0.05;  // nat a step
+constexpr int kIdleSteps = 3;
+
 /// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it stay.
 Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
   Eigen::VectorXd downhill = -at.gradient;
@@ -208,6 +213,7 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
   now.at = expand(now.problem, s, weights, robust, now.x);
   std::vector<double> costs = {now.at.cost};
   double damping = 0;
+  int idle = 0;  // steps in a row that gained nothing
   for (int k = 0; k < std::max(1, options.max_iterations); ++k) {
     if (!std::isfinite(now.at.cost)) break;
     const JointStep step = joint_step(now, lower, damping);
@@ -218,6 +224,7 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
     const bool settled =
         damping == 0 && step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
     const bool uphill = !std::isfinite(next.at.cost) || next.at.cost > now.at.cost * (1 + 1e-12) + kNoRise;
+    if (!uphill) idle = now.at.cost - next.at.cost < kIdleFall ? idle + 1 : 0;
     if (uphill && !settled) {
       damping = std::max(10 * damping, kFirstDamping);
       if (damping > kMostDamping) break;
@@ -226,7 +233,7 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
     if (!uphill) now = std::move(next);
     costs.push_back(now.at.cost);
     damping = damping < kNoDamping ? 0 : damping / 10;
-    if (!settled) continue;
+    if (!settled && idle < kIdleSteps) continue;
     Minimum found = minimum_at(now, std::move(costs));
     found.converged = true;
     found.message = fmt::format("last step {:.1e} standard deviations", step.in_standard_deviations);

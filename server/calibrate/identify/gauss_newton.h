@@ -42,7 +42,7 @@ struct Minimum {
                                                 const Weights& weights, const CalibrateOptions& options,
                                                 const Eigen::VectorXd& start);
 
-/// Of a batch of several sessions: steps of the parameters and of where each instrument stood, damped where a full one
+/// Steps of the parameters and, of a batch of several sessions, of where each instrument stood, damped where a full one
 /// leads uphill. The information is that of the parameters with the sessions eliminated. Refuses where nothing leads
 /// downhill and it is not the minimum.
 [[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s,

@@ -82,6 +82,9 @@ void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s
   const Eigen::VectorXd scale = s.scale(free);
   result.covariance(free, free) = scale.asDiagonal() * scaled_covariance * scale.asDiagonal();
   add_observability(seen, poses, result);
+  const Eigen::VectorXd from_prior = result.model.values.cwiseQuotient(s.scale) - s.prior;
+  result.log_evidence =
+      result.log_likelihood - 0.5 * from_prior(free).squaredNorm() + 0.5 * variance.array().log().sum();
   result.unidentifiable = unidentifiable_combinations(seen, parameters, scale.cwiseQuotient(s.typical(free)));
   for (Eigen::Index i = 0; i < P; ++i) {
     const double stddev = std::sqrt(result.covariance(i, i));
@@ -171,7 +174,7 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.model.values = found->minimum.x.cwiseProduct(s.scale);
   result.discrepancy = found->weights.discrepancy;
   result.discrepancy_rotation = found->weights.discrepancy_rotation;
-  result.log_likelihood = log_likelihood(r, found->weights);
+  result.log_evidence = result.log_likelihood = log_likelihood(r, found->weights);
   result.suspects = suspects_of(problem.batch, r, found->weights);
   result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
   result.converged = found->minimum.converged;

@@ -87,6 +87,8 @@ Result<Minimum> minimise(const CalibrationProblem& problem, const ScaledParamete
                          const CalibrateOptions& options, const Eigen::VectorXd& start) {
   if (has_sessions(problem.batch)) return session_steps(problem, s, weights, options, start);
   if (std::optional<Minimum> found = full_steps(problem, s, weights, options, start)) return std::move(*found);
+  if (Result<Minimum> found = session_steps(problem, s, weights, options, start); found && found->converged)
+    return found;
   return guarded_steps(problem, s, weights, options, start);
 }
 

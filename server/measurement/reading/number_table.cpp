@@ -1,6 +1,8 @@
 #include "server/measurement/reading/number_table.h"
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 namespace trammel::reading {
 
@@ -36,10 +38,17 @@ NumberTable matched(const NumberTable& table, const std::vector<std::size_t>& ro
 }
 
 NumberTable thinned(const NumberTable& table, std::size_t most) {
-  const std::size_t n = table.size();
-  if (n <= most) return table;
+  if (table.size() <= most) return table;
+  std::map<std::string, std::vector<std::size_t>> by_tool;
+  for (std::size_t i = 0; i < table.size(); ++i) by_tool[table.from[i]->context.tool].push_back(i);
+  const std::size_t fewest = std::max<std::size_t>(1, most / (2 * by_tool.size()));
   std::vector<std::size_t> rows;
-  for (std::size_t k = 0; k < most; ++k) rows.push_back(k * n / most);
+  for (const auto& [tool, of_tool] : by_tool) {
+    const std::size_t n = of_tool.size();
+    const std::size_t kept = std::min(n, std::max(fewest, most * n / table.size()));
+    for (std::size_t k = 0; k < kept; ++k) rows.push_back(of_tool[k * n / kept]);
+  }
+  std::sort(rows.begin(), rows.end());
   return matched(table, rows, rows);
 }
 

@@ -26,7 +26,8 @@ struct NumberTable {
 /// Positions and orientations of `rows`, each with the joints of the row at the same place in `joints_of`.
 [[nodiscard]] NumberTable matched(const NumberTable& table, const std::vector<std::size_t>& rows,
                                   const std::vector<std::size_t>& joints_of);
-/// At most `most` rows, evenly drawn.
+/// About `most` rows, evenly drawn from those of each tool. No tool is left out, however few its rows are and in
+/// whatever order the tools take turns.
 [[nodiscard]] NumberTable thinned(const NumberTable& table, std::size_t most);
 
 /// The middle one; of an even number the upper of the two. `values` is not empty.

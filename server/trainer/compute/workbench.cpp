@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
+#include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/paired_gain.h"
@@ -47,6 +48,30 @@ Made nothing_applied(const std::string& why, const ServedModel& present) {
   made.outcome.next = "submit the batch where it is good, and release it";
   made.message = fmt::format("nothing applied: {}; version {} stays in force", why, present.version);
   return made;
+}
+
+bool has_unknown_tools(const CompensatedModel& model, const MeasurementBatch& batch) {
+  return known_rows(model, batch).measurements.size() < batch.measurements.size();
+}
+
+/// Whether `after` is better than `before` beyond chance, on those judges of the sessions that both know.
+bool is_better_on(const std::vector<JudgingSession>& sessions, const CompensatedModel& before,
+                  const CompensatedModel& after) {
+  std::vector<Vector3> errors_before, errors_after;
+  for (const JudgingSession& session : sessions) {
+    const Eigen::Matrix3Xd one = located_errors(before, session).position;
+    const Eigen::Matrix3Xd other = located_errors(after, session).position;
+    for (Eigen::Index i = 0; i < one.cols(); ++i) {
+      if (!one.col(i).allFinite() || !other.col(i).allFinite()) continue;
+      errors_before.emplace_back(one.col(i));
+      errors_after.emplace_back(other.col(i));
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(errors_before.size());
+  if (n == 0) return false;
+  return paired_gain(Eigen::Map<const Eigen::Matrix3Xd>(errors_before.front().data(), 3, n),
+                     Eigen::Map<const Eigen::Matrix3Xd>(errors_after.front().data(), 3, n))
+      .beyond_chance();
 }
 
 /// `; ` before each that says something.
@@ -107,8 +132,9 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const bool as_usual = task_.level.empty() && task_.bias.empty();
   auto successor = train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(watch));
   if (!successor) return tl::make_unexpected(successor.error());
-  if (changed && !task_.earlier_ids.empty()) {
-    if (const Status chosen = choose_alone(*successor, watch); !chosen) return tl::make_unexpected(chosen.error());
+  if (!task_.earlier_ids.empty()) {
+    if (const Status chosen = choose_alone(*successor, changed, watch); !chosen)
+      return tl::make_unexpected(chosen.error());
   }
   return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
 }
@@ -138,21 +164,26 @@ Result<Made> Workbench::checked(const ComputeWatch& watch) {
   return made;
 }
 
-Status Workbench::choose_alone(Successor& together, const ComputeWatch& watch) {
+Status Workbench::choose_alone(Successor& together, bool changed, const ComputeWatch& watch) {
   const auto own = batches_.first_without_older_judges();
   if (!own) return tl::make_unexpected(own.error());
+  const bool adds_tools = in_force_ && has_unknown_tools(in_force_->model, own->rows());
+  if (!changed && !adds_tools) return {};
   auto alone = train_successor(task_.cell, *own, in_force_.get(), train_options(watch));
   if (!alone) return {};  // too little by itself
   const std::vector<JudgingSession>& sessions = batches_.judging_sessions();
   const auto session = std::find_if(sessions.begin(), sessions.end(),
                                     [&](const JudgingSession& one) { return one.batch_id == own->id(); });
-  if (session == sessions.end()) return {};
-  const Eigen::Matrix3Xd before = located_errors(together.model, *session).position;
-  const Eigen::Matrix3Xd after = located_errors(alone->model, *session).position;
-  if (before.cols() == 0 || !before.allFinite() || !after.allFinite()) return {};
-  if (!paired_gain(before, after).beyond_chance()) return {};
-  alone->note += fmt::format("{}the arm has changed in more than one way: learned from this batch alone",
-                             alone->note.empty() ? "" : "; ");
+  const char* why = nullptr;
+  if (changed && session != sessions.end() && is_better_on({*session}, together.model, alone->model)) {
+    why = "the arm has changed in more than one way: learned from this batch alone";
+  } else if (!changed && !is_better_on(sessions, in_force_->model, together.model)) {
+    why =
+        "the sessions together are no better for the tools that were known: what was known stays, the new tool is "
+        "added";
+  }
+  if (why == nullptr) return {};
+  alone->note += (alone->note.empty() ? "" : "; ") + std::string(why);
   together = std::move(*alone);
   return {};
 }

@@ -163,7 +163,7 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
   if (!sources) return tl::make_unexpected(sources.error());
   const Identify identify = [&](const std::vector<std::string>& names) {
     return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
-                         : calibrate(cell, names, split.train, {});
+                         : calibrate(cell, names, split.train, {.held = {}, .weigh_links = true});
   };
   auto found = identify_sessions(identify, *sources, split.train, [&](double share) {
     return report("asking what changed between the sessions", 0.3 * share);

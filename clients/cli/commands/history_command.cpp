@@ -1,0 +1,146 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/files/cell_to_train.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/base/units.h"
+#include "server/compensate/model_file.h"
+#include "server/report/history.h"
+#include "server/store/audit_json.h"
+
+namespace trammel::cli {
+
+namespace {
+
+struct HistoryArguments {
+  std::string cell, output, json;
+  std::vector<std::string> models;
+  std::size_t last = 30;
+  ServiceOptions service;
+};
+
+std::optional<double> metres(const std::optional<double>& mm) {
+  return mm ? std::optional(*mm * from_mm(1)) : std::nullopt;
+}
+
+VersionOnRecord on_record(const CompensatedModel& model, int version) {
+  const ModelProvenance& made = model.provenance();
+  const auto& judged = model.parts().validation;
+  VersionOnRecord one{version,
+                      made.id,
+                      made.batch_id,
+                      made.trained_at,
+                      made.training_poses,
+                      judged ? std::optional(judged->compensated.rms) : std::nullopt};
+  put_on_record(model, one);
+  return one;
+}
+
+Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
+  CellHistory history;
+  for (const std::string& path : arguments.models) {
+    const Result<CompensatedModel> model = load_model(path);
+    if (!model) return tl::make_unexpected(model.error());
+    if (history.cell.empty()) history.cell = model->cell().name;
+    if (model->cell().name != history.cell) {
+      return refused("the model is of cell {}, the ones before it are of {}", model->cell().name, history.cell)
+          .in(path)
+          .of("cell");
+    }
+    history.versions.push_back(on_record(*model, static_cast<int>(history.versions.size()) + 1));
+  }
+  history.versions.back().in_force = true;  // the newest of the files
+  return history;
+}
+
+/// With its parameters, where the service still has the file.
+VersionOnRecord version_of(client::Session& session, const client::ModelInfo& info) {
+  VersionOnRecord one{
+      info.version, info.id, info.batch_id, info.trained_at_unix_s, info.training_poses, metres(info.validation_rms_mm),
+      info.in_force};
+  const Result<std::string> text = session.export_model(info.cell, info.version);
+  const auto model = text.and_then([&](const std::string& t) { return deserialize(t, info.id); });
+  if (model) put_on_record(*model, one);
+  return one;
+}
+
+Status add_trainings(client::Session& session, CellHistory& history) {
+  const auto jobs = session.jobs(history.cell);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  for (const client::DatedJob& job : *jobs) {
+    if (job.kind != "train" || !job.finished_unix_s) continue;
+    history.trainings.push_back({*job.finished_unix_s, fmt::format("{}", fmt::join(job.batches, "+")),
+                                 job.status.verdict, job.status.why, metres(job.status.before_mm),
+                                 metres(job.status.after_mm)});
+  }
+  return {};
+}
+
+Status add_events(client::Session& session, std::size_t last, CellHistory& history) {
+  const auto texts = session.audit(history.cell, 0, last);
+  if (!texts) return tl::make_unexpected(texts.error());
+  for (const client::AuditText& text : *texts) {
+    const auto trail = audit_of_json(text.json);
+    if (!trail) return tl::make_unexpected(trail.error());
+    for (const AuditRow& row : trail->rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+  }
+  return {};
+}
+
+Result<CellHistory> history_of_service(const HistoryArguments& arguments) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const auto session = open_session(arguments.service);
+  if (!session) return tl::make_unexpected(session.error());
+  auto models = (*session)->models(*cell);
+  if (!models) return tl::make_unexpected(models.error());
+  std::sort(models->begin(), models->end(), [](const auto& a, const auto& b) { return a.version < b.version; });
+  const std::size_t skipped = models->size() - std::min(models->size(), arguments.last);
+  CellHistory history{*cell};
+  for (std::size_t i = skipped; i < models->size(); ++i)
+    history.versions.push_back(version_of(**session, (*models)[i]));
+  if (const Status added = add_trainings(**session, history); !added) return tl::make_unexpected(added.error());
+  if (const Status added = add_events(**session, 10 * arguments.last, history); !added)
+    return tl::make_unexpected(added.error());
+  return history;
+}
+
+Status history(const HistoryArguments& arguments) {
+  if (arguments.models.empty() == arguments.cell.empty())
+    return failure(ErrorCode::kUsage, "either --cell, of a service, or --model, once for each version").of("--cell");
+  Outputs outputs;
+  outputs.add("--output", arguments.output);
+  outputs.add("--json", arguments.json);
+  std::vector<NamedFile> inputs;
+  for (const std::string& path : arguments.models) inputs.push_back({"--model", path});
+  if (const Status usable = outputs.check(inputs); !usable) return usable;
+  const Result<CellHistory> found =
+      arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments);
+  if (!found) return tl::make_unexpected(found.error());
+  outputs.put("--output", history_page(*found));
+  outputs.put("--json", json_text(history_json(*found)));
+  if (const Status written = outputs.write(); !written) return written;
+  tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found->cell,
+                   found->versions.size(), moved_parameters(*found).size()),
+       {arguments.output, arguments.json});
+  return {};
+}
+
+}  // namespace
+
+void add_history_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<HistoryArguments>();
+  CLI::App* command = app.add_subcommand(
+      "history", "Show what a cell has been through: its parameters over the versions, errors, events");
+  command->add_option("--cell", arguments->cell, "The cell, by its name or its file; asks a service");
+  command->add_option("--model", arguments->models, "Model file of a version, once for each, the oldest first");
+  command->add_option("--last", arguments->last, "How many versions of a service, the newest")->capture_default_str();
+  command->add_option("-o,--output", arguments->output, "Page to write (HTML)")->required();
+  add_json_option(*command, arguments->json);
+  add_options_of_service_command(*command, arguments->service);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return history(*arguments); }; });
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "server/robot/arm_state.h"
+
+namespace trammel {
+
+/// What the weight of an arm may be beyond what its robot file tells.
+struct ExpectedWeights {
+  FirstMoments moment;  ///< 2 x n, kg m
+  JointArray spread;    ///< n, kg m: standard deviation of either number of a link
+};
+
+/// Of an arm of that shape whose mass is spread evenly along its links. Without told masses: as heavy as robots of its
+/// reach are, and as uncertain. With them: nothing more, give or take a third.
+[[nodiscard]] ExpectedWeights expected_weights(const Chain& chain);
+
+}  // namespace trammel

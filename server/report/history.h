@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// A parameter as a version has it, in the unit it is read in.
+struct ParameterOnRecord {
+  std::string cause;  ///< for people: `joint zeros and link lengths`
+  std::string name, unit;
+  double value = 0, u95 = 0;  ///< U(k = 2)
+  bool identified = false;    ///< by the measurements, and not by the prior alone
+  bool of_set_up = false;     ///< where the instrument stood, which says nothing of the arm
+};
+
+/// A version of a cell's model.
+struct VersionOnRecord {
+  int version = 0;
+  std::string id, batches;      ///< `lt-07+lt-08`
+  std::int64_t trained_at = 0;  ///< Unix time, s
+  int poses = 0;
+  std::optional<double> validation_rms = {};  ///< m
+  bool in_force = false;
+  std::vector<ParameterOnRecord> parameters = {};  ///< none where its file is not there any more
+  std::vector<std::string> notes = {};             ///< what it knows to have changed, and what its user should know
+};
+/// Its parameters and notes, from the model itself.
+void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
+
+/// A training, and how its model did on poses held out.
+struct TrainingOnRecord {
+  std::int64_t at = 0;  ///< Unix time, s, of its end
+  std::string batches, verdict, why;
+  std::optional<double> before, after;  ///< m rms, of what was in force and of the new model
+};
+
+/// Something that somebody did, or that the service did by itself.
+struct EventOnRecord {
+  std::int64_t at = 0;  ///< Unix time, s
+  std::string what, subject, why, who;
+};
+
+/// What a cell has been through, oldest first.
+struct CellHistory {
+  std::string cell;
+  std::vector<VersionOnRecord> versions = {};
+  std::vector<TrainingOnRecord> trainings = {};
+  std::vector<EventOnRecord> events = {};
+};
+
+/// A parameter of the arm that moved by more than both uncertainties between two versions of which the later one was
+/// put on record next. Versions share measurements, so that the difference is better known than this: what is told has
+/// moved.
+struct Moved {
+  std::string cause, parameter, unit;
+  int from_version = 0, to_version = 0;
+  double from = 0, to = 0, u95 = 0;  ///< u95 of the difference, as of independent versions
+};
+[[nodiscard]] std::vector<Moved> moved_parameters(const CellHistory& history);
+
+[[nodiscard]] nlohmann::ordered_json history_json(const CellHistory& history);
+
+/// The history as a page that people look at: every parameter over the versions with its U, the error before and after
+/// each training, events. HTML with everything inside; opens without a network.
+[[nodiscard]] std::string history_page(const CellHistory& history);
+
+}  // namespace trammel

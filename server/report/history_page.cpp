@@ -1,0 +1,189 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <map>
+
+#include "server/base/units.h"
+#include "server/report/embedded.h"
+#include "server/report/history.h"
+#include "server/report/html.h"
+#include "server/report/shown_value.h"
+
+namespace trammel {
+
+namespace {
+
+/// Where things stand in a drawing, px.
+struct Frame {
+  double width = 0, height = 0, margin = 0;
+  double low = 0, high = 0;  // of what is drawn
+  std::size_t places = 1;    // from left to right
+  [[nodiscard]] double x(std::size_t place) const {
+    const double step = places < 2 ? 0 : static_cast<double>(place) / static_cast<double>(places - 1);
+    return margin + step * (width - 2 * margin);
+  }
+  [[nodiscard]] double y(double value) const {
+    const double share = high > low ? (value - low) / (high - low) : 0.5;
+    return height - margin - share * (height - 2 * margin);
+  }
+};
+
+std::string day_of(std::int64_t unix_time) {
+  if (unix_time <= 0) return "";
+  const std::time_t time = unix_time;
+  std::tm utc{};
+  ::gmtime_r(&time, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M", &utc);
+  return text.data();
+}
+
+std::string millimetres(const std::optional<double>& m) { return m ? fmt::format("{:.4f}", to_mm(*m)) : "–"; }
+
+using Track = std::map<int, const ParameterOnRecord*>;  // by version
+
+/// A whisker of ± U at each version that has the parameter, and a line through the values.
+std::string track_svg(const Track& track, const std::vector<int>& versions) {
+  Frame frame{240, 40, 6, track.begin()->second->value, track.begin()->second->value, versions.size()};
+  for (const auto& [version, one] : track) {
+    frame.low = std::min(frame.low, one->value - one->u95);
+    frame.high = std::max(frame.high, one->value + one->u95);
+  }
+  std::string marks, line;
+  for (std::size_t place = 0; place < versions.size(); ++place) {
+    const auto found = track.find(versions[place]);
+    if (found == track.end()) continue;
+    const ParameterOnRecord& one = *found->second;
+    const double x = frame.x(place);
+    marks += fmt::format(R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}"/><circle cx="{0:.1f}" cy="{3:.1f}" r="2.5"/>)", x,
+                         frame.y(one.value - one.u95), frame.y(one.value + one.u95), frame.y(one.value));
+    line += fmt::format("{}{:.1f} {:.1f}", line.empty() ? "M" : "L", x, frame.y(one.value));
+  }
+  return fmt::format(R"(<svg class="track" viewBox="0 0 240 40" role="img"><path class="line" d="{}"/>{}</svg>)", line,
+                     marks);
+}
+
+struct Tracked {
+  const ParameterOnRecord* last = nullptr;
+  const ParameterOnRecord* first = nullptr;
+  Track track;
+};
+
+/// In the order of the newest version, then those that only older ones have.
+std::vector<Tracked> tracked(const CellHistory& history) {
+  std::vector<Tracked> all;
+  for (auto version = history.versions.rbegin(); version != history.versions.rend(); ++version) {
+    for (const ParameterOnRecord& one : version->parameters) {
+      auto found = std::find_if(all.begin(), all.end(), [&](const Tracked& t) {
+        return t.last->cause == one.cause && t.last->name == one.name && t.last->unit == one.unit;
+      });
+      if (found == all.end()) found = all.insert(all.end(), Tracked{&one, &one, {}});
+      found->first = &one;
+      found->track[version->version] = &one;
+    }
+  }
+  return all;
+}
+
+bool has_moved(const std::vector<Moved>& moved, const ParameterOnRecord& one) {
+  return std::any_of(moved.begin(), moved.end(),
+                     [&](const Moved& m) { return m.cause == one.cause && m.parameter == one.name; });
+}
+
+std::string parameter_table(const CellHistory& history, const std::vector<Moved>& moved) {
+  std::vector<int> versions;
+  for (const VersionOnRecord& one : history.versions)
+    if (!one.parameters.empty()) versions.push_back(one.version);
+  std::vector<HtmlRow> rows;
+  std::string cause;
+  for (const Tracked& one : tracked(history)) {
+    const ParameterOnRecord& last = *one.last;
+    if (last.cause != cause) rows.push_back({{html_text(last.cause)}, "cause", 5});
+    cause = last.cause;
+    const ShownValue first = show_with_uncertainty(one.first->value, one.first->u95);
+    const ShownValue now = show_with_uncertainty(last.value, last.u95);
+    const bool marked = has_moved(moved, last);
+    rows.push_back(
+        {{html_text(last.name), fmt::format("{} ± {}", first.value, first.expanded),
+          fmt::format("{} ± {}", now.value, now.expanded), html_text(last.unit), track_svg(one.track, versions)},
+         marked            ? "moved"
+         : last.identified ? ""
+                           : "unknown"});
+  }
+  if (rows.empty()) return "<p>No version has any.</p>";
+  return html_table({"parameters", {"parameter", "first", "now", "unit", "over the versions, ± U (k = 2)"}, rows});
+}
+
+std::string version_table(const CellHistory& history) {
+  std::vector<HtmlRow> rows;
+  for (const VersionOnRecord& one : history.versions) {
+    rows.push_back({{fmt::format("{}{}", one.version, one.in_force ? " (in force)" : ""), day_of(one.trained_at),
+                     html_text(one.batches), std::to_string(one.poses), millimetres(one.validation_rms)},
+                    one.in_force ? "now" : ""});
+  }
+  return html_table({"versions", {"version", "trained (UTC)", "batches", "poses", "held-out rms, mm"}, rows});
+}
+
+std::string outcome_of(const TrainingOnRecord& one) {
+  std::string verdict = one.verdict;
+  std::replace(verdict.begin(), verdict.end(), '_', ' ');
+  return one.why.empty() ? verdict : verdict + ": " + one.why;
+}
+
+std::string training_table(const CellHistory& history) {
+  if (history.trainings.empty()) return "<p>The service remembers none.</p>";
+  std::vector<HtmlRow> rows;
+  for (const TrainingOnRecord& one : history.trainings) {
+    rows.push_back({{day_of(one.at), html_text(one.batches), millimetres(one.before), millimetres(one.after),
+                     html_text(outcome_of(one))}});
+  }
+  return html_table({"trainings", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
+}
+
+std::string event_table(const CellHistory& history) {
+  if (history.events.empty()) return "<p>None.</p>";
+  std::vector<HtmlRow> rows;
+  for (const EventOnRecord& one : history.events) {
+    rows.push_back(
+        {{day_of(one.at), html_text(one.what), html_text(one.subject), html_text(one.why), html_text(one.who)}});
+  }
+  return html_table({"events", {"when (UTC)", "what", "of what", "why", "who"}, rows});
+}
+
+std::string verdict(const CellHistory& history, const std::vector<Moved>& moved) {
+  const auto now = std::find_if(history.versions.begin(), history.versions.end(),
+                                [](const VersionOnRecord& one) { return one.in_force; });
+  std::string text = now == history.versions.end()
+                         ? "No version in force is on record."
+                         : fmt::format("Version {} is in force, trained on {}.", now->version, day_of(now->trained_at));
+  std::string list;
+  if (now != history.versions.end())
+    for (const std::string& note : now->notes) list += "<li>" + html_text(note) + "</li>";
+  for (const Moved& one : moved) {
+    const ShownValue step = show_with_uncertainty(one.to - one.from, one.u95);
+    list +=
+        fmt::format("<li>{}, {}: {} ± {} {} from version {} to {}</li>", html_text(one.cause), html_text(one.parameter),
+                    step.value, step.expanded, html_text(one.unit), one.from_version, one.to_version);
+  }
+  if (moved.empty()) {
+    text += fmt::format(" No {}parameter of the arm moved by more than its uncertainty between versions.",
+                        list.empty() ? "" : "other ");
+  }
+  return "<p>" + text + "</p>" + (list.empty() ? "" : "<ul>" + list + "</ul>");
+}
+
+}  // namespace
+
+std::string history_page(const CellHistory& history) {
+  const std::vector<Moved> moved = moved_parameters(history);
+  const std::string title = "History of cell " + html_text(history.cell);
+  return fill_in(embedded::history_page_html, {{"title", title},
+                                               {"verdict", verdict(history, moved)},
+                                               {"versions", version_table(history)},
+                                               {"trainings", training_table(history)},
+                                               {"parameters", parameter_table(history, moved)},
+                                               {"events", event_table(history)}});
+}
+
+}  // namespace trammel
