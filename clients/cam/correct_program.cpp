@@ -140,6 +140,12 @@ class Correcting {
         is_joints(target.coordinates)
             ? axes_of(target.coordinates, arm_.to_axes(q))
             : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
+    if (!std::all_of(exact.begin(), exact.end(), [](double number) { return std::isfinite(number); })) {
+      row.status = "refused";
+      row.message = "what is to be commanded is no number";
+      row.joints.clear();
+      return;
+    }
     row.correction_B = X_BT.translation() - row.p_B;
     write(target, exact, row);
     row.rounding_mm = rounding(target, exact, row.after, q, X_TF);

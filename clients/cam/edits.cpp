@@ -14,6 +14,7 @@ std::string line_end_of(const std::string& text) {
 Edits::Applied Edits::apply(const std::string& text) && {
   std::vector<Replacement> replacements = std::move(replacements_);
   std::vector<Line> lines = std::move(lines_);
+  for (Line& line : lines) line.at = line_begin(text, line.at);  // a last line may have no end
   std::stable_sort(replacements.begin(), replacements.end(),
                    [](const auto& a, const auto& b) { return a.span.begin < b.span.begin; });
   std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) { return a.at < b.at; });

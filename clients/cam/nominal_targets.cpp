@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "server/base/units.h"
@@ -16,6 +17,8 @@ client::PoseMm to_wire(const Pose& X_BT) {
   const Vector3 p = X_BT.translation() * to_mm(1);
   return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
 }
+
+constexpr double kLargest = 1e7;  // of a target's numbers, mm or deg
 
 class Finding {
  public:
@@ -79,6 +82,11 @@ class Finding {
       if (!moving_axes_.contains(axis)) continue;
       found_.targets[t].why_not =
           fmt::format("external axis {} moves, and the cell has none", static_cast<char>('a' + axis));
+      return;
+    }
+    const auto beyond = [](double number) { return !(std::abs(number) < kLargest); };
+    if (std::any_of(target.numbers.begin(), target.numbers.end(), beyond)) {
+      found_.targets[t].why_not = "a number that no robot reaches";
       return;
     }
     client::TargetMm& asked = found_.targets[t].asked;

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "server/base/check.h"
+
 namespace trammel::cam {
 
 namespace {
@@ -87,6 +89,7 @@ NumberStyle with_rounding(double value, NumberStyle style, double largest) {
 }
 
 std::string number_text(double value, const NumberStyle& style) {
+  TRAMMEL_CHECK(std::isfinite(value));
   std::string text = style.exponent == 0 ? fixed_text(value, style) : exponent_text(value, style);
   const std::size_t digits = text.front() == '-' ? 1 : 0;
   if (style.ends_in_point && style.decimals == 0) {

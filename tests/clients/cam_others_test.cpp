@@ -130,5 +130,21 @@ TEST(OtherDialects, WhatIsNoneIsLeftAsItIs) {
   }
 }
 
+TEST(Programs, NumbersThatNoRobotReachesAreLeftAndNothingIsWrittenBehindAnUnfinishedLine) {
+  const std::string huge =
+      "def a():\n  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n  movej([0, -0.349, 0.349, 0, 0.524, 0])\n"
+      "  movel(p[1e308, 1e305, -1E300, 1e300, 1.57, 0])\nend\n";
+  const test::Corrected left = corrected_by_shift(Dialect::kUrScript, {{"a.script", huge}});
+  EXPECT_EQ(left.program.left_alone(), 1u);
+  EXPECT_NE(left.program.files[0].text.find("p[1e308, 1e305, -1E300, 1e300, 1.57, 0]"), std::string::npos);
+  const std::string job =
+      "/JOB\n//POS\n///TOOL 1\n///POSTYPE BASE\n///RECTAN\n///RCONF 1,0,0,0,0,0,0,0\n"
+      "C00000=1800.000,-100.000,800.000,0.0000,90.0000,0.0000\n//INST\nMOVL C00000 V=10.0\nEND";
+  const Pose X_FT = test::spindle_only().tools.at("spindle");
+  const test::Corrected made = corrected_by_shift(Dialect::kInform, {{"a.jbi", job}}, {.frames = {{"TOOL[1]", X_FT}}});
+  ASSERT_EQ(made.program.moves_corrected, 1u);
+  EXPECT_EQ(test::without_numbers(test::without_inserted(made.program)), test::without_numbers(job));
+}
+
 }  // namespace
 }  // namespace trammel::cam

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "clients/cam/scan.h"
@@ -79,7 +80,8 @@ class Job {
     if (line.starts_with("///RCONF")) {
       now_.conf.clear();
       for (const Piece& piece : pieces_of(text_, begin + 8, end, number, {})) {
-        if (const auto written = read_number(piece.text)) now_.conf.push_back(static_cast<int>(written->value));
+        if (const auto written = read_number(piece.text))
+          now_.conf.push_back(static_cast<int>(std::clamp(written->value, -1e6, 1e6)));
       }
     }
     const std::size_t equals = line.find('=');

@@ -105,7 +105,11 @@ class Reader {
   Program read() {
     note_displacements();
     for (std::size_t m = 0; m < modules_.size(); ++m) read_motions(m);
-    for (auto& [place, site] : sites_) finish(site);
+    program_.targets.reserve(sites_.size());
+    for (auto& [place, site] : sites_) {
+      finish(site);
+      site = {};
+    }
     list_unused();
     return std::move(program_);
   }
@@ -209,10 +213,12 @@ class Reader {
       tool.why_not = data.error();
       return known_tool(std::move(tool));
     }
+    const auto [seen, fresh] = tool_at_.emplace(data->node, 0);
+    if (!fresh) return seen->second;
     tool.file = program_.files[data->scope->module].name;
     tool.line = data->node->line;
     read_tool(*data, tool);
-    return known_tool(std::move(tool));
+    return seen->second = known_tool(std::move(tool));
   }
 
   void read_tool(const Data& data, ProgramTool& tool) const {
@@ -269,13 +275,16 @@ class Reader {
       return known_frame(std::move(frame));
     }
     const Told<Data> data = named(*expression, *where);
+    if (data) {
+      if (const auto seen = frame_at_.find(data->node); seen != frame_at_.end()) return seen->second;
+    }
     const Told<Data> parts = data ? aggregate(*data, 5) : because(data.error());
     if (!parts) {
       frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
       return known_frame(std::move(frame));
     }
     read_frame(*parts, frame);
-    return known_frame(std::move(frame));
+    return frame_at_[data->node] = known_frame(std::move(frame));
   }
 
   void read_frame(const Data& parts, ProgramFrame& frame) const {
@@ -343,15 +352,17 @@ class Reader {
       note_names(*argument);
       if (const auto speed = predefined_speed(*argument)) program_.moves.back().speed_mm_s = speed;
     }
-    const std::string first = meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]);
+    const auto leave_it = [&](const std::string& why) {
+      leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
+    };
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
     const auto displaced = displaced_.find(&motion);
-    if (displaced != displaced_.end()) return leave(module, motion, first, displaced->second);
-    if (!open_displacement_.empty()) return leave(module, motion, first, open_displacement_);
+    if (displaced != displaced_.end()) return leave_it(displaced->second);
+    if (!open_displacement_.empty()) return leave_it(open_displacement_);
     for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
       const Expression* with = tool != nullptr ? tool : tool_argument(motion, positional, *scope);
       if (with == nullptr) {
-        leave(module, motion, first, "it has no tool");
+        leave_it("it has no tool");
         continue;
       }
       const bool joints = motion.name.starts_with("moveabsj");
@@ -399,16 +410,15 @@ class Reader {
 
   void use(std::size_t module, const Instruction& motion, const Expression& argument, bool joints, std::size_t tool,
            std::size_t frame, const Scope& scope) {
-    const std::string name = meaning_->text_of(argument, scope);
     const auto handed = meaning_->handed_over(argument, scope);
-    if (!handed) return leave(module, motion, name, handed.error());
+    if (!handed) return leave(module, motion, meaning_->text_of(argument, scope), handed.error());
     const auto& [expression, where] = *handed;
     const bool written_here = expression->kind == Kind::kAggregate || expression->kind == Kind::kCall;
     const Told<std::vector<Data>> all =
         written_here
             ? Told<std::vector<Data>>(std::vector<Data>{{expression, where, joints ? "jointtarget" : "robtarget"}})
             : meaning_->data_of(*expression, *where);
-    if (!all) return leave(module, motion, name, all.error());
+    if (!all) return leave(module, motion, meaning_->text_of(argument, scope), all.error());
     for (const Data& data : *all) {
       const std::size_t of = data.scope->module;
       Site& site = sites_[{of, data.node->begin}];
@@ -662,6 +672,7 @@ class Reader {
   std::map<std::size_t, Scope> own_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
   std::set<std::string> named_;
+  std::map<const Expression*, std::size_t> tool_at_, frame_at_;  ///< of Program::tools and frames, by what says them
   std::string open_displacement_;
   std::map<const Instruction*, std::string> displaced_;
 };

@@ -1,6 +1,7 @@
 #include "clients/cli/text/receipt_text.h"
 
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "clients/cli/terminal/output.h"
@@ -94,21 +95,26 @@ std::string receipt_csv(const CorrectedProgram& program) {
   text +=
       ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
       "path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,suggestion\n";
+  const auto out = std::back_inserter(text);
   for (const ReceiptRow& row : program.rows) {
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
-                        csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
-                        csv_field(row.tool), csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
-                        row.before.empty() ? "" : spelled(row.coordinates));
-    text += numbers(row.before) + numbers(row.after);
-    for (Eigen::Index k = 0; k < 3; ++k)
-      text += (std::isfinite(row.p_B(k)) ? fmt::format("{:.4f}", to_mm(row.p_B(k))) : "") + ",";
+    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
+                   csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
+                   csv_field(row.tool), csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
+                   row.before.empty() ? "" : spelled(row.coordinates));
+    text += numbers(row.before);
+    text += numbers(row.after);
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (std::isfinite(row.p_B(k))) fmt::format_to(out, "{:.4f}", to_mm(row.p_B(k)));
+      text += ',';
+    }
     for (const double value :
          {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm}) {
-      text += millimetres(value) + ",";
+      text += millimetres(value);
+      text += ',';
     }
-    text += fmt::format("{},{},{},{},{},{},{}\n", domain_of(row), row.iterations, speed(row.path_limit_before_mm_s),
-                        speed(row.path_limit_after_mm_s), program.model_id, csv_field(row.message),
-                        csv_field(row.suggestion));
+    fmt::format_to(out, "{},{},{},{},{},{},{}\n", domain_of(row), row.iterations, speed(row.path_limit_before_mm_s),
+                   speed(row.path_limit_after_mm_s), program.model_id, csv_field(row.message),
+                   csv_field(row.suggestion));
   }
   return text;
 }
