@@ -190,7 +190,7 @@ Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest
     gradient.noalias() +=
         fitting.rows[at].transpose() * fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
   }
-  return (fitting.information + fitting.prior).ldlt().solve(gradient);
+  return (fitting.information + fitting.prior).llt().solve(gradient);
 }
 
 Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) const {
