@@ -107,6 +107,10 @@ TEST(EvaluationTable, SaysWhereABiasDoesNotHelp) {
       evaluation_table(worse).find("the bias does not help here: 0.4100 mm with it, 0.4000 mm without on 7 poses"),
       std::string::npos);
   EXPECT_TRUE(evaluation_json(worse).contains("doubt_of_bias"));
+  // A model without a bias: the same but for the last bit.
+  Evaluation none = evaluation();
+  none.compensated.rms = std::nextafter(none.calibrated.rms, 1);
+  EXPECT_EQ(evaluation_table(none).find("the bias"), std::string::npos);
 }
 
 TEST(ModelText, SaysWhatCouldNotBeIdentified) {
