@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kNothing = 1e-9;    // m, rad: a parameter whose prior moves the tool by less has no effect
 constexpr double kElsewhere = 1e-3;  // m: a tool that moved by more turns through other errors of the arm
+constexpr double kSameRms = 1e-9;    // relative
 constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
@@ -222,7 +223,8 @@ std::vector<std::string> warnings_of(const CompensatedModel& model, const std::o
 std::optional<std::string> doubt_of_bias(const Evaluation& evaluation) {
   const double with = evaluation.compensated.rms;
   const double without = evaluation.calibrated.rms;
-  const bool worse = with > without || (evaluation.bias_gain_z && with == without);
+  // Without a bias the two are the same up to rounding.
+  const bool worse = with > without * (1 + kSameRms) || (evaluation.bias_gain_z && with >= without);
   const bool by_chance = evaluation.bias_gain_z && *evaluation.bias_gain_z <= PairedGain::kBeyondChance;
   if (!worse && !by_chance) return std::nullopt;
   return fmt::format("the bias {} here: {:.4f} mm with it, {:.4f} mm without on {} poses{}",

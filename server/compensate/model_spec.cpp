@@ -18,7 +18,7 @@ Error in_cell_file(Error why, const char* key, const Cell& cell, const std::stri
 
 std::vector<Error> check_sources(const Cell& cell) {
   std::vector<Error> problems;
-  for (const std::string& source : cell.model.error_sources) {
+  for (const std::string& source : spelled_out(cell.model.error_sources, cell)) {
     const auto made = make_error_source(source, cell);
     if (!made) problems.push_back(made.error());
   }

@@ -123,7 +123,7 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
   if (const Status few = check_counts(specs); !few) return tl::make_unexpected(few.error());
   PhysicalModel model;
   std::size_t parameters = 0;
-  for (const std::string& spec : specs) {
+  for (const std::string& spec : spelled_out(specs, *cell)) {
     Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
     if (!source) return tl::make_unexpected(source.error());
     for (const ErrorSourcePtr& other : model.sources) {

@@ -40,7 +40,8 @@ struct PhysicalModel {
 /// Puts `source` at its place in the acting order, at its prior values; index of its first value.
 Eigen::Index add_source(PhysicalModel& model, ErrorSourcePtr source);
 
-/// A model of `cell` with the sources that `specs` name, at their prior values. An unknown base or tool is identity
+/// A model of `cell` with the sources that `specs` name, at their prior values; `joint_map:*` names one for each joint
+/// that can have it. An unknown base or tool is identity
 /// until it is found.
 [[nodiscard]] Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell,
                                                         const std::vector<std::string>& specs);

@@ -113,6 +113,24 @@ Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& ce
       .map_error([&](Error error) { return Failure(std::move(error)).of("error_sources").with_text(spec).value(); });
 }
 
+std::vector<std::string> spelled_out(const std::vector<std::string>& specs, const Cell& cell) {
+  const Chain& robot = cell.robot;
+  std::vector<std::string> all;
+  for (const std::string& spec : specs) {
+    const std::size_t star = spec.substr(0, spec.find('@')).find(":*");
+    const CauseRecord* record = find_cause(spec);
+    if (star == std::string::npos || record == nullptr || record->scope != Scope::kJoint) {
+      all.push_back(spec);
+      continue;
+    }
+    for (int joint = 0; joint < robot.size(); ++joint) {
+      if (record->of_turning_joint && robot.joint(joint).type != JointType::kRevolute) continue;
+      all.push_back(fmt::format("{}:{}{}", spec.substr(0, star), joint + 1, spec.substr(star + 2)));
+    }
+  }
+  return all;
+}
+
 bool are_forms_of_one(const std::string& source, const std::string& other) {
   if (source == other) return true;
   const CauseRecord* record = find_cause(source);

@@ -18,6 +18,9 @@ namespace trammel {
 /// unknown name, joint or number.
 [[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
 
+/// `joint_map:*` as one spec for each joint that can have it; all other specs as they are.
+[[nodiscard]] std::vector<std::string> spelled_out(const std::vector<std::string>& specs, const Cell& cell);
+
 /// The order in which causes act on the arm: frames and links first, causes that depend on the loaded posture last.
 [[nodiscard]] bool acts_before(const ErrorSource& one, const ErrorSource& other);
 

@@ -47,7 +47,7 @@ Status check_spellings(const Cell& cell, const std::string& level, const std::st
     const auto specs = parse_level(level);
     if (!specs) return tl::make_unexpected(specs.error());
     if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
-    for (const std::string& spec : *specs) {
+    for (const std::string& spec : spelled_out(*specs, cell)) {
       if (auto source = make_error_source(spec, cell); !source) return tl::make_unexpected(source.error());
     }
   }

@@ -10,8 +10,10 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
+#include "server/calibrate/refit.h"
 #include "server/plan/plan.h"
 #include "tests/support/demand.h"
+#include "tests/support/heavy_arm.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
 
@@ -116,6 +118,37 @@ void speed_beside_scipy() {
   if (std::system(command.c_str()) != 0) std::printf("SciPy is not at hand (Debian: python3-scipy)\n");
 }
 
+/// Base and tool from 60 poses, beside maps of all joints that stay as they are.
+void refit_beside_maps() {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  std::vector<std::string> sources = {"base", "geometry", "compliance_linear", "tool"};
+  for (int joint = 1; joint <= 6; ++joint) sources.push_back(fmt::format("joint_map:{}@78", joint));
+  const CalibrationResult known = test::demand(calibrate(cell, sources, test::measured(robot, 600, 78), {}));
+  const MeasurementBatch batch = test::measured(robot, 60, 79);
+  const double begin = cpu_seconds();
+  const Refit found = test::demand(refit(known, cell, batch, {"base", "tool"}));
+  std::printf("base and tool from 60 poses beside %zu parameters: %.3f s (aim 1), rms %.5f mm\n",
+              found.result.parameters.size(), cpu_seconds() - begin, to_mm(found.result.rms));
+}
+
+/// Arms whose links weigh, without a data sheet.
+void link_weights(int seeds) {
+  double worst = 0;
+  double longest = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const test::HeavyArm arm = test::draw_heavy_arm({.seed = static_cast<std::uint64_t>(seed)});
+    const MeasurementBatch batch = test::measured(arm, 600, 1);
+    const double begin = cpu_seconds();
+    const CalibrationResult found =
+        test::demand(calibrate(arm.cell, {"base", "geometry", "compliance"}, batch, {.held = {}, .weigh_links = true}));
+    longest = std::max(longest, cpu_seconds() - begin);
+    worst = std::max(worst, rms_mm(found.model, test::measured(arm, 1000, 2)));
+  }
+  std::printf("masses never told, 600 poses, worst of %d arms: %.5f mm (aim %.5f), longest %.2f s\n", seeds, worst,
+              1.05 * 0.013 * std::sqrt(3.0), longest);
+}
+
 }  // namespace
 }  // namespace trammel
 
@@ -123,4 +156,6 @@ int main(int argc, char** argv) {
   trammel::uncertainties_and_validation(argc > 1 ? std::atoi(argv[1]) : 100);
   trammel::robot_like_the_measured_one();
   trammel::speed_beside_scipy();
+  trammel::refit_beside_maps();
+  trammel::link_weights(20);
 }

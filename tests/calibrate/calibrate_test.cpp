@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/refit.h"
 #include "server/plan/plan.h"
+#include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
@@ -263,6 +264,50 @@ TEST(Calibrate, RefitsACauseThatTheModelDidNotHaveAndTheFormThatItHas) {
     EXPECT_TRUE(before || combination.parameters.front()[0] == 't' || combination.parameters.front()[0] == 'C')
         << combination.sentence;
   }
+}
+
+/// With maps of all joints, which are known to be nothing.
+CalibrationResult with_idle_maps(CalibrationResult known, int harmonics) {
+  const auto own = static_cast<Eigen::Index>(known.parameters.size());
+  for (int joint = 1; joint <= 6; ++joint) {
+    const std::string spec = fmt::format("joint_map:{}@{}", joint, harmonics);
+    add_source(known.model, test::demand(make_error_source(spec, *known.model.cell)));
+  }
+  const std::vector<Parameter> parameters = known.model.parameters();
+  const auto all = static_cast<Eigen::Index>(parameters.size());
+  std::vector<Eigen::Index> places;
+  std::vector<IdentifiedParameter> identified;
+  for (Eigen::Index k = 0; k < all; ++k) {
+    const auto& p = parameters[static_cast<std::size_t>(k)];
+    const bool map = p.name.starts_with("map");
+    identified.push_back(map ? IdentifiedParameter{p, 0, 0, true} : known.parameters[places.size()]);
+    if (!map) places.push_back(k);
+  }
+  EXPECT_EQ(static_cast<Eigen::Index>(places.size()), own);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(all, all);
+  covariance(places, places) = known.covariance;
+  known.parameters = std::move(identified);
+  known.covariance = std::move(covariance);
+  return known;
+}
+
+TEST(Calibrate, WhatIsKeptHasNoPartInARefitHoweverMuchItIs) {
+  const auto cell = cell_7();
+  VirtualRobot robot = chapter_5_robot(cell);
+  const CalibrationResult few =
+      *calibrate(cell, {"base", "geometry", "compliance_linear", "tool"}, measured(robot, 200, 20), {});
+  const CalibrationResult many = with_idle_maps(few, 80);
+  EXPECT_EQ(many.parameters.size(), few.parameters.size() + 960);
+  robot.truth.tools["spindle"].translation() += Vector3(1e-3, -2e-3, 0.5e-3);
+  const MeasurementBatch batch = measured(robot, 60, 21);
+  const Refit one = test::demand(refit(few, cell, batch, {"base", "tool"}));
+  const Refit other = test::demand(refit(many, cell, batch, {"base", "tool"}));
+  for (const Eigen::Index k : one.anew) {
+    const IdentifiedParameter& p = one.result.parameters[static_cast<std::size_t>(k)];
+    EXPECT_NEAR(parameter(other.result, p.parameter.name).value, p.value, 1e-9) << p.parameter.name;
+    EXPECT_NEAR(parameter(other.result, p.parameter.name).stddev, p.stddev, 1e-3 * p.stddev) << p.parameter.name;
+  }
+  EXPECT_EQ(other.result.rank, one.result.rank + 960);
 }
 
 TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {

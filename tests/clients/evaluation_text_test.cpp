@@ -40,6 +40,27 @@ TEST(EvaluationJson, HasAnOrientationInDegreesWhereOneWasMeasuredAndSoHasTheText
             std::string::npos);
 }
 
+TEST(ResidualsCsv, HasARowAPoseInMillimetresAndMarksSuspects) {
+  MeasurementBatch batch;
+  for (const char* id : {"p1", "p,2"}) {
+    Measurement m;
+    m.pose_id = id;
+    m.row = static_cast<int>(batch.measurements.size()) + 2;
+    batch.measurements.push_back(m);
+  }
+  CompensatedModel::LevelErrors errors;
+  errors.nominal = errors.calibrated = errors.compensated = errors.stddev = Eigen::Matrix3Xd::Constant(3, 2, 1e-5);
+  errors.compensated.col(1) = Vector3(3e-5, 4e-5, 0);
+  errors.compensated(2, 1) = 6e-5;
+  errors.in_domain = {true, false};
+  EXPECT_EQ(
+      residuals_csv(batch, errors),
+      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,cz_mm,nominal_mm,"
+      "in_domain,suspect\n"
+      "p1,2,0.0173205,0.01,0.01,0.01,0.01,0.01,0.01,1,1,1,0.0173205,0.01,0.01,0.01,0.0173205,1,0\n"
+      "\"p,2\",3,0.0781025,0.03,0.04,0.06,0.01,0.01,0.01,3,4,6,0.0173205,0.01,0.01,0.01,0.0173205,0,1\n");
+}
+
 TEST(EvaluationJson, HasExactlyItsPinnedKeysInMillimetres) {
   const std::string compensated =
       R"("rms_mm":0.1,"mean_mm":0.09,"p997_mm":0.2,"max_mm":0.3,"axis":{"x":{"mean_mm":0.01,"std_mm":0.04},)"
@@ -86,6 +107,10 @@ TEST(EvaluationTable, SaysWhereABiasDoesNotHelp) {
       evaluation_table(worse).find("the bias does not help here: 0.4100 mm with it, 0.4000 mm without on 7 poses"),
       std::string::npos);
   EXPECT_TRUE(evaluation_json(worse).contains("doubt_of_bias"));
+  // A model without a bias: the same but for the last bit.
+  Evaluation none = evaluation();
+  none.compensated.rms = std::nextafter(none.calibrated.rms, 1);
+  EXPECT_EQ(evaluation_table(none).find("the bias"), std::string::npos);
 }
 
 TEST(ModelText, SaysWhatCouldNotBeIdentified) {

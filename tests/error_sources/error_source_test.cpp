@@ -229,6 +229,23 @@ TEST(ErrorSources, LevelsAreListsOfSources) {
   EXPECT_FALSE(parse_level("M2,base"));
 }
 
+TEST(ErrorSources, AStarStandsForEveryJointThatCanHaveTheSource) {
+  const auto names = [](const std::string& robot, const std::string& spec) {
+    auto cell = std::make_shared<Cell>(*cell_7());
+    cell->robot = *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/" + robot);
+    std::string all;
+    const auto model = make_physical_model(cell, {spec});
+    if (!model) return model.error().message;
+    for (const ErrorSourcePtr& source : model->sources) all += source->name() + " ";
+    return all;
+  };
+  EXPECT_EQ(names("abb_irb6640-205-275.yaml", "joint_map:*@5"),
+            "joint_map:1@5 joint_map:2@5 joint_map:3@5 joint_map:4@5 joint_map:5@5 joint_map:6@5 ");
+  EXPECT_TRUE(names("abb_irb6640-205-275-on-rail.yaml", "joint_map:*").starts_with("joint_map:2 joint_map:3 "));
+  EXPECT_FALSE(make_physical_model(cell_7(), {"geometry:*"}));
+  EXPECT_FALSE(make_physical_model(cell_7(), {"joint_map:*", "joint_map:2"}));
+}
+
 TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const auto cell = cell_7();
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);

@@ -147,7 +147,7 @@ Status train_model(const TrainArguments& arguments) {
 }
 
 struct EvaluateArguments {
-  std::string model, json;
+  std::string model, json, residuals;
   std::vector<std::string> batches;
 };
 
@@ -158,7 +158,18 @@ std::string located_text(const InWorld& world) {
                      fmt::join(world.located, ", "));
 }
 
+Status check_outputs(const EvaluateArguments& arguments) {
+  if (arguments.residuals.empty()) return {};
+  Outputs outputs;
+  outputs.add("--residuals", arguments.residuals);
+  outputs.add("--json", arguments.json);
+  std::vector<NamedFile> inputs = {{"--model", arguments.model}};
+  for (const std::string& batch : arguments.batches) inputs.push_back({"--batch", batch});
+  return outputs.check(inputs);
+}
+
 Status evaluate(const EvaluateArguments& arguments) {
+  if (const Status fit = check_outputs(arguments); !fit) return fit;
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   const Result<CheckedBatch> batch = read_checked_batches(arguments.batches, model->cell());
@@ -166,10 +177,18 @@ Status evaluate(const EvaluateArguments& arguments) {
   const Result<InWorld> world = in_world_of(*model, batch->rows());
   if (!world) return tl::make_unexpected(world.error());
   const Evaluation evaluation = model->evaluate(world->batch);
+  const CompensatedModel::LevelErrors errors = model->errors_B(world->batch);
+  const std::string structure = structure_note(*model, world->batch, errors);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id()) +
-           evaluation_table(evaluation) + located_text(*world),
-       {arguments.json});
-  return write_json(arguments.json, evaluation_json(evaluation));
+           evaluation_table(evaluation) + located_text(*world) + (structure.empty() ? "" : "note: " + structure + "\n"),
+       {arguments.json, arguments.residuals});
+  if (!arguments.residuals.empty()) {
+    const Status written = write_output(arguments.residuals, residuals_csv(world->batch, errors));
+    if (!written) return written;
+  }
+  nlohmann::ordered_json json = evaluation_json(evaluation);
+  if (!structure.empty()) json["structure"] = structure;
+  return write_json(arguments.json, json);
 }
 
 struct ReportArguments {
@@ -233,6 +252,8 @@ void add_evaluate(CLI::App& app, Action& chosen) {
       app.add_subcommand("evaluate", "Compare a model with measurements: errors in mm, of orientations in deg");
   command->add_option("--model", arguments->model, "Model file")->required();
   add_batches_option(*command, arguments->batches)->required();
+  command->add_option("--residuals", arguments->residuals,
+                      "Also write what is left of each pose, axis by axis, to this file (CSV; '-': standard output)");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return evaluate(*arguments); }; });
 }

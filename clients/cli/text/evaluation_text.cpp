@@ -3,6 +3,8 @@
 #include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
+#include "server/compensate/residual_structure.h"
+#include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
 
 namespace trammel::cli {
@@ -56,6 +58,35 @@ std::string evaluation_table(const Evaluation& evaluation) {
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
                      evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
          nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + doubt_line(evaluation);
+}
+
+std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors) {
+  constexpr double kSuspect = 5.5;  // norm of 3 axes that 1 in 10^6 good poses exceeds
+  std::string text =
+      "pose_id,row,error_mm,ex_mm,ey_mm,ez_mm,sx_mm,sy_mm,sz_mm,zx,zy,zz,calibrated_mm,cx_mm,cy_mm,cz_mm,nominal_mm,"
+      "in_domain,suspect\n";
+  const auto rounded = [](double value) { return fmt::format("{:.6g}", value); };
+  const auto three = [&](const Vector3& v) {
+    return fmt::format("{},{},{}", rounded(v.x()), rounded(v.y()), rounded(v.z()));
+  };
+  for (Eigen::Index i = 0; i < errors.compensated.cols(); ++i) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    const Vector3 e = errors.compensated.col(i);
+    const Vector3 z = e.cwiseQuotient(Vector3(errors.stddev.col(i)));
+    const Vector3 calibrated = errors.calibrated.col(i);
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row, rounded(to_mm(e.norm())),
+                        three(to_mm(1) * e), three(to_mm(1) * errors.stddev.col(i)), three(z),
+                        rounded(to_mm(calibrated.norm())), three(to_mm(1) * calibrated),
+                        rounded(to_mm(errors.nominal.col(i).norm())),
+                        errors.in_domain[static_cast<std::size_t>(i)] ? 1 : 0, z.norm() > kSuspect ? 1 : 0);
+  }
+  return text;
+}
+
+std::string structure_note(const CompensatedModel& model, const MeasurementBatch& batch,
+                           const CompensatedModel::LevelErrors& errors) {
+  const auto structured = most_structured(residual_orders(model, batch, errors.calibrated));
+  return structured ? in_words(*structured) : "";
 }
 
 ordered_json evaluation_json(const Evaluation& evaluation) {

@@ -25,6 +25,7 @@ double freedom_of(const Eigen::MatrixXd& information) {
 }
 
 Information decomposed(const Eigen::MatrixXd& information) {
+  if (information.size() == 0) return {};
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
@@ -65,33 +66,29 @@ void add_observability(const Information& seen, std::size_t poses, CalibrationRe
 }
 
 /// Adds covariance, rank and what is not identifiable: from the information that `poses` poses give of the parameters
-/// that are not held.
+/// that are not held. Those that are held are exact.
 void add_posterior(const Eigen::MatrixXd& information, const ScaledParameters& s, std::size_t poses,
                    CalibrationResult& result) {
-  const auto P = s.scale.size();
-  std::vector<Eigen::Index> free;
-  std::vector<Parameter> parameters;
-  for (Eigen::Index i = 0; i < P; ++i) {
-    if (!s.held.empty() && s.held[static_cast<std::size_t>(i)]) continue;
-    free.push_back(i);
-    parameters.push_back(s.parameters[static_cast<std::size_t>(i)]);
-  }
-  const Information seen = decomposed(information(free, free));
+  const Information seen = decomposed(information);
   const Eigen::VectorXd variance = (seen.singular_values.array().square() + 1).inverse();
   const Eigen::MatrixXd scaled_covariance = seen.directions * variance.asDiagonal() * seen.directions.transpose();
-  const Eigen::VectorXd scale = s.scale(free);
-  result.covariance(free, free) = scale.asDiagonal() * scaled_covariance * scale.asDiagonal();
+  result.covariance(s.free, s.free) = s.scale.asDiagonal() * scaled_covariance * s.scale.asDiagonal();
   add_observability(seen, poses, result);
-  const Eigen::VectorXd from_prior = result.model.values.cwiseQuotient(s.scale) - s.prior;
-  result.log_evidence =
-      result.log_likelihood - 0.5 * from_prior(free).squaredNorm() + 0.5 * variance.array().log().sum();
-  result.unidentifiable = unidentifiable_combinations(seen, parameters, scale.cwiseQuotient(s.typical(free)));
-  for (Eigen::Index i = 0; i < P; ++i) {
-    const double stddev = std::sqrt(result.covariance(i, i));
-    result.parameters.push_back({.parameter = s.parameters[static_cast<std::size_t>(i)],
-                                 .value = result.model.values(i),
-                                 .stddev = stddev,
-                                 .identified = stddev < kIdentifiedShare * s.typical(i)});
+  const Eigen::VectorXd from_prior = result.model.values(s.free).cwiseQuotient(s.scale) - s.prior;
+  result.log_evidence = result.log_likelihood - 0.5 * from_prior.squaredNorm() + 0.5 * variance.array().log().sum();
+  result.unidentifiable = unidentifiable_combinations(seen, s.parameters, s.scale.cwiseQuotient(s.typical));
+  for (Parameter& parameter : result.model.parameters())
+    result.parameters.push_back({.parameter = std::move(parameter), .value = 0, .stddev = 0, .identified = true});
+  for (Eigen::Index i = 0; i < s.values.size(); ++i) {
+    IdentifiedParameter& one = result.parameters[static_cast<std::size_t>(i)];
+    one.value = result.model.values(i);
+    one.parameter.prior = s.values(i);
+  }
+  for (std::size_t k = 0; k < s.free.size(); ++k) {
+    IdentifiedParameter& one = result.parameters[static_cast<std::size_t>(s.free[k])];
+    one.parameter = s.parameters[k];
+    one.stddev = std::sqrt(result.covariance(s.free[k], s.free[k]));
+    one.identified = one.stddev < kIdentifiedShare * s.typical(static_cast<Eigen::Index>(k));
   }
 }
 
@@ -137,7 +134,7 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
   CalibrationProblem working = problem;
   Identified now;
   now.sessions = settings_of(problem.batch);
-  now.minimum.x = problem.model.values.cwiseQuotient(s.scale);
+  now.minimum.x = s.prior;
   now.minimum.converged = s.scale.size() == 0;
   now.minimum.message = "nothing to identify";
   for (int round = 0; round < kMostReweightings; ++round) {
@@ -151,7 +148,7 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
       freedom = freedom_of(now.minimum.information) + freedom_of_sessions(problem.batch);
       take_over_sessions(problem.batch, now, working.batch, tracker);
     }
-    now.residuals = residuals_of(problem.model, working.batch, now.minimum.x.cwiseProduct(s.scale));
+    now.residuals = residuals_of(problem.model, working.batch, s.values_at(now.minimum.x));
     const bool same_noise =
         now.sessions.empty() || estimate_own_noise(now, freedom, problem.batch, working.batch, tracker);
     const Weights before = now.weights;
@@ -165,13 +162,13 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
 
 Result<CalibrationResult> identify(const CalibrationProblem& problem, const CalibrateOptions& options) {
   const ScaledParameters s = scaled_parameters(problem.model, options.held);
-  const auto P = s.scale.size();
+  const Eigen::Index P = s.values.size();
   CalibrationResult result;
   result.model = problem.model;
   const Result<Identified> found = settle(problem, options, s, result);
   if (!found) return tl::make_unexpected(found.error());
   const Residuals& r = found->residuals;
-  result.model.values = found->minimum.x.cwiseProduct(s.scale);
+  result.model.values = s.values_at(found->minimum.x);
   result.discrepancy = found->weights.discrepancy;
   result.discrepancy_rotation = found->weights.discrepancy_rotation;
   result.log_evidence = result.log_likelihood = log_likelihood(r, found->weights);

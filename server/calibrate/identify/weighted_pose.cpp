@@ -24,14 +24,14 @@ Matrix3 right_jacobian_inverse(const Vector3& w) {
 WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
                            const Weights& weights)
     : model_(model),
-      scale_(s.scale),
-      held_(s.held),
+      s_(s),
       measurement_(measurement),
       inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
       inverse_rotation_sigma_(1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
 
 bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
-  const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(x, scale_.size()).cwiseProduct(scale_);
+  const Eigen::Index F = s_.scale.size();
+  const Eigen::VectorXd values = s_.values_at(Eigen::Map<const Eigen::VectorXd>(x, F));
   Eigen::MatrixXd J;
   const Pose X_WT = model_.pose_W(measurement_.context, values, jacobian != nullptr ? &J : nullptr);
   Eigen::Map<Eigen::VectorXd> r(residuals, size());
@@ -42,17 +42,13 @@ bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian
     r.tail<3>() = inverse_rotation_sigma_ * turn;
   }
   if (jacobian != nullptr) {
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(jacobian, size(),
-                                                                                           scale_.size());
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(jacobian, size(), F);
     // d log(R_m (exp(w) R)ᵀ) = -Jr^-1(turn) w to first order in w, Jr the right Jacobian of SO(3).
     const Matrix3 by_turn = -inverse_rotation_sigma_ * right_jacobian_inverse(turn);
-    for (Eigen::Index k = 0; k < scale_.size(); ++k) {
-      if (!held_.empty() && held_[static_cast<std::size_t>(k)]) {
-        out.col(k).setZero();
-        continue;
-      }
-      out.col(k).head<3>() = -inverse_sigma_ * scale_(k) * J.col(k).head<3>();
-      if (measurement_.R_WT) out.col(k).tail<3>() = scale_(k) * (by_turn * J.col(k).tail<3>());
+    for (Eigen::Index k = 0; k < F; ++k) {
+      const auto column = J.col(s_.free[static_cast<std::size_t>(k)]);
+      out.col(k).head<3>() = -inverse_sigma_ * s_.scale(k) * column.head<3>();
+      if (measurement_.R_WT) out.col(k).tail<3>() = s_.scale(k) * (by_turn * column.tail<3>());
     }
   }
   return X_WT.translation().allFinite();

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// One measurement: its residual in units of sigma, as a function of the parameters in units of their scale. Held
-/// parameters have no derivative. Keeps references to its arguments.
+/// One measurement: its residual in units of sigma, as a function of the F parameters that are to be found, in units of
+/// their scale. Keeps references to its arguments.
 class WeightedPose {
  public:
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
@@ -16,7 +16,7 @@ class WeightedPose {
 
   /// How many equations: 6, or 3 without an orientation.
   [[nodiscard]] int size() const { return measurement_.R_WT ? 6 : 3; }
-  /// At `x` (P): `residuals` (size()), and `jacobian` (size() x P by rows) unless it is null. False: not finite.
+  /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null. False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;
   [[nodiscard]] double inverse_sigma() const { return inverse_sigma_; }                    ///< 1/m
   [[nodiscard]] double inverse_rotation_sigma() const { return inverse_rotation_sigma_; }  ///< 1/rad
@@ -25,8 +25,7 @@ class WeightedPose {
 
  private:
   const PhysicalModel& model_;
-  const Eigen::VectorXd& scale_;
-  const std::vector<bool>& held_;
+  const ScaledParameters& s_;
   const Measurement& measurement_;
   double inverse_sigma_;           // 1/m, of one axis, discrepancy included
   double inverse_rotation_sigma_;  // 1/rad

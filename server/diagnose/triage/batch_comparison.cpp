@@ -32,7 +32,8 @@ int shown_directions(const Alternative& alternative, const Eigen::MatrixXd& info
   }
   if (free.empty()) return 0;
   const Eigen::MatrixXd own = information(free, free);
-  const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(own).eigenvalues();
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(own, Eigen::EigenvaluesOnly).eigenvalues();
   return static_cast<int>((eigenvalues.array() > 1).count());
 }
 
@@ -182,15 +183,20 @@ void Comparison::linearise(const Alternative& alternative, Fitting& fitting) con
 Eigen::VectorXd Comparison::step(const Alternative& alternative, double farthest, Fitting& fitting) const {
   const Eigen::VectorXd off = (fitting.values - alternative.known).cwiseQuotient(fitting.scale);
   Eigen::VectorXd gradient = -fitting.prior * off;
-  fitting.information.setZero(off.size(), off.size());
+  Eigen::MatrixXd counted(off.size(), static_cast<Eigen::Index>(all_rows()));  // one column a row that counts
+  Eigen::Index filled = 0;
   for (int i = 0; i < poses(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (fitting.square[at] > farthest) continue;
-    fitting.information.noalias() += fitting.rows[at].transpose() * fitting.rows[at];
+    counted.middleCols(filled, rows(i)) = fitting.rows[at].transpose();
+    filled += rows(i);
     gradient.noalias() +=
         fitting.rows[at].transpose() * fitting.residual[at].cwiseQuotient(deviation_.col(i).head(rows(i)));
   }
-  return (fitting.information + fitting.prior).ldlt().solve(gradient);
+  fitting.information.setZero(off.size(), off.size());
+  if (filled > 0) fitting.information.selfadjointView<Eigen::Lower>().rankUpdate(counted.leftCols(filled));
+  fitting.information = Eigen::MatrixXd(fitting.information.selfadjointView<Eigen::Lower>());
+  return (fitting.information + fitting.prior).llt().solve(gradient);
 }
 
 Fit Comparison::judged(const Alternative& alternative, const Fitting& fitting) const {

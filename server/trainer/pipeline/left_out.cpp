@@ -11,11 +11,15 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// R with R Rᵀ the covariance, which may be singular or empty.
-MatrixXd square_root(const MatrixXd& covariance) {
-  if (covariance.size() == 0) return covariance;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no part in it.
+MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
+  std::vector<Index> open;
+  for (Index k = 0; k < covariance.rows(); ++k) {
+    if (covariance(k, k) > 0) open.push_back(k);
+  }
+  if (open.empty()) return MatrixXd(J.rows(), 0);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance(open, open));
+  return J(Eigen::all, open) * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 std::vector<const Measurement*> observations(const CalibrationResult& found, const MeasurementBatch& batch) {
@@ -54,7 +58,7 @@ LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) 
     residual_.segment<3>(6 * i + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose()) / turn;
     J_.middleRows<3>(6 * i + 3) = J_W.bottomRows<3>() / turn;
   }
-  J_ = (J_ * square_root(found.covariance)).eval();
+  J_ = times_square_root(J_, found.covariance);
 }
 
 std::optional<LeftOut::Without> LeftOut::without(const std::vector<Index>& poses) const {
