@@ -397,7 +397,8 @@ Complaints check_causes(const SourceTree& tree) {
 
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
-  static const std::regex kMayStart(R"(^server/main\.cpp$|^(server/trainer|server/dds|clients/session|clients/cli/work)/.*)");
+  static const std::regex kMayStart(
+      R"(^server/main\.cpp$|^(server/trainer|server/dds|clients/session|clients/cli/work)/.*)");
   Complaints complaints;
   find_in_code(
       tree, kThread, "starts a thread",
