@@ -95,8 +95,8 @@ std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector&
 }
 
 CorrectedInWrist correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
-                                  const JointVector& from, const Vector6& missing_at_start,
-                                  const MissingAt& missing_at, const CorrectOptions& options) {
+                                  const JointVector& from, const Vector6& missing_at_start, const MissingAt& missing_at,
+                                  const CorrectOptions& options) {
   const JointVector start = from;  // what `missing_at` writes to may be what the caller handed over
   CorrectedInWrist now{start, missing_at_start};
   bool asked_here = true;  // what was learned

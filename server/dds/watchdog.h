@@ -17,8 +17,8 @@ inline constexpr int kExitHung = 70;
 /// no lock: the thread that hangs may hold any lock.
 [[noreturn]] void end_at_once(const char* line);
 
-/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was given the processor: one
-/// that is slow on a crowded machine does not hang. A daemon that has ended is started again by its supervisor; one
+/// Ends the process when one of `parts` stops moving. Time counts only as far as the process was given the processor:
+/// one that is slow on a crowded machine does not hang. A daemon that has ended is started again by its supervisor; one
 /// that hangs is not. Checks from its own thread until it is destroyed.
 class Watchdog {
  public:

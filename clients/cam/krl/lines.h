@@ -35,7 +35,7 @@ struct Value {
   Kind kind = Kind::kOther;
   std::size_t begin = 0, end = 0;
   double number = 0;
-  std::string name;  ///< in upper case, with its index: `XP[3]`; an index that is no number is `*`
+  std::string name;                      ///< in upper case, with its index: `XP[3]`; an index that is no number is `*`
   std::vector<std::string> field_names;  ///< of an aggregate
   std::vector<Value> field_values;       ///< as field_names
 
