@@ -56,19 +56,16 @@ Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {
-    const Result<std::string> tool = resolve_tool(model.cell(), asked_tool);
-    if (!tool) return tl::make_unexpected(tool.error());
-    const Result<std::string> payload = resolve_payload(model.cell(), asked_payload);
-    if (!payload) return tl::make_unexpected(payload.error());
-    if (const Status known = model.check_trained_with(*tool, *payload); !known)
-      return tl::make_unexpected(known.error());
+    const auto known = known_tool_and_payload(model, asked_tool, asked_payload);
+    if (!known) return tl::make_unexpected(known.error());
     client::Answer<client::CorrectedTarget> answer{info_of(model), {}};
     answer.items.resize(targets.size());
     const std::vector<JointType> types = joint_types(model.cell().robot);
     in_parallel(
         targets.size(),
         [&](std::size_t i) {
-          answer.items[i] = to_wire(model.correct(from_wire(targets[i], model.cell().robot), *tool, *payload), types);
+          answer.items[i] =
+              to_wire(model.correct(from_wire(targets[i], model.cell().robot), known->tool, known->payload), types);
         },
         [&](double share) { progress.show("correcting", share); });
     return answer;

@@ -37,19 +37,15 @@ PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot, 
 cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::CommandedJoints>& poses) -> Result<client::Answer<client::PredictedError>> {
-    const Result<std::string> tool = resolve_tool(model.cell(), asked_tool);
-    if (!tool) return tl::make_unexpected(tool.error());
-    const Result<std::string> payload = resolve_payload(model.cell(), asked_payload);
-    if (!payload) return tl::make_unexpected(payload.error());
-    if (const Status known = model.check_trained_with(*tool, *payload); !known)
-      return tl::make_unexpected(known.error());
+    const auto known = known_tool_and_payload(model, asked_tool, asked_payload);
+    if (!known) return tl::make_unexpected(known.error());
     client::Answer<client::PredictedError> answer{info_of(model), {}};
     answer.items.resize(poses.size());
     const auto portion = [&](std::size_t k) {
       std::vector<PoseContext> contexts;
       const std::size_t first = k * kPosesTogether, last = std::min(first + kPosesTogether, poses.size());
       for (std::size_t i = first; i < last; ++i)
-        contexts.push_back(context_of(poses[i], model.cell().robot, *tool, *payload));
+        contexts.push_back(context_of(poses[i], model.cell().robot, known->tool, known->payload));
       const std::vector<ErrorPrediction> all = model.predict_all(contexts);
       for (std::size_t i = first; i < last; ++i) answer.items[i] = to_wire(all[i - first]);
     };

@@ -4,6 +4,17 @@ namespace trammel::cli {
 
 cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
 
+Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
+                                              const std::string& payload) {
+  Result<std::string> known_tool = resolve_tool(model.cell(), tool);
+  if (!known_tool) return tl::make_unexpected(known_tool.error());
+  Result<std::string> known_payload = resolve_payload(model.cell(), payload);
+  if (!known_payload) return tl::make_unexpected(known_payload.error());
+  if (const Status known = model.check_trained_with(*known_tool, *known_payload); !known)
+    return tl::make_unexpected(known.error());
+  return ToolAndPayload{std::move(*known_tool), std::move(*known_payload)};
+}
+
 client::ModelInfo info_of(const CompensatedModel& model) {
   const ModelProvenance& provenance = model.provenance();
   client::ModelInfo info;

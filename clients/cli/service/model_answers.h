@@ -15,6 +15,14 @@ namespace trammel::cli {
 [[nodiscard]] cam::CellTools tools_of(const CompensatedModel& model);
 [[nodiscard]] client::ModelInfo info_of(const CompensatedModel& model);
 
+struct ToolAndPayload {
+  std::string tool, payload;
+};
+/// Those that a program asks for, by the cell's names; empty: its only ones. Refuses what the model was not trained
+/// with.
+[[nodiscard]] Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
+                                                            const std::string& payload);
+
 /// Tells which model answered a call.
 using SawModel = std::function<void(const client::ModelInfo&)>;
 
