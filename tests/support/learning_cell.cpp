@@ -13,7 +13,7 @@ namespace trammel::test {
 
 namespace {
 
-constexpr std::chrono::seconds kLimit{120};
+constexpr std::chrono::seconds kLimit{900};  // a training waits where others compute
 constexpr int kTruePoses = 400;
 
 }  // namespace
