@@ -1,12 +1,14 @@
 #include "server/calibrate/calibrate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify/check_needs.h"
 #include "server/calibrate/identify/identify.h"
 #include "server/calibrate/identify/order_search.h"
+#include "server/calibrate/identify/weighting.h"
 #include "server/calibrate/sessions/locate_sessions.h"
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/sessions.h"
@@ -15,7 +17,10 @@ namespace trammel {
 
 namespace {
 
-constexpr double kWeighed = 20;  // nat: so much more likely must the data be with the links' weights
+constexpr double kWeighed = 20;            // nat: so much more likely must the data be with the links' weights
+constexpr double kPerhapsStretched = 3;    // standard deviations of what a scale alone would explain: worth a trial
+constexpr double kStretched = 10;          // nat: so much more likely must the data be with scales of the sessions,
+constexpr double kStretchedOfSession = 3;  // and so much more for each of them
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
@@ -41,6 +46,44 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   return {};
 }
 
+/// Whether the residuals of a session grow with the distance from its middle. The parameters have taken a part of that,
+/// so it is only a reason to look.
+bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& located) {
+  const Tracker& tracker = found.model.cell->tracker;
+  const MeasurementBatch here = moved(located, found.sessions, tracker.sigma, tracker.sigma_rotation);
+  const Residuals r = residuals_of(found.model, here, found.model.values);
+  const std::size_t S = found.sessions.size();
+  std::vector<Vector3> middle(S, Vector3::Zero());
+  for (const Measurement& m : here.measurements) {
+    const auto s = static_cast<std::size_t>(m.session);
+    middle[s] += m.p_W / found.sessions[s].poses;
+  }
+  std::vector<double> along(S, 0.0), square(S, 0.0);
+  for (std::size_t i = 0; i < here.measurements.size(); ++i) {
+    const auto s = static_cast<std::size_t>(here.measurements[i].session);
+    const auto at = static_cast<Eigen::Index>(i);
+    const Vector3 from_middle = here.measurements[i].p_W - middle[s];
+    const double variance = std::pow(r.sigma(at), 2) + std::pow(found.discrepancy, 2);
+    along[s] += r.position.col(at).dot(from_middle) / variance;
+    square[s] += from_middle.squaredNorm() / variance;
+  }
+  for (std::size_t s = 0; s < S; ++s) {
+    if (std::abs(along[s]) > kPerhapsStretched * std::sqrt(square[s])) return true;
+  }
+  return false;
+}
+
+/// identify(), and once more with a scale for each session where the data ask for it.
+Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& problem, const CalibrateOptions& options) {
+  Result<CalibrationResult> rigid = identify(problem, options);
+  if (!rigid || rigid->sessions.size() < 2 || !perhaps_stretched(*rigid, problem.batch)) return rigid;
+  CalibrationProblem with = problem;
+  with.stretched = true;
+  Result<CalibrationResult> stretched = identify(with, options);
+  const double price = kStretched + kStretchedOfSession * static_cast<double>(rigid->sessions.size() - 1);
+  return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
+}
+
 }  // namespace
 
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
@@ -63,9 +106,9 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
   if (Status fit = check_needs(complete); !fit) return tl::make_unexpected(fit.error());
   localise_base(complete.model, complete.batch);
   if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
-  return identify(complete, options).map([&](CalibrationResult found) {
+  return identify_with_sessions(complete, options).map([&](CalibrationResult found) {
     for (std::size_t s = 0; s < sessions.size(); ++s)
-      found.sessions[s].X_WS = found.sessions[s].X_WS * sessions[s].X_WS;
+      found.sessions[s].set_into_W(found.sessions[s].into_W() * sessions[s].into_W());
     return found;
   });
 }

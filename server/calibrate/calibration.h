@@ -21,6 +21,7 @@ inline constexpr double kNoModelShare = 0.05;
 struct CalibrationProblem {
   PhysicalModel model;
   MeasurementBatch batch;  ///< checked against the cell
+  bool stretched = false;  ///< each session but the newest has a scale of its own
 };
 
 struct CalibrateOptions {

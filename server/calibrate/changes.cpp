@@ -146,7 +146,7 @@ class ChangeSearch {
     const auto P = static_cast<Index>(own_.size());
     const auto K = static_cast<Index>(changes_.size());
     information_ = MatrixXd::Identity(P, P);
-    for (SessionBlock& block : blocks_) block.cross = MatrixXd::Zero(6, P);
+    for (SessionBlock& block : blocks_) block.cross = MatrixXd::Zero(kOfSession, P);
     whole_.assign(sessions_.size(), Sums(K, P));
     halves_.assign(joints_ * sessions_.size(), Sums(K, P));
     const Tracker& tracker = found.model.cell->tracker;
@@ -287,8 +287,8 @@ class ChangeSearch {
     VectorXd r(pose.size());
     MatrixXd all(s_.scale.size(), pose.size());  // one column an equation
     if (!pose.evaluate(s_.prior.data(), r.data(), all.data())) return;
-    MatrixXd D =
-        motion_columns(m, kinds_.probe().X_WB.translation(), pose.inverse_sigma(), pose.inverse_rotation_sigma());
+    MatrixXd D = motion_columns(m, kinds_.probe().X_WB.translation(), pose.inverse_sigma(),
+                                pose.inverse_rotation_sigma(), are_stretched(sessions_));
     if (const double norm = r.norm(); norm > pose.huber_limit()) {
       const double root_weight = std::sqrt(pose.huber_limit() / norm);
       r *= root_weight;

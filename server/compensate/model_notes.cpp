@@ -191,6 +191,11 @@ void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>
   for (const LeftOutSession& session : parts.sessions_left_out)
     notes.push_back(fmt::format("nothing was learned from session {}: {}", session.id, session.why));
   for (const SessionSetting& session : parts.sessions) {
+    if (session.scale != 0) {
+      notes.push_back(fmt::format(
+          "session {} measured lengths {:.1f} ppm {} than session {}: it has a scale of its own", session.id,
+          1e6 * std::abs(session.scale), session.scale < 0 ? "longer" : "shorter", parts.sessions.back().id));
+    }
     if (session.own_noise == 0 && session.own_noise_rotation == 0) continue;
     notes.push_back(
         fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: it counts "

@@ -46,13 +46,13 @@ constexpr double kOtherSetUp = 3;          // times what is left where the rows 
 constexpr double kSlack = 1e-4;            // m
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after all sessions
 
-/// m rms, of what the model leaves of the rows, seen from there.
-double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Pose& X_WS, int index) {
+/// m rms, of what the model leaves of the rows, taken into W so.
+double left_of(const CompensatedModel& model, const MeasurementBatch& session, const Similarity& into_W, int index) {
   MeasurementBatch rows = known_rows(model, session);
   rows.as_then = true;
   if (rows.measurements.empty()) return 0;
   for (Measurement& m : rows.measurements) {
-    m.p_W = X_WS * m.p_W;
+    m.p_W = into_W * m.p_W;
     m.context.index = index;
   }
   return std::sqrt(model.errors_B(rows).compensated.colwise().squaredNorm().mean());
@@ -63,8 +63,8 @@ double left_of(const CompensatedModel& model, const MeasurementBatch& session, c
 bool is_same_set_up(const CompensatedModel& model, const MeasurementBatch& session, const SessionSetting& known) {
   const Result<Pose> X_WS = located(model, session);
   if (!X_WS) return true;
-  return left_of(model, session, known.X_WS, known.first) <=
-         kOtherSetUp * left_of(model, session, *X_WS, known.first) + kSlack;
+  return left_of(model, session, known.into_W(), known.first) <=
+         kOtherSetUp * left_of(model, session, {*X_WS}, known.first) + kSlack;
 }
 
 /// The batch is one session.
@@ -92,7 +92,7 @@ Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatc
   for (std::size_t s = 0; s < sessions.size(); ++s) {
     const SessionSetting* known = known_session(model, batch, batch.sessions[s]);
     if (known != nullptr && is_same_set_up(model, sessions[s], *known)) {
-      settings[s].X_WS = known->X_WS;
+      settings[s].set_into_W(known->into_W());
       settings[s].own_noise = known->own_noise;
       settings[s].own_noise_rotation = known->own_noise_rotation;
       index[s] = known->first;

@@ -306,6 +306,49 @@ TEST(CoupledPosterior, PassesOverPosesThatAreTooFarAwayToMatterAndNoOthers) {
   EXPECT_GT(moved, 1e-9) << "nothing was passed over";
 }
 
+/// Poses whose own signal is below the noise, as calibration leaves it, or far above.
+struct ServedCase {
+  LinearBlocks blocks = made(Blocks::kBoth);
+  MatrixXd q = turns(400, 71);
+  CoupledHyperparameters at = some_hyperparameters(blocks);
+  CoupledData data = arm_data(blocks, q, gear_residual(q, kNoise, 72), uneven_noise(q.rows()));
+
+  explicit ServedCase(double signal_over_noise) {
+    for (GpHyperparameters& output : at.outputs)
+      output.log_signal_stddev = output.log_noise_stddev + std::log(signal_over_noise);
+  }
+  CoupledPosterior posterior(VarianceForm form) const {
+    return *CoupledPosterior::condition(make_kernel("matern52"), blocks, data, at, form);
+  }
+};
+
+TEST(CoupledPosterior, ServesFromNearPosesWhatAllSay) {
+  for (const double signal_over_noise : {0.1, 0.5, 5.0}) {
+    const ServedCase served(signal_over_noise);
+    const CoupledPosterior near = served.posterior(VarianceForm::kServed);
+    const CoupledPosterior all = served.posterior(VarianceForm::kExact);
+    const MatrixXd targets = turns(150, 73);  // not those that it was tried at
+    for (const auto& target : targets.rowwise()) {
+      const MatrixXd H = arm_columns(served.blocks, target);
+      const CoupledPrediction a = predict_one(near, target, H);
+      const CoupledPrediction b = predict_one(all, target, H);
+      EXPECT_EQ(a.mean, b.mean);
+      for (Index d = 0; d < 3; ++d) {
+        const double noise = std::exp(2 * served.at.outputs[static_cast<std::size_t>(d)].log_noise_stddev);
+        const double measured = b.covariance(d, d) + noise;
+        EXPECT_GE(a.covariance(d, d), b.covariance(d, d) - 0.01 * measured) << signal_over_noise;
+        EXPECT_LE(a.covariance(d, d), b.covariance(d, d) + 0.05 * measured) << signal_over_noise;
+      }
+    }
+  }
+}
+
+TEST(CoupledPosterior, TakesNearPosesWhereTheyAreEnoughAndOnlyThere) {
+  EXPECT_EQ(ServedCase(0.1).posterior(VarianceForm::kServed).outputs_from_near_points(), 3);
+  EXPECT_EQ(ServedCase(5.0).posterior(VarianceForm::kServed).outputs_from_near_points(), 0);
+  EXPECT_EQ(ServedCase(0.1).posterior(VarianceForm::kExact).outputs_from_near_points(), 0);
+}
+
 TEST(CoupledPosterior, SaysThatAnErrorOfTheFirstJointIsAcrossTheArmAndNotAlongIt) {
   const LinearBlocks blocks = made(Blocks::kJointMap);
   const MatrixXd q = turns(40, 51);

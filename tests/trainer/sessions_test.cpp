@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -79,6 +81,64 @@ TEST(Sessions, NothingHasChangedWhereOnlyTheTrackerMoved) {
     EXPECT_TRUE(model.parts().changes.empty()) << model.parts().changes.front().source;
     EXPECT_EQ(model.parts().sessions.size(), 4u);
   }
+}
+
+/// Sessions as sessions_of() has them; the instrument of each measures lengths too long by `ppm`.
+CheckedBatch stretched_sessions(const VirtualRobot& robot, const std::vector<double>& ppm, std::uint64_t seed) {
+  std::vector<CheckedBatch> batches;
+  for (std::size_t s = 0; s < ppm.size(); ++s) {
+    MeasurementBatch batch = measured_on(robot, {.poses = 60, .seed = seed + 17 * s, .set_up_anew = true});
+    for (Measurement& m : batch.measurements) m.p_W *= 1 + 1e-6 * ppm[s];
+    batches.push_back(checked(std::move(batch), fmt::format("day-{}", s + 1), *robot.truth.cell));
+  }
+  return joined(batches);
+}
+
+TEST(Sessions, AnInstrumentThatMeasuresTooLongInOneOfThemSpoilsNothing) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel good = test::demand(train(cell, stretched_sessions(robot, {0, 0, 0, 0}, 300), kPhysics));
+  const CompensatedModel model = test::demand(train(cell, stretched_sessions(robot, {0, 60, 0, 0}, 300), kPhysics));
+  const auto& sessions = model.parts().sessions;
+  EXPECT_NEAR(1e6 * sessions[1].scale, -60, 4);
+  EXPECT_NEAR(1e6 * sessions[0].scale, 0, 4);
+  EXPECT_EQ(sessions.back().scale, 0);
+  EXPECT_TRUE(model.parts().changes.empty());
+  EXPECT_LT(true_error(model, robot), 1.15 * true_error(good, robot));
+  const std::vector<std::string> notes = notes_of(model);
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+    return note.find("session day-2 measured lengths") != std::string::npos &&
+           note.find("ppm longer than session day-4") != std::string::npos;
+  }));
+  const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
+  EXPECT_EQ(again.parts().sessions, sessions);
+}
+
+TEST(Sessions, HaveTheSameScaleWhereTheDataAskForNoOther) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const CompensatedModel model =
+        test::demand(train(cell, stretched_sessions(robot, {0, 0, 0, 0}, 4100 * seed), kPhysics));
+    EXPECT_FALSE(are_stretched(model.parts().sessions)) << "seed " << seed;
+  }
+}
+
+TEST(Sessions, AZeroLostIsFoundBesideAnotherScale) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const VirtualRobot after = test::with_zero_off(robot, 3, 2e-4);
+  std::vector<CheckedBatch> batches;
+  for (int s = 0; s < 4; ++s) {
+    MeasurementBatch batch = measured_on(
+        s < 2 ? robot : after, {.poses = 60, .seed = 810 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true});
+    for (Measurement& m : batch.measurements) m.p_W *= 1 + (s == 1 ? 6e-5 : 0);
+    batches.push_back(checked(std::move(batch), fmt::format("day-{}", s + 1), *cell));
+  }
+  const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
+  ASSERT_EQ(model.parts().changes.size(), 1u);
+  EXPECT_EQ(model.parts().changes.front().source, "joint_slip:3@121");
+  EXPECT_TRUE(are_stretched(model.parts().sessions));
 }
 
 TEST(Sessions, AZeroOfTheLastJointAndATurnedToolAreAmbiguous) {

@@ -252,6 +252,7 @@ ordered_json sessions_json(const CompensatedModel::Parts& parts) {
     list.push_back({{"session_id", session.id},
                     {"poses", session.poses},
                     {"first_pose_id", session.first_pose},
+                    {"scale_ppm", 1e6 * session.scale},
                     {"own_noise_mm", to_mm(session.own_noise)},
                     {"own_noise_deg", to_deg(session.own_noise_rotation)}});
   }

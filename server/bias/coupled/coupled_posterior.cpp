@@ -7,6 +7,7 @@
 #include "server/base/check.h"
 #include "server/bias/process/inducing_points.h"
 #include "server/numerics/numerics.h"
+#include "server/numerics/seeded_random.h"
 
 namespace trammel {
 
@@ -29,6 +30,12 @@ constexpr Index kWorthPassing = 8;  // leaving poses out pays where at most one 
 // more of a posterior variance than R A⁻¹ Rᵀ of their errors, which is below it.
 constexpr double kUnexplained = 1e-4;
 constexpr Index kWorthFew = 3;  // few points pay where they are less than one in so many
+
+// R from near points is tried at so many joint vectors between the poses. The variance that follows may be smaller and
+// larger than that from all poses by these shares of the variance of a measurement.
+constexpr Index kTried = 64;
+constexpr double kNearTooSmall = 0.005;
+constexpr double kNearTooLarge = 0.02;
 
 AlignedMatrix packed_inverse_root(const MatrixXd& A) {
   const Index p = A.rows();
@@ -116,10 +123,47 @@ std::optional<CoupledPosterior> CoupledPosterior::condition(std::shared_ptr<cons
   posterior.packed_root_ = packed_inverse_root(solution->A);
   posterior.features_ = std::move(solution->features);
   posterior.few_.resize(posterior.outputs_.size());
+  posterior.rows_.resize(posterior.outputs_.size());
   if (form == VarianceForm::kServed || form == VarianceForm::kLearned) {
-    for (std::size_t d = 0; d < posterior.outputs_.size(); ++d) posterior.explain_by_few(d, data.noise_shape);
+    for (std::size_t d = 0; d < posterior.outputs_.size(); ++d) {
+      posterior.explain_by_near(d, data, *solution);
+      if (posterior.rows_[d].rows() == 0) posterior.explain_by_few(d, data.noise_shape);
+    }
   }
   return posterior;
+}
+
+// The columns of a joint vector between two poses are taken to be those between theirs: what near points miss of
+// kᵀ M⁻¹ H does not depend on them.
+void CoupledPosterior::explain_by_near(std::size_t output, const CoupledData& data, const CoupledSolution& solution) {
+  if (!outputs_[output].is_near_enough()) return;
+  const MatrixXd& H = data.columns[output];
+  SeededRandom random(1);
+  const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(points_)); };
+  MatrixXd q(kTried, data.q.cols()), columns(kTried, H.cols());
+  for (Index i = 0; i < kTried; ++i) {
+    const Index a = any(), b = any();
+    q.row(i) = 0.5 * (data.q.row(a) + data.q.row(b));
+    columns.row(i) = 0.5 * (H.row(a) + H.row(b));
+  }
+  const auto d = static_cast<Index>(output);
+  const auto variance_of = [&](const Part& part) -> VectorXd {
+    return part.known + solution.root.matrixL().solve(part.R).colwise().squaredNorm().transpose();
+  };
+  const VectorXd of_all = variance_of(part_of(q, columns, d));
+  rows_[output] = (H * column_scale_.asDiagonal()).eval().sparseView();
+  const VectorXd more = variance_of(near_part_of(q, columns, d)) - of_all;
+  const Eigen::ArrayXd measured = of_all.array() + outputs_[output].noise_variance() * data.noise_shape.mean();
+  const bool enough = (more.array() >= -kNearTooSmall * measured && more.array() <= kNearTooLarge * measured).all();
+  if (enough) {
+    explained_[output].resize(0, 0);
+  } else {
+    rows_[output].resize(0, 0);
+  }
+}
+
+Index CoupledPosterior::outputs_from_near_points() const {
+  return std::count_if(rows_.begin(), rows_.end(), [](const auto& rows) { return rows.rows() > 0; });
 }
 
 // With R_xx ≈ R_xu R_uu⁻¹ R_ux.
@@ -232,8 +276,24 @@ void CoupledPosterior::predict_few(const MatrixXd& q, const std::vector<MatrixXd
   }
 }
 
+CoupledPosterior::Part CoupledPosterior::near_part_of(const MatrixXd& q, const MatrixXd& columns, Index d) const {
+  const auto output = static_cast<std::size_t>(d);
+  Part part{column_scale_.asDiagonal() * columns.transpose(), VectorXd(q.rows()), VectorXd(q.rows())};
+  std::vector<NearWeights> near;
+  const std::vector<PosteriorVariance> own = outputs_[output].variance(q, &near);
+  for (Index i = 0; i < q.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    part.known[i] = own[at].posterior;
+    part.prior[i] = own[at].prior + part.R.col(i).squaredNorm();
+    for (std::size_t a = 0; a < near[at].points.size(); ++a)
+      part.R.col(i) -= near[at].weights[static_cast<Index>(a)] * rows_[output].row(near[at].points[a]).transpose();
+  }
+  return part;
+}
+
 CoupledPosterior::Part CoupledPosterior::part_of(const MatrixXd& q, const MatrixXd& columns, Index d) const {
   const auto output = static_cast<std::size_t>(d);
+  if (rows_[output].rows() > 0) return near_part_of(q, columns, d);
   const GpHyperparameters& at = hyperparameters_[output];
   const double signal = std::exp(2 * at.log_signal_stddev);
   MatrixXd targets(q.rows(), kernel_->feature_count(q.cols()));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Sparse>
+
 #include "server/bias/coupled/coupled_likelihood.h"
 
 namespace trammel {
@@ -32,6 +34,9 @@ class CoupledPosterior {
   /// M x D: what the processes of the outputs add to H w.
   [[nodiscard]] Eigen::MatrixXd own_mean(const Eigen::MatrixXd& q) const;
 
+  /// Of how many outputs only the points near a target say what it is uncertain by.
+  [[nodiscard]] Eigen::Index outputs_from_near_points() const;
+
   /// p: ŵ of the columns of H, not scaled.
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
@@ -49,6 +54,8 @@ class CoupledPosterior {
  private:
   CoupledPosterior() = default;
   void leave_out(const CoupledSolution& solution, const CoupledData& data);
+  /// R of an output from the points near a target, where these say as much of it as all.
+  void explain_by_near(std::size_t output, const CoupledData& data, const CoupledSolution& solution);
   /// Takes `explained_` of an output from few of its points, where these stand for all.
   void explain_by_few(std::size_t output, const Eigen::VectorXd& noise);
   /// What one output contributes at some targets.
@@ -60,6 +67,8 @@ class CoupledPosterior {
   // The poses whose covariance matters, rising.
   [[nodiscard]] std::vector<Eigen::Index> near_poses(const double* k, std::size_t output) const;
   [[nodiscard]] Part part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
+  // The same from the points near each target.
+  [[nodiscard]] Part near_part_of(const Eigen::MatrixXd& q, const Eigen::MatrixXd& columns, Eigen::Index d) const;
   // R A⁻¹ Rᵀ of target i.
   [[nodiscard]] Eigen::MatrixXd shared_covariance(const std::vector<Part>& parts, Eigen::Index i) const;
   // Of a few targets at once.
@@ -77,9 +86,11 @@ class CoupledPosterior {
   };
   std::vector<std::optional<FewPoints>> few_;  // D: u; empty: all points
   std::vector<Eigen::MatrixXd> explained_;     // D: Hᵀ M⁻¹, p x N; of few points Hᵀ M⁻¹ R_xu R_uu⁻¹
-  std::vector<std::vector<double>> inverse_;   // D: M⁻¹, lower triangle row after row; empty: not needed
-  std::vector<double> passed_over_;            // D: root sum of squares of the covariances that do not matter
-  AlignedMatrix packed_root_;                  // L⁻¹ of A = L Lᵀ, as Numerics packs it
+  // D: H scaled, N x p, where R is taken from near points; else empty
+  std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> rows_;
+  std::vector<std::vector<double>> inverse_;  // D: M⁻¹, lower triangle row after row; empty: not needed
+  std::vector<double> passed_over_;           // D: root sum of squares of the covariances that do not matter
+  AlignedMatrix packed_root_;                 // L⁻¹ of A = L Lᵀ, as Numerics packs it
   Eigen::VectorXd column_scale_;
   Eigen::VectorXd weights_;
   double log_likelihood_ = 0;

@@ -333,15 +333,19 @@ void GaussianProcess::mean(const MatrixXd& q, double* out) const {
                         out);
 }
 
-std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q) const {
+std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std::vector<NearWeights>* near) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
   VectorXd posterior(q.rows());
   VectorXd prior(q.rows());
   const FeatureBlock asked = rows_of(targets, 0, q.rows());
+  if (near != nullptr) near->resize(near_ > 0 ? static_cast<std::size_t>(q.rows()) : 0);
   if (near_ > 0) {
     kernel_->diagonal(parameters_, asked, prior.data());
-    const NearPoints near = near_points(near_);
-    for (Index i = 0; i < q.rows(); ++i) posterior[i] = near.left_of(rows_of(targets, i, 1), prior[i]);
+    const NearPoints points = near_points(near_);
+    for (Index i = 0; i < q.rows(); ++i) {
+      NearWeights* weights = near == nullptr ? nullptr : &(*near)[static_cast<std::size_t>(i)];
+      posterior[i] = points.left_of(rows_of(targets, i, 1), prior[i], -1, weights);
+    }
   } else {
     const VarianceTable& table = compressed_ ? *compressed_ : exact_;
     table.shares(*kernel_, parameters_, asked, posterior.data(), prior.data());

@@ -124,8 +124,12 @@ class GaussianProcess {
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
   void mean(const Eigen::MatrixXd& q, double* out) const;
 
-  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
+  /// `near`: the points that each variance was computed from, where near ones are enough; else it becomes empty.
+  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
+                                                        std::vector<NearWeights>* near = nullptr) const;
 
+  /// Whether variances are computed from near points.
+  [[nodiscard]] bool is_near_enough() const { return near_ > 0; }
   /// How many points the variance of a target is computed from.
   [[nodiscard]] Eigen::Index variance_points() const {
     return near_ > 0 ? near_ : compressed_ ? compressed_->size() : size_;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
-#include <vector>
+#include <utility>
 
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/numerics.h"
@@ -46,12 +46,12 @@ std::vector<Index> largest(const double* k, Index size, Index count) {
 
 }  // namespace
 
-double NearPoints::left_of(const FeatureBlock& target, double prior, Index left_out) const {
+double NearPoints::left_of(const FeatureBlock& target, double prior, Index left_out, NearWeights* weights) const {
   const Index size = noise.size();
   AlignedMatrix cross(features.rows(), 1);
   kernel.tile(parameters, rows_of(features, 0, size), target, cross.data(), cross.rows());
   if (left_out >= 0) cross(left_out, 0) = -std::numeric_limits<double>::infinity();
-  const std::vector<Index> found = largest(cross.data(), size, count);
+  std::vector<Index> found = largest(cross.data(), size, count);
 
   AlignedMatrix near(padded_rows(count), features.cols());
   Few known(count);
@@ -67,7 +67,11 @@ double NearPoints::left_of(const FeatureBlock& target, double prior, Index left_
   const Eigen::LLT<Covariance> root(matrix);
   if (root.info() != Eigen::Success) return prior;
   root.matrixL().solveInPlace(known);
-  return std::clamp(prior - known.squaredNorm(), 0.0, prior);
+  const double left = std::clamp(prior - known.squaredNorm(), 0.0, prior);
+  if (weights == nullptr) return left;
+  root.matrixU().solveInPlace(known);
+  *weights = {std::move(found), known};
+  return left;
 }
 
 }  // namespace trammel

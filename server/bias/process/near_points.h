@@ -1,11 +1,18 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <vector>
 
 #include "server/bias/kernels/kernel.h"
 #include "server/numerics/aligned_matrix.h"
 
 namespace trammel {
+
+/// How the points near a target tell its mean: Σ weights y, with the weights (R + noise)⁻¹ r of these points.
+struct NearWeights {
+  std::vector<Eigen::Index> points;  ///< rising
+  Eigen::VectorXd weights;
+};
 
 /// The variance that the points leave which a target has most in common with. Fewer points know less, so it is never
 /// below the variance that all points leave. Nothing is kept for it. Refers to what it is made of.
@@ -19,8 +26,9 @@ struct NearPoints {
   Eigen::Index count;             ///< of near ones; at most kMost, and fewer than there are points
 
   /// In units of σ_f². `target`: one row of features, `prior` its variance without data. Without the point `left_out`,
-  /// if there is one.
-  [[nodiscard]] double left_of(const FeatureBlock& target, double prior, Eigen::Index left_out = -1) const;
+  /// if there is one. Tells the points and their weights, too, where it is asked for them.
+  [[nodiscard]] double left_of(const FeatureBlock& target, double prior, Eigen::Index left_out = -1,
+                               NearWeights* weights = nullptr) const;
 };
 
 }  // namespace trammel

@@ -46,12 +46,12 @@ class Normals {
   Normals(Expansion& at, std::size_t sessions)
       : at_(at),
         jacobians_(at.gradient.size(), 6 * kPosesAtATime),
-        motions_(6, sessions > 1 ? 6 * kPosesAtATime : 0),
+        motions_(kOfSession, sessions > 1 ? 6 * kPosesAtATime : 0),
         residuals_(6 * kPosesAtATime),
         newest_(static_cast<int>(sessions) - 1) {
     if (sessions < 2) return;
     at_.sessions.resize(sessions - 1);
-    for (SessionBlock& block : at_.sessions) block.cross = Eigen::MatrixXd::Zero(6, at.gradient.size());
+    for (SessionBlock& block : at_.sessions) block.cross = Eigen::MatrixXd::Zero(kOfSession, at.gradient.size());
   }
   /// Where the next pose of that session writes its residuals and their derivatives.
   void begin(int session) {
@@ -62,9 +62,7 @@ class Normals {
   [[nodiscard]] double* jacobian() { return jacobians_.col(filled_).data(); }
   [[nodiscard]] auto residuals(Eigen::Index count) { return residuals_.segment(filled_, count); }
   [[nodiscard]] bool moves() const { return session_ < newest_; }
-  void set_motion(const Eigen::Matrix<double, 6, Eigen::Dynamic>& columns) {
-    motions_.middleCols(filled_, columns.cols()) = columns;
-  }
+  void set_motion(const SessionColumns& columns) { motions_.middleCols(filled_, columns.cols()) = columns; }
   void weigh(Eigen::Index count, double root_weight) {
     residuals_.segment(filled_, count) *= root_weight;
     jacobians_.middleCols(filled_, count) *= root_weight;
@@ -112,8 +110,8 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
     const double norm = finite ? normals.residuals(pose.size()).norm() : std::numeric_limits<double>::infinity();
     const double limit = pose.huber_limit();
     if (normals.moves()) {
-      normals.set_motion(
-          motion_columns(m, problem.model.X_WB.translation(), pose.inverse_sigma(), pose.inverse_rotation_sigma()));
+      normals.set_motion(motion_columns(m, problem.model.X_WB.translation(), pose.inverse_sigma(),
+                                        pose.inverse_rotation_sigma(), problem.stretched));
     }
     if (robust && norm > limit) {
       normals.weigh(pose.size(), std::sqrt(limit / norm));
@@ -156,12 +154,12 @@ namespace {
 struct Standing {
   Eigen::VectorXd x;
   CalibrationProblem problem;
-  std::vector<Pose> moved;
+  std::vector<Similarity> moved;
   Expansion at;
 };
 
 void move_sessions(Standing& standing, const std::vector<SessionMotion>& motions) {
-  std::vector<Pose> by;
+  std::vector<Similarity> by;
   for (const SessionMotion& motion : motions) {
     by.push_back(measured_by(motion, standing.problem.model.X_WB.translation()));
     standing.moved[by.size() - 1] = by.back() * standing.moved[by.size() - 1];
@@ -170,7 +168,7 @@ void move_sessions(Standing& standing, const std::vector<SessionMotion>& motions
     const auto session = static_cast<std::size_t>(m.session);
     if (session >= by.size()) continue;
     m.p_W = by[session] * m.p_W;
-    if (m.R_WT) m.R_WT = (by[session].linear() * *m.R_WT).eval();
+    if (m.R_WT) m.R_WT = (by[session].X.linear() * *m.R_WT).eval();
   }
 }
 
@@ -209,7 +207,7 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
                               const CalibrateOptions& options, const Eigen::VectorXd& start) {
   const Eigen::VectorXd lower = s.lower();
   const bool robust = is_robust(options, weights);
-  Standing now{start.cwiseMax(lower), problem, std::vector<Pose>(problem.batch.sessions.size(), Pose::Identity()), {}};
+  Standing now{start.cwiseMax(lower), problem, std::vector<Similarity>(problem.batch.sessions.size()), {}};
   now.at = expand(now.problem, s, weights, robust, now.x);
   std::vector<double> costs = {now.at.cost};
   double damping = 0;

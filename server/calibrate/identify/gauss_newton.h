@@ -31,7 +31,7 @@ struct Minimum {
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;
-  std::vector<Pose> moved = {};  ///< of several sessions: what moves the measurements of each into W
+  std::vector<Similarity> moved = {};  ///< of several sessions: what moves the measurements of each into W
 };
 
 /// Whether Huber's loss is used: not before the discrepancy is known, since nothing can be called an outlier then.
@@ -42,7 +42,7 @@ struct Minimum {
                                                 const Weights& weights, const CalibrateOptions& options,
                                                 const Eigen::VectorXd& start);
 
-/// Steps of the parameters and, of a batch of several sessions, of where each instrument stood, damped where a full one
+/// Steps of the parameters and, of a batch of several sessions, of what belongs to each, damped where a full one
 /// leads uphill. The information is that of the parameters with the sessions eliminated. Refuses where nothing leads
 /// downhill and it is not the minimum.
 [[nodiscard]] Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s,

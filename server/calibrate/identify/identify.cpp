@@ -105,13 +105,14 @@ void take_over_sessions(const MeasurementBatch& given, Identified& now, Measurem
                         const Tracker& tracker) {
   if (now.sessions.empty()) return;
   for (std::size_t s = 0; s < now.sessions.size(); ++s)
-    now.sessions[s].X_WS = now.minimum.moved[s] * now.sessions[s].X_WS;
+    now.sessions[s].set_into_W(now.minimum.moved[s] * now.sessions[s].into_W());
   batch = moved(given, now.sessions, tracker.sigma, tracker.sigma_rotation);
 }
 
 /// How many numbers the sessions took from the data.
-double freedom_of_sessions(const MeasurementBatch& batch) {
-  return has_sessions(batch) ? 6.0 * static_cast<double>(batch.sessions.size() - 1) : 0.0;
+double freedom_of_sessions(const CalibrationProblem& problem) {
+  if (!has_sessions(problem.batch)) return 0;
+  return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
 /// Gives each session the noise that it has beyond the others, and the residuals the sigmas that follow. False where
@@ -145,7 +146,7 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
       now.minimum = std::move(*found);
       result.iterations += static_cast<int>(now.minimum.costs.size());
       result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(), now.minimum.costs.end());
-      freedom = freedom_of(now.minimum.information) + freedom_of_sessions(problem.batch);
+      freedom = freedom_of(now.minimum.information) + freedom_of_sessions(problem);
       take_over_sessions(problem.batch, now, working.batch, tracker);
     }
     now.residuals = residuals_of(problem.model, working.batch, s.values_at(now.minimum.x));

@@ -15,10 +15,19 @@ constexpr double kLeastBeside = 1e-3;  // m rms beside the best line
 
 }  // namespace
 
+Similarity Similarity::operator*(const Similarity& first) const {
+  return {make_pose(X.linear() * first.X.linear(), *this * first.X.translation()), (1 + scale) * (1 + first.scale) - 1};
+}
+
 bool operator==(const SessionSetting& a, const SessionSetting& b) {
   return a.id == b.id && a.first == b.first && a.first_pose == b.first_pose && a.poses == b.poses &&
-         a.X_WS.matrix() == b.X_WS.matrix() && a.own_noise == b.own_noise &&
+         a.X_WS.matrix() == b.X_WS.matrix() && a.scale == b.scale && a.own_noise == b.own_noise &&
          a.own_noise_rotation == b.own_noise_rotation;
+}
+
+bool are_stretched(const std::vector<SessionSetting>& settings) {
+  return std::any_of(settings.begin(), settings.end(),
+                     [](const SessionSetting& setting) { return setting.scale != 0; });
 }
 
 std::vector<SessionSetting> settings_of(const MeasurementBatch& batch) {
@@ -40,7 +49,7 @@ MeasurementBatch moved(MeasurementBatch batch, const std::vector<SessionSetting>
                        double sigma_rotation) {
   for (Measurement& m : batch.measurements) {
     const SessionSetting& setting = settings[static_cast<std::size_t>(m.session)];
-    m.p_W = setting.X_WS * m.p_W;
+    m.p_W = setting.into_W() * m.p_W;
     if (m.R_WT) m.R_WT = (setting.X_WS.linear() * *m.R_WT).eval();
     if (setting.own_noise > 0) m.sigma = std::hypot(m.sigma.value_or(sigma), setting.own_noise);
     if (setting.own_noise_rotation > 0)

@@ -8,6 +8,7 @@ namespace trammel::model_file {
 namespace {
 
 constexpr double kRigid = 1e-6;                      // |RᵀR - 1|: rounding of what was rigid is far below
+constexpr double kMostStretched = 0.1;               // of a session's lengths: a tenth is no instrument's scale
 constexpr double kMostMetres = 1e6;                  // of a frame: no cell is larger
 constexpr double kCorrelationRounding = 1e-6;        // of what was symmetric and positive semidefinite
 constexpr Eigen::Index kMostTrainingPoses = 20'000;  // of one training: the memory of a bias grows with them
@@ -144,7 +145,9 @@ Status check_sessions(const ModelParts& parts) {
           .of("changes")
           .beyond(change.session + 1, parts.sessions.size());
   }
-  const auto finite = [](const SessionSetting& session) { return session.X_WS.matrix().allFinite(); };
+  const auto finite = [](const SessionSetting& session) {
+    return session.X_WS.matrix().allFinite() && std::abs(session.scale) < kMostStretched;
+  };
   if (!std::all_of(parts.sessions.begin(), parts.sessions.end(), finite))
     return refused("model: where a session stood is not finite").of("sessions");
   return {};

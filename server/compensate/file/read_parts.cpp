@@ -104,6 +104,7 @@ SessionSetting session_from(const Json& json) {
   session.first_pose = json.at("first_pose");
   session.poses = count_from(json, "poses");
   session.X_WS = pose_from(json.at("X_WS"));
+  session.scale = number_if(json, "scale").value_or(0);
   session.own_noise = number_if(json, "own_noise_m").value_or(0);
   session.own_noise_rotation = number_if(json, "own_noise_rad").value_or(0);
   return session;

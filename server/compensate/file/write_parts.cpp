@@ -99,6 +99,7 @@ Json json_of(const SessionSetting& session) {
                {"first_pose", session.first_pose},
                {"poses", session.poses},
                {"X_WS", pose_json(session.X_WS)}};
+  if (session.scale != 0) json["scale"] = session.scale;
   if (session.own_noise > 0) json["own_noise_m"] = session.own_noise;
   if (session.own_noise_rotation > 0) json["own_noise_rad"] = session.own_noise_rotation;
   return json;
