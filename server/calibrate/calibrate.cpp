@@ -84,11 +84,8 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
 }
 
-}  // namespace
-
-Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
-  if (problem.batch.measurements.empty())
-    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
+/// In the world of the last session.
+Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, const CalibrateOptions& options) {
   CalibrationProblem complete = problem;
   std::vector<SessionSetting> sessions;
   if (has_sessions(problem.batch)) {
@@ -111,6 +108,59 @@ Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const Cal
       found.sessions[s].set_into_W(found.sessions[s].into_W() * sessions[s].into_W());
     return found;
   });
+}
+
+/// The session with the most poses, whatever their order; of equal ones that whose name sorts first.
+std::size_t largest_session(const MeasurementBatch& batch) {
+  const std::vector<SessionSetting> settings = settings_of(batch);
+  const auto largest = std::min_element(settings.begin(), settings.end(), [](const auto& a, const auto& b) {
+    return a.poses != b.poses ? a.poses > b.poses : a.id < b.id;
+  });
+  return static_cast<std::size_t>(largest - settings.begin());
+}
+
+/// The batch with its last session and that one in each other's place.
+MeasurementBatch exchanged(MeasurementBatch batch, std::size_t session) {
+  const auto one = static_cast<int>(session);
+  const auto last = static_cast<int>(batch.sessions.size()) - 1;
+  std::swap(batch.sessions[session], batch.sessions.back());
+  for (Measurement& m : batch.measurements) {
+    if (m.session == one || m.session == last) m.session = one + last - m.session;
+  }
+  return batch;
+}
+
+/// Calibrated in the world of that session; told in that of the newest.
+Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationProblem& problem,
+                                       const CalibrateOptions& options) {
+  CalibrationProblem there = problem;
+  there.batch = exchanged(problem.batch, session);
+  return calibrate_there(there, options).map([&](CalibrationResult found) {
+    std::swap(found.sessions[session], found.sessions.back());
+    const Pose back = found.sessions.back().X_WS.inverse();
+    for (SessionSetting& setting : found.sessions) setting.X_WS = back * setting.X_WS;
+    found.sessions.back().X_WS = Pose::Identity();
+    found.model.X_WB = back * found.model.X_WB;
+    return found;
+  });
+}
+
+/// Whether nothing that is to be found depends on which world it is told in: not where the instrument drifts to.
+bool is_of_the_robot(const PhysicalModel& model) {
+  return std::all_of(model.sources.begin(), model.sources.end(), [](const ErrorSourcePtr& source) {
+    return source->cause().scope != causes::Scope::kSession && source->cause().scope != causes::Scope::kPose;
+  });
+}
+
+}  // namespace
+
+Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
+  if (problem.batch.measurements.empty())
+    return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
+  // Nobody says where the base stands: it is found by the session that tells most, not by the few poses of the newest.
+  if (has_sessions(problem.batch) && !problem.model.cell->X_WB && is_of_the_robot(problem.model))
+    return calibrate_by(largest_session(problem.batch), problem, options);
+  return calibrate_there(problem, options);
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/calibrate/sessions/session_blocks.h"
@@ -135,9 +136,9 @@ struct Seen {
 /// The equations of a whole batch beside one calibration.
 class ChangeSearch {
  public:
-  ChangeSearch(const CalibrationResult& found, const MeasurementBatch& batch)
+  ChangeSearch(const CalibrationResult& found, std::vector<SessionSetting> sessions, const MeasurementBatch& batch)
       : kinds_(found.model),
-        sessions_(found.sessions),
+        sessions_(std::move(sessions)),
         s_(scaled_parameters(kinds_.probe(), {})),
         own_(kinds_.own()),
         changes_(kinds_.changes()),
@@ -347,7 +348,7 @@ class ChangeSearch {
   }
 
   const AllKinds kinds_;
-  const std::vector<SessionSetting>& sessions_;
+  const std::vector<SessionSetting> sessions_;
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;
   const std::size_t joints_;
@@ -363,7 +364,14 @@ class ChangeSearch {
 
 std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch) {
   if (found.sessions.size() < 2) return std::nullopt;
-  return ChangeSearch(found, batch).strongest();
+  return ChangeSearch(found, found.sessions, batch).strongest();
+}
+
+std::optional<Change> change_instead_of_noise(const CalibrationResult& found, const MeasurementBatch& batch) {
+  std::vector<SessionSetting> sessions = found.sessions;
+  for (SessionSetting& session : sessions) session.own_noise = session.own_noise_rotation = 0;
+  if (sessions.size() < 2 || sessions == found.sessions) return std::nullopt;
+  return ChangeSearch(found, std::move(sessions), batch).strongest();
 }
 
 }  // namespace trammel

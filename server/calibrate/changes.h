@@ -33,4 +33,9 @@ struct Change {
 /// explains more than any single change.
 [[nodiscard]] std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch);
 
+/// The same as if no session were noisier than the others: what a session was taken to be noisy for may be a change.
+/// Empty where none is noisier. A session that is noisy makes a change seem to be there, so it is only a proposal.
+[[nodiscard]] std::optional<Change> change_instead_of_noise(const CalibrationResult& found,
+                                                            const MeasurementBatch& batch);
+
 }  // namespace trammel

@@ -9,9 +9,11 @@
 #include <ctime>
 
 #include "server/base/units.h"
+#include "server/calibrate/batch_check.h"
 #include "server/compensate/known_rows.h"
 #include "server/health/evidence/check_tests.h"
 #include "server/health/evidence/working_poses.h"
+#include "server/measurement/sessions.h"
 
 namespace trammel {
 
@@ -30,6 +32,7 @@ constexpr double kAlike = 6;         // of scores: odds of e^3
 constexpr double kUnlinear = 0.003;  // of an effect
 constexpr double kDoubtful = 0.02;   // chance from which on nothing is said for certain
 constexpr double kNearlySeen = 10;   // times the limit: a cause that is named where the whole is beyond chance
+constexpr double kFarOff = 5e-3;     // m rms, base refitted: no small change, and effects are no longer linear
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   Eigen::MatrixXd both(one.rows(), one.cols() + other.cols());
@@ -92,10 +95,15 @@ class Examination {
     return joined(rows_.by_base, rows_.by_cause(Eigen::all, effects_.tool_columns()));
   }
   void look_for_changes(const CheckTests& healthy);
+  /// m rms of the positions, refitted.
+  [[nodiscard]] double distance_of(const RefittedRows& refitted) const;
+  /// Whether the cause is a tool that sits elsewhere, whose shift stays linear however far it is.
+  [[nodiscard]] bool is_tool(std::size_t hypothesis) const;
   /// Whether a cause was found, and the rest is to be looked at again.
   bool look_once(const CheckTests& tests);
-  void found(std::size_t hypothesis, const RefittedRows& refitted, double chance, const std::vector<double>& scores);
-  void tell_rivals(std::size_t hypothesis, const std::vector<double>& scores, SeenChange& change) const;
+  void found(std::size_t hypothesis, const CheckTests& tests, double chance, const std::vector<double>& scores);
+  void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
+                   SeenChange& change) const;
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
   void tell_rms(const RefittedRows& refitted);
   void tell_due(const RefittedRows& refitted, const CheckTimes& times);
@@ -115,6 +123,8 @@ class Examination {
   Sifted sifted_;
   Eigen::MatrixXd covariance_;  // with what a change that was found may leave over
   Eigen::MatrixXd nuisance_;    // refitted: frames, bad poses, changes that were found
+  bool is_far_ = false;         // only a tool that sits elsewhere is named
+  bool is_too_far_ = false;     // nothing is
   HealthCheck check_;
 };
 
@@ -152,7 +162,8 @@ void Examination::look_for_changes(const CheckTests& healthy) {
   nuisance_ = frames();
   for (const int pose : sifted_.bad)
     nuisance_ = joined(nuisance_, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
-  if (!look_once(healthy)) return;
+  is_far_ = distance_of(healthy.rows()) > kFarOff;
+  if (!look_once(healthy) || is_far_) return;
   while (static_cast<int>(check_.changed.size()) < kMostCauses &&
          look_once(CheckTests(covariance_, nuisance_, questions_))) {
   }
@@ -167,17 +178,33 @@ bool Examination::look_once(const CheckTests& tests) {
   const std::vector<double> scores = tests.scores(left);
   const auto causes_end = scores.begin() + static_cast<std::ptrdiff_t>(questions_.causes);
   const auto best = static_cast<std::size_t>(std::max_element(scores.begin(), causes_end) - scores.begin());
+  if (is_far_ && !(questions_.causes > 0 && is_tool(best))) {
+    is_too_far_ = true;
+    return false;
+  }
   const bool fits = questions_.causes > 0 && scores[best] > 0 && tests.p_value(best, left) < kNearlySeen * limit;
   if (fits) {
-    found(best, tests.rows(), chance, scores);
+    found(best, tests, chance, scores);
   } else if (check_.changed.empty()) {
     unknown_found(chance, left, tests.rows().freedom());
   }
   return fits;
 }
 
-void Examination::found(std::size_t hypothesis, const RefittedRows& refitted, double chance,
+double Examination::distance_of(const RefittedRows& refitted) const {
+  const Eigen::VectorXd left = refitted.unwhitened(refitted.left(rows_.residual));
+  double square = 0;
+  for (const Index first : rows_.first) square += left.segment<3>(first).squaredNorm();
+  return std::sqrt(square / static_cast<double>(rows_.poses()));
+}
+
+bool Examination::is_tool(std::size_t hypothesis) const {
+  return effects_.causes()[questions_.hypotheses[hypothesis].cause].columns == effects_.tool_columns();
+}
+
+void Examination::found(std::size_t hypothesis, const CheckTests& tests, double chance,
                         const std::vector<double>& scores) {
+  const RefittedRows& refitted = tests.rows();
   const Hypothesis& one = questions_.hypotheses[hypothesis];
   const CauseEffects::Entry& entry = effects_.causes()[one.cause];
   const Eigen::VectorXd left = refitted.left(rows_.residual);
@@ -187,20 +214,26 @@ void Examination::found(std::size_t hypothesis, const RefittedRows& refitted, do
                         ? size_of_any(own, left, working_.any_function_rms(entry.columns.front()), &theta)
                         : size_of(own, left, working_.left_square(entry.columns), &theta);
   SeenChange change{entry.cause, size.rms, size.u95, chance, {}};
-  tell_rivals(hypothesis, scores, change);
+  tell_rivals(hypothesis, tests, scores, change);
   check_.changed.push_back(std::move(change));
   covariance_.diagonal() += (kUnlinear * one.columns * theta).cwiseAbs2();
   nuisance_ = joined(nuisance_, one.columns);
 }
 
-void Examination::tell_rivals(std::size_t hypothesis, const std::vector<double>& scores, SeenChange& change) const {
+void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
+                              SeenChange& change) const {
+  // What a cause explains whatever it costs: one with more numbers may be the true one all the same.
+  const double price = std::log(static_cast<double>(rows_.residual.size()));
+  const auto explained = [&](std::size_t h) { return scores[h] + price * tests.freedom(h); };
   const auto add = [&](const SingleCause& other) {
     const auto same = [&](const SingleCause& known) { return same_cause(known, other); };
     const bool known = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), same);
     if (!known && !same(change.cause)) change.could_also_be.push_back(other);
   };
   for (std::size_t h = 0; h < questions_.causes; ++h) {
-    if (scores[h] > scores[hypothesis] - kAlike) add(effects_.causes()[questions_.hypotheses[h].cause].cause);
+    const SingleCause& other = effects_.causes()[questions_.hypotheses[h].cause].cause;
+    const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
+    if (as_much || scores[h] > scores[hypothesis] - kAlike) add(other);
   }
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {
@@ -326,7 +359,12 @@ std::string Examination::seen_in_words() const {
 
 void Examination::tell_verdict() {
   const double tolerance = to_mm(options_.tolerance);
-  if (!check_.changed.empty()) {
+  if (is_too_far_) {
+    check_.sentence = fmt::format(
+        "the poses are off by {:.1f} mm rms, which no small change explains: was the file read as it was meant, is it "
+        "this robot, is it this tool? `diagnose` says more",
+        to_mm(check_.rms));
+  } else if (!check_.changed.empty()) {
     check_.verdict = HealthVerdict::kChanged;
     check_.sentence = "the robot is not as its model has it; " + seen_in_words();
   } else if (check_.p_value < kDoubtful) {
@@ -374,6 +412,14 @@ std::string_view to_string(HealthVerdict verdict) {
 
 Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                  const HealthOptions& options) {
+  if (has_sessions(batch.rows())) {
+    return refused("a check is one set-up of the instrument, the batch has {}", batch.rows().sessions.size())
+        .in("batch " + batch.id())
+        .of("session_id")
+        .next("check each session by itself");
+  }
+  if (std::optional<Error> doubt = reading_doubt(batch.rows(), model.cell()))
+    return tl::make_unexpected(std::move(*doubt));
   const MeasurementBatch known = known_rows(model, batch.rows());
   if (known.measurements.empty()) {
     return refused("no pose has a tool and payload that model {} was trained with", model.provenance().id)

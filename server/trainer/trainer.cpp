@@ -416,6 +416,7 @@ Status Trainer::check_not_worse(const std::string& cell_name, int version) const
   nothing.cell = cell_name;
   const auto sources = batch_sources(store_, nothing, true);
   if (!sources) return tl::make_unexpected(sources.error());
+  if (sources->empty()) return {};  // nothing to judge by: a person decides, and has
   JobBatches batches(**cell, held_out_by_service(options_.validation_share, options_.seed), {});
   for (const BatchSource& source : *sources) {
     const auto stored = store_.batch(cell_name, source.id);
@@ -425,11 +426,11 @@ Status Trainer::check_not_worse(const std::string& cell_name, int version) const
   const GateVerdict verdict = verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
                                          {Bar::kBetter, options_.accept_ratio});
   const GateFigures& figures = verdict.figures;
-  const bool unjudged = !figures.before || !figures.after;  // a person decides, and has
-  const bool as_good = unjudged || *figures.after <= options_.accept_ratio * *figures.before;
-  if (verdict.put_in_force || verdict.undecided || as_good) return {};
-  return refused("cell {}: version {} was imported and is worse than version {}: {}", cell_name, version,
-                 present->version, verdict.why)
+  const bool has_figures = figures.before && figures.after;
+  const bool as_good = has_figures && *figures.after <= options_.accept_ratio * *figures.before;
+  if (verdict.put_in_force || as_good) return {};
+  return refused("cell {}: version {} was imported and is {} version {}: {}", cell_name, version,
+                 has_figures ? "worse than" : "not known to be as good as", present->version, verdict.why)
       .of("version")
       .with_value(version)
       .next("activate --force where it is wanted all the same");

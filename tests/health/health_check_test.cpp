@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
+#include "server/measurement/files/batch_file.h"
 #include "tests/support/checked_robot.h"
 
 namespace trammel {
@@ -111,6 +112,63 @@ TEST_F(HealthTest, PlannedPosesShowMoreThanScatteredOnes) {
   const HealthCheck by_chance = checked(scattered, {}, 1, tolerance_mm(0.1));
   ASSERT_TRUE(planned.would_have_seen && by_chance.would_have_seen);
   EXPECT_LT(*planned.would_have_seen, 0.9 * *by_chance.would_have_seen);
+}
+
+TEST_F(HealthTest, ACheckIsOneSetUpOfTheInstrument) {
+  MeasurementBatch batch = test::measured_check(*robot_, {}, 3);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i)
+    batch.measurements[i].session_id = i < batch.measurements.size() / 2 ? "morning" : "noon";
+  batch = parse_batch_csv(to_csv(batch), "two.csv").value();
+  const Cell& cell = robot_->model.cell();
+  const auto check = check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
+  ASSERT_FALSE(check);
+  EXPECT_EQ(check.error().field, "session_id");
+  EXPECT_FALSE(check.error().next.empty());
+}
+
+TEST_F(HealthTest, AFileThatWasReadOtherwiseThanItWasMeantIsNoChangeOfTheRobot) {
+  MeasurementBatch batch = test::measured_check(*robot_, {}, 4);
+  for (Measurement& m : batch.measurements) m.context.q(4) *= -1;
+  const Cell& cell = robot_->model.cell();
+  const auto check = check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
+  ASSERT_FALSE(check) << check->sentence;
+  EXPECT_EQ(check.error().code, ErrorCode::kRefused);
+}
+
+TEST_F(HealthTest, OfPosesThatAreFarOffOnlyAnotherToolIsNamed) {
+  const Cell& cell = robot_->model.cell();
+  MeasurementBatch batch = test::measured_check(*robot_, {}, 5);
+  MeasurementBatch stirred = batch;
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const Vector3 up_T = *batch.measurements[i].R_WT * Vector3(0.03, -0.02, 0.01);
+    batch.measurements[i].p_W += up_T;
+    stirred.measurements[i].p_W += Vector3::Unit(static_cast<Eigen::Index>(i % 3)) * (i % 2 == 0 ? 0.03 : -0.03);
+  }
+  const HealthCheck tool =
+      check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
+  ASSERT_EQ(tool.changed.size(), 1u) << tool.sentence;
+  EXPECT_EQ(tool.changed.front().cause.record->spelling.substr(0, 4), "tool");
+  const auto nothing = check_health(robot_->model, check_against_cell(stirred, cell).value(), tolerance_mm(0.05));
+  if (!nothing) return;  // taken for a mistake of reading
+  EXPECT_EQ(nothing->verdict, HealthVerdict::kCannotTell) << nothing->sentence;
+  EXPECT_TRUE(nothing->changed.empty());
+}
+
+TEST_F(HealthTest, ACauseThatExplainsAsMuchWithMoreNumbersIsSaidToBePossible) {
+  const Cell& cell = robot_->model.cell();
+  int listed = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, 20 + seed);
+    for (Measurement& m : batch.measurements) m.p_W += *m.R_WT * Vector3(2e-4, 0, 0);
+    const HealthCheck check =
+        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
+    ASSERT_FALSE(check.changed.empty()) << check.sentence;
+    const SeenChange& first = check.changed.front();
+    const auto is_tool = [](const SingleCause& cause) { return cause.record->spelling.substr(0, 4) == "tool"; };
+    const auto& others = first.could_also_be;
+    listed += is_tool(first.cause) || std::any_of(others.begin(), others.end(), is_tool) ? 1 : 0;
+  }
+  EXPECT_EQ(listed, 5);
 }
 
 }  // namespace

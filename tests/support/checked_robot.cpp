@@ -29,11 +29,16 @@ CheckedRobot trained_robot(const hidden::RobotSpec& spec, int poses, const std::
   return {std::move(robot), std::move(model), std::move(planned)};
 }
 
-HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed, const HealthOptions& options) {
+MeasurementBatch measured_check(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed) {
   hidden::Random random(seed * 31 + 5);
   const std::string csv =
       hidden::check_csv(robot.robot, {robot.planned, hidden.effects, hidden.bad_pose, hidden.bad_mm}, random);
-  return demand(check_health(robot.model, as_batch(csv, robot.model.cell(), 0), options));
+  return demand(parse_batch_csv(csv, "check.csv"));
+}
+
+HealthCheck checked(const CheckedRobot& robot, const Hidden& hidden, std::uint64_t seed, const HealthOptions& options) {
+  const MeasurementBatch batch = measured_check(robot, hidden, seed);
+  return demand(check_health(robot.model, demand(check_against_cell(batch, robot.model.cell(), drawn(0, 1))), options));
 }
 
 }  // namespace trammel::test

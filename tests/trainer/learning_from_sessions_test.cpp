@@ -86,5 +86,41 @@ TEST(LearningFromSessions, AnImportedModelThatIsBetterNeedsNoForce) {
   EXPECT_TRUE(learning.trainer().activate("cell-7", version));
 }
 
+TEST(LearningFromSessions, AnImportedModelOfAFewPosesIsPutInForceByForceOnly) {
+  const auto cell = cell_of();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  LearningCell learning(cell), elsewhere(cell);
+  learning.submit(measured_on(robot, {.poses = 100, .seed = 1}));
+  elsewhere.submit(measured_on(robot, {.poses = 6, .seed = 2, .corner = 0.2}));
+  const int version = test::demand(learning.trainer().import_model("cell-7", serialize(elsewhere.version(1))));
+  const Status refused = learning.trainer().activate("cell-7", version);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().next.find("--force"), std::string::npos);
+  EXPECT_EQ(learning.in_force(), 1);
+}
+
+TEST(LearningFromSessions, AFirstBatchOfSeveralSetUpsIsJudgedInEachOfThem) {
+  const auto cell = cell_of();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    MeasurementBatch all;
+    for (int s = 0; s < 3; ++s) {
+      const Day day{.poses = 60, .seed = 100 * seed + static_cast<std::uint64_t>(s), .set_up_anew = s < 2};
+      MeasurementBatch part = measured_on(robot, day);
+      for (Measurement& m : part.measurements) {
+        m.session_id = fmt::format("set-up {}", s);
+        m.pose_id = fmt::format("{}-{}", s, m.pose_id);
+        all.measurements.push_back(m);
+      }
+    }
+    LearningCell learning(cell);
+    const JobProgress end = learning.submit(all);
+    EXPECT_TRUE(end.in_force) << end.what;
+    ASSERT_TRUE(end.outcome.before && end.outcome.after) << end.what;
+    EXPECT_LT(*end.outcome.before, 0.05) << end.what;
+    EXPECT_LT(*end.outcome.after, 1e-4) << end.what;
+  }
+}
+
 }  // namespace
 }  // namespace trammel

@@ -274,6 +274,65 @@ TEST(Sessions, TenPosesAfterAToolChangeRefitTheToolAlone) {
   EXPECT_GT(true_error(test::demand(train(cell, many, kPhysics)), after), 2e-4);
 }
 
+TEST(Sessions, AChangedToolIsNotTakenForANoisySessionHoweverManyPosesShowIt) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const Vector3& shift : {Vector3(0.003, 0, 0), Vector3(0, 1e-4, 0)}) {
+    VirtualRobot after = robot;
+    after.truth.tools.at("spindle").translation() += shift;
+    for (const int poses : {7, 8, 10, 12, 16, 20}) {
+      std::vector<CheckedBatch> batches;
+      for (std::uint64_t s = 0; s < 4; ++s) {
+        batches.push_back(checked(measured_on(robot, {.poses = 60, .seed = 900 + s, .set_up_anew = true}),
+                                  fmt::format("day-{}", s + 1), *cell));
+      }
+      batches.push_back(checked(measured_on(after, {.poses = poses, .seed = 950, .set_up_anew = true}), "few", *cell));
+      const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
+      EXPECT_LT(true_error(model, after), 3e-5) << poses << " poses, " << shift.transpose();
+    }
+  }
+}
+
+TEST(Sessions, ANoisySessionIsNotTakenForAChange) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const double noise : {3.0, 8.0}) {
+    for (const int poses : {10, 20, 60}) {
+      const CheckedBatch quiet =
+          checked(measured_on(robot, {.poses = 120, .seed = 70, .set_up_anew = true}), "quiet", *cell);
+      const Day day{.poses = poses, .seed = 71, .noise = noise, .set_up_anew = true};
+      const CheckedBatch noisy = checked(measured_on(robot, day), "noisy", *cell);
+      const CompensatedModel model = test::demand(train(cell, joined({quiet, noisy}), kPhysics));
+      EXPECT_TRUE(model.parts().changes.empty())
+          << noise << ", " << poses << " poses: " << model.parts().changes.front().source;
+    }
+  }
+}
+
+TEST(Sessions, WhereTheBaseIsUnknownTheOrderOfTheSessionsAndAFewPosesMoreChangeNoCommand) {
+  const auto cell = test::cell_7_unlocated();
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  std::vector<CheckedBatch> batches;
+  for (std::uint64_t s = 0; s < 3; ++s) {
+    batches.push_back(checked(measured_on(robot, {.poses = 60, .seed = 30 + s, .set_up_anew = true}),
+                              fmt::format("day-{}", s + 1), *cell));
+  }
+  const CheckedBatch few = checked(measured_on(robot, {.poses = 3, .seed = 40, .set_up_anew = true}), "few", *cell);
+  const auto tip_B = [&](const std::vector<CheckedBatch>& sessions) -> Vector3 {
+    const CompensatedModel model = test::demand(train(cell, joined(sessions), kPhysics));
+    JointVector q(6);
+    q << 0.3, 0.2, -0.2, 0.4, 0.7, -0.5;
+    const ErrorPrediction at = model.predict(q, "spindle");
+    EXPECT_LT(at.true_stddev_B.norm(), 5e-5);
+    return at.error_B;
+  };
+  const Vector3 one = tip_B({batches[0], batches[1], batches[2]});
+  const Vector3 other = tip_B({batches[2], batches[0], batches[1]});
+  const Vector3 with_few = tip_B({batches[0], batches[1], batches[2], few});
+  EXPECT_LT((one - other).norm(), 5e-6);
+  EXPECT_LT((one - with_few).norm(), 3e-5);
+}
+
 TEST(Sessions, ThreePosesAfterACollisionNameTheJoint) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);

@@ -8,8 +8,9 @@
 /// Set-ups of the instrument. In a session s the tracker sees (1 + k(s)) p = X_WS(s)^-1 X_WB f(q) + noise: the arm is
 /// one, and X_WS(s), where the instrument stood, belongs to the session. So does the scale k(s) where the data ask for
 /// it: an instrument that measures all lengths too long, or an arm that was colder as a whole. W is the world of the
-/// newest session, and its lengths are those of W. A rigid motion leaves isotropic noise as it is, and so does a scale
-/// of parts in a million; so measurements may be moved into W as if all were of one set-up.
+/// newest session, and its lengths are those of W (where the cell does not say where the base stands: those of the
+/// session with the most poses, by which it is found). A rigid motion leaves isotropic noise as it is, and so does a
+/// scale of parts in a million; so measurements may be moved into W as if all were of one set-up.
 namespace trammel {
 
 /// A scale, then a rigid motion: p -> X ((1 + scale) p).
@@ -28,7 +29,7 @@ struct SessionSetting {
   std::string first_pose;  ///< its id
   int poses = 0;
   Pose X_WS = Pose::Identity();   ///< from the session's world into that of the newest
-  double scale = 0;               ///< by what its lengths are to be stretched, of themselves; 0: as the newest has them
+  double scale = 0;               ///< by what its lengths are to be stretched, of themselves; 0: as the model has them
   double own_noise = 0;           ///< m, one axis: noise beyond that of the other sessions
   double own_noise_rotation = 0;  ///< rad, one axis
 

@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/known_rows.h"
+#include "server/compensate/world.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
@@ -312,14 +313,28 @@ class Duel {
   Columns shared_, inside_, outside_, new_tools_;
 };
 
+/// The judges whose tools the candidate knows, in its world: each set-up of the instrument from where the candidate
+/// found that it stood.
+MeasurementBatch judges_in_world(const GateQuestion& question) {
+  MeasurementBatch all = question.sessions.back().judges;
+  all.measurements.clear();
+  all.sessions.clear();
+  for (const JudgingSession& session : question.sessions) {
+    const Result<InWorld> here = in_world_of(question.candidate, session.judges);
+    if (!here) continue;
+    for (const Measurement& m : here->batch.measurements) {
+      if (!knows(question.candidate, m)) continue;
+      all.measurements.push_back(m);
+      all.measurements.back().session = 0;
+    }
+  }
+  return all;
+}
+
 /// The first of its cell: it must beat the nominal model as the cell file has it, and not be worse than the nominal arm
 /// in the same place.
 GateVerdict judge_first(const GateQuestion& question, const GateOptions& options) {
-  MeasurementBatch all = question.sessions.back().judges;
-  all.measurements.clear();
-  for (const Measurement* m : judges_in(question.sessions)) {
-    if (knows(question.candidate, *m)) all.measurements.push_back(*m);
-  }
+  const MeasurementBatch all = judges_in_world(question);
   if (all.measurements.empty()) return no("no pose that was held out has its tools", {}, kAdvice);
   const CompensatedModel::LevelErrors errors = question.candidate.errors_B(all);
   const PairedGain gain = paired_gain(errors.nominal, errors.compensated);

@@ -10,11 +10,37 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostChanges = 12;
+constexpr double kInsteadOfNoise = 10;  // nat of evidence: so much more likely must a change be than a noisy session
 
 /// The sources of the model as they are: each in the form and with the orders that were found.
 std::vector<std::string> names_of(const PhysicalModel& model) {
   std::vector<std::string> names;
   for (const ErrorSourcePtr& source : model.sources) names.push_back(source->name());
+  return names;
+}
+
+/// A change, and by how much the log evidence must rise with it; none: the log likelihood must rise.
+struct Proposal {
+  Change change;
+  std::optional<double> evidence = {};
+};
+
+std::optional<Proposal> proposed_change(const CalibrationResult& found, const MeasurementBatch& batch) {
+  if (std::optional<Change> seen = strongest_change(found, batch)) return Proposal{std::move(*seen)};
+  std::optional<Change> instead = change_instead_of_noise(found, batch);
+  if (!instead) return std::nullopt;
+  return Proposal{std::move(*instead), kInsteadOfNoise};
+}
+
+bool is_better(const CalibrationResult& with, const CalibrationResult& without, const Proposal& proposal) {
+  if (proposal.evidence) return with.log_evidence > without.log_evidence + *proposal.evidence;
+  return with.log_likelihood > without.log_likelihood;
+}
+
+/// The sources of the model, and what the change adds.
+std::vector<std::string> with_change(const PhysicalModel& model, const Change& change) {
+  std::vector<std::string> names = names_of(model);
+  for (std::string& source : change.sources()) names.push_back(std::move(source));
   return names;
 }
 
@@ -26,8 +52,8 @@ Result<IdentifiedSessions> without_idle_changes(const Identify& identify, Identi
     for (const std::string& source : found.changes[k].sources()) std::erase(fewer, source);
     auto without = identify(fewer);
     if (!without) return tl::make_unexpected(without.error());
-    const std::optional<Change> missed = strongest_change(*without, batch);
-    if (missed) {
+    const std::optional<Proposal> missed = proposed_change(*without, batch);
+    if (missed && is_better(found.calibration, *without, *missed)) {
       ++k;
       continue;
     }
@@ -63,14 +89,12 @@ Result<IdentifiedSessions> identify_sessions(const Identify& identify, const std
   if (!has_sessions(batch)) return found;
   while (found.changes.size() < kMostChanges) {
     if (!go_on(static_cast<double>(found.changes.size()) / kMostChanges)) return given_up();
-    std::optional<Change> change = strongest_change(found.calibration, batch);
-    if (!change) break;
-    std::vector<std::string> more = names_of(found.calibration.model);
-    for (std::string& source : change->sources()) more.push_back(std::move(source));
-    auto with = identify(more);
-    if (!with || with->log_likelihood <= found.calibration.log_likelihood) break;
+    std::optional<Proposal> proposal = proposed_change(found.calibration, batch);
+    if (!proposal) break;
+    auto with = identify(with_change(found.calibration.model, proposal->change));
+    if (!with || !is_better(*with, found.calibration, *proposal)) break;
     found.calibration = std::move(*with);
-    found.changes.push_back(std::move(*change));
+    found.changes.push_back(std::move(proposal->change));
   }
   return without_idle_changes(identify, std::move(found), batch);
 }
