@@ -1,19 +1,41 @@
-# What `cmake --install` lays down: the two programs and what they read; and for other projects the libraries, their headers and
-# find_package(trammel COMPONENTS session offline).
+# What `cmake --install` lays down, by component: the two programs and what they read (trammel, trammeld), libtrammel for other
+# programs (library, dev), the Python package (python), and the rooms of the project as static libraries with all their headers
+# (rooms). deploy/package makes a Debian package of each but the last.
 include(CMakePackageConfigHelpers)
 
-install(TARGETS trammeld trammel RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel)
-install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel)
-install(FILES deploy/trammeld.service DESTINATION lib/systemd/system)
+install(TARGETS trammeld RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT trammeld)
+install(TARGETS trammel RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT trammel)
+install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel COMPONENT trammel)
+install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel COMPONENT trammeld)
+install(FILES deploy/trammeld.service DESTINATION lib/systemd/system COMPONENT trammeld)
 
-# The rooms of each component; `common` comes with both. Rooms above the trainer are the daemon's own.
+# libtrammel: find_package(Trammel), Trammel::trammel.
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trammel)
+if(TARGET trammel_shared)
+  install(TARGETS trammel_shared EXPORT Trammel
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
+  install(DIRECTORY clients/library/trammel DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY clients/library/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libtrammel-dev COMPONENT dev)
+  install(EXPORT Trammel NAMESPACE Trammel:: FILE TrammelTargets.cmake DESTINATION ${package_dir} COMPONENT dev)
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/TrammelConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+  install(FILES deploy/TrammelConfig.cmake ${PROJECT_BINARY_DIR}/TrammelConfigVersion.cmake
+    DESTINATION ${package_dir} COMPONENT dev)
+endif()
+
+if(TARGET trammel_python)
+  set(python_dir lib/python3/dist-packages/trammel)
+  install(TARGETS trammel_python LIBRARY DESTINATION ${python_dir} COMPONENT python)
+  install(DIRECTORY clients/python/trammel/ DESTINATION ${python_dir} COMPONENT python
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed")
+  install(FILES clients/python/tour.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-trammel COMPONENT python)
+endif()
+
+# The rooms: find_package(trammel COMPONENTS session offline). `common` comes with both. Rooms above the trainer are the daemon's own.
 set(common_rooms headers base)
 set(session_rooms idl_types idl clients_session)
 set(offline_rooms numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
   trainer offline)
 
-set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trammel)
 set_target_properties(trammel_clients_session PROPERTIES EXPORT_NAME session)
 foreach(component common session offline)
   foreach(room ${${component}_rooms})
@@ -21,18 +43,28 @@ foreach(component common session offline)
     if(NOT exported)
       set_target_properties(trammel_${room} PROPERTIES EXPORT_NAME ${room})
     endif()
-    install(TARGETS trammel_${room} EXPORT trammel_${component} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/trammel)
+    install(TARGETS trammel_${room} EXPORT trammel_${component}
+      ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/trammel COMPONENT rooms)
   endforeach()
-  install(EXPORT trammel_${component} NAMESPACE trammel:: FILE ${component}.cmake DESTINATION ${package_dir})
+  install(EXPORT trammel_${component} NAMESPACE trammel:: FILE ${component}.cmake DESTINATION ${package_dir} COMPONENT rooms)
 endforeach()
 
 # Headers keep their paths: #include "clients/session/session.h" in a build tree and after installation.
-install(DIRECTORY server DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel FILES_MATCHING PATTERN "*.h"
+install(DIRECTORY server DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel COMPONENT rooms FILES_MATCHING PATTERN "*.h"
   PATTERN "dds" EXCLUDE PATTERN "config" EXCLUDE)
-install(FILES clients/session/session.h clients/session/session_types.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel/clients/session)
+install(FILES clients/session/session.h clients/session/session_types.h
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel/clients/session COMPONENT rooms)
 
 configure_package_config_file(deploy/trammel-config.cmake.in ${PROJECT_BINARY_DIR}/trammel-config.cmake
   INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/trammel-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/trammel-config.cmake ${PROJECT_BINARY_DIR}/trammel-config-version.cmake
-  DESTINATION ${package_dir})
+  DESTINATION ${package_dir} COMPONENT rooms)
+
+# Debian packages of what is built: cmake --build --preset release --target packages
+add_custom_target(packages COMMAND ${PROJECT_SOURCE_DIR}/deploy/package ${PROJECT_BINARY_DIR} USES_TERMINAL VERBATIM)
+foreach(target trammel trammeld trammel_shared trammel_python)
+  if(TARGET ${target})
+    add_dependencies(packages ${target})
+  endif()
+endforeach()
