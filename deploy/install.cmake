@@ -28,7 +28,7 @@ endforeach()
 
 # Headers keep their paths: #include "clients/session/session.h" in a build tree and after installation.
 install(DIRECTORY server DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel FILES_MATCHING PATTERN "*.h"
-  PATTERN "dds" EXCLUDE PATTERN "config" EXCLUDE)
+  PATTERN "dds" EXCLUDE PATTERN "config" EXCLUDE PATTERN "http" EXCLUDE PATTERN "host" EXCLUDE)
 install(FILES clients/session/session.h clients/session/session_types.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel/clients/session)
 
 configure_package_config_file(deploy/trammel-config.cmake.in ${PROJECT_BINARY_DIR}/trammel-config.cmake
