@@ -51,7 +51,7 @@ endforeach()
 
 # Headers keep their paths: #include "clients/session/session.h" in a build tree and after installation.
 install(DIRECTORY server DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel COMPONENT rooms FILES_MATCHING PATTERN "*.h"
-  PATTERN "dds" EXCLUDE PATTERN "config" EXCLUDE)
+  PATTERN "dds" EXCLUDE PATTERN "config" EXCLUDE PATTERN "http" EXCLUDE PATTERN "host" EXCLUDE)
 install(FILES clients/session/session.h clients/session/session_types.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/trammel/clients/session COMPONENT rooms)
 

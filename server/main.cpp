@@ -1,13 +1,9 @@
 // trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
-#include <fcntl.h>
 #include <signal.h>
-#include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/sink.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -23,11 +19,15 @@
 #include "server/base/memory.h"
 #include "server/base/mutex.h"
 #include "server/base/plain_text.h"
+#include "server/config/reload.h"
 #include "server/config/server_config.h"
 #include "server/config/start_check.h"
 #include "server/dds/dds_service.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/watchdog.h"
+#include "server/host/log.h"
+#include "server/host/service_manager.h"
+#include "server/http/http_server.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/compute/compute_main.h"
@@ -36,6 +36,7 @@
 namespace trammel {
 namespace {
 
+constexpr int kExitDark = 1;
 constexpr int kExitUsage = 2;
 constexpr int kExitRefused = 3;
 constexpr int kExitUnreachable = 4;
@@ -46,6 +47,7 @@ struct Arguments {
   std::optional<std::string> store;
   std::optional<std::uint16_t> port;
   std::optional<std::uint32_t> domain;
+  std::optional<std::uint16_t> http_port;
 };
 
 int exit_code(const Error& error) {
@@ -79,104 +81,41 @@ int check(const ServerReading& server, const std::string& path) {
   const StartCheck found = check_start(server, path);
   for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
   if (!found.problems.empty()) return refuse_start(found.problems);
+  LineOutput said(STDERR_FILENO);
+  for (const std::string& dark : found.dark) said.write(fmt::format("trammeld: {}\n", shown(dark)));
+  if (!found.dark.empty()) return kExitDark;
   fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
   return 0;
 }
 
-/// The message in one line that controls no terminal, whatever names it holds.
-class PlainMessage final : public spdlog::custom_flag_formatter {
- public:
-  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& line) override {
-    const std::string plain = shown({message.payload.data(), message.payload.size()});
-    line.append(plain.data(), plain.data() + plain.size());
-  }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<PlainMessage>();
-  }
-};
-
-/// Lines of the log to where nobody may read any more: the service does not wait for that.
-class LogSink final : public spdlog::sinks::sink {
- public:
-  explicit LogSink(int descriptor) : output_(descriptor), is_terminal_(::isatty(descriptor) == 1) {}
-
-  void log(const spdlog::details::log_msg& message) override {
-    const MutexLock lock(mutex_);
-    message.color_range_start = message.color_range_end = 0;
-    spdlog::memory_buf_t formatted;
-    formatter_->format(message, formatted);
-    std::string line = fmt::to_string(formatted);
-    if (is_terminal_ && message.color_range_end > message.color_range_start) {
-      line.insert(message.color_range_end, "\033[m");
-      line.insert(message.color_range_start, color_of(message.level));
-    }
-    output_.write(line);
-  }
-  void flush() override {}
-  void set_pattern(const std::string& pattern) override {
-    set_formatter(std::make_unique<spdlog::pattern_formatter>(pattern));
-  }
-  void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
-    const MutexLock lock(mutex_);
-    formatter_ = std::move(formatter);
-  }
-
- private:
-  static const char* color_of(spdlog::level::level_enum level) {
-    if (level >= spdlog::level::err) return "\033[31m\033[1m";
-    if (level == spdlog::level::warn) return "\033[33m\033[1m";
-    return level == spdlog::level::info ? "\033[32m" : "\033[36m";
-  }
-
-  LineOutput output_;
-  const bool is_terminal_;
-  Mutex mutex_;
-  std::unique_ptr<spdlog::formatter> formatter_ TRAMMEL_GUARDED_BY(mutex_) =
-      std::make_unique<spdlog::pattern_formatter>();
-};
-
-Status start_log(const LogOptions& options) {
-  int descriptor = STDERR_FILENO;
-  if (!options.file.empty()) {
-    descriptor = ::open(options.file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0644);
-    if (descriptor < 0)
-      return refused("cannot be opened: {}", std::strerror(errno)).in(options.file).under("log: file");
-  }
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("trammeld", std::make_shared<LogSink>(descriptor)));
-  spdlog::set_error_handler([](const std::string&) {});  // it would wait for standard error
-  spdlog::set_level(spdlog::level::from_str(options.level));
-  spdlog::flush_on(spdlog::level::info);
-  auto line = std::make_unique<spdlog::pattern_formatter>();
-  line->add_flag<PlainMessage>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*");
-  spdlog::set_formatter(std::move(line));
-  return {};
-}
-
 void log_progress(const JobProgress& progress) {
+  const LogAbout about = {{"cell", progress.cell}, {"job", std::to_string(progress.job)}};
+  const std::string job = fmt::format("{}: job {}", progress.cell, progress.job);
   switch (progress.stage) {
     case JobStage::kQueued:
       if (progress.what.empty()) {
-        spdlog::info("{}: job {} is queued", progress.cell, progress.job);
+        tell(LogLevel::kInfo, "job_queued", job + " is queued", about);
       } else {
-        spdlog::warn("{}: job {} is queued: {}", progress.cell, progress.job, progress.what);
+        tell(LogLevel::kWarn, "job_queued", fmt::format("{} is queued: {}", job, progress.what), about);
       }
       break;
     case JobStage::kTraining:
-      spdlog::debug("{}: job {}: {}, {:.0f} %", progress.cell, progress.job, progress.what, 100 * progress.share);
+      tell(LogLevel::kDebug, "job_progress", fmt::format("{}: {}, {:.0f} %", job, progress.what, 100 * progress.share),
+           about);
       break;
     case JobStage::kStoring:
-      spdlog::debug("{}: job {} is being stored", progress.cell, progress.job);
+      tell(LogLevel::kDebug, "job_progress", job + " is being stored", about);
       break;
     case JobStage::kDone:
       if (progress.model_version == 0) {
-        spdlog::info("{}: job {} is done: {}", progress.cell, progress.job, progress.what);
+        tell(LogLevel::kInfo, "job_done", fmt::format("{} is done: {}", job, progress.what), about);
       } else {
-        spdlog::info("{}: job {} made version {}, {}", progress.cell, progress.job, progress.model_version,
-                     progress.what);
+        tell(LogLevel::kInfo, "job_done",
+             fmt::format("{} made version {}, {}", job, progress.model_version, progress.what), about);
       }
       break;
     case JobStage::kFailed:
-      spdlog::warn("{}: job {} failed: {}", progress.cell, progress.job, progress.what);
+      tell(LogLevel::kWarn, "job_failed", fmt::format("{} failed: {}", job, progress.what), about);
       break;
   }
 }
@@ -184,37 +123,43 @@ void log_progress(const JobProgress& progress) {
 /// Whoever asks for nonsense all day does not fill the log of a service that logs what happens.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
+  const LogAbout about = {{"cell", call.cell},       {"operation", call.operation}, {"who", call.client},
+                          {"request", call.request}, {"trace", call.trace},         {"result", call.result}};
+  const std::string what = fmt::format("{}: {} of request {}{}", call.cell, call.operation, call.request, trace);
   if (!call.refused.empty()) {
-    spdlog::debug("{}: {} of request {}{} is refused: {}", call.cell, call.operation, call.request, trace,
-                  call.refused);
+    tell(LogLevel::kDebug, "request_refused", fmt::format("{} is refused: {}", what, call.refused), about);
   } else {
-    spdlog::info("{}: {} of request {}{} is done", call.cell, call.operation, call.request, trace);
+    tell(LogLevel::kInfo, "request_done", what + " is done", about);
   }
 }
 
-/// Takes the signals that end the service in a thread of its own; all other threads block them. A signal ends the
-/// process within kOrderlyStop, even if another thread hangs.
-class StopSignals {
+/// Takes the signals that end the service or have it read its files again, in a thread of its own; all other threads
+/// block them. A signal to end ends the process within kOrderlyStop, even if another thread hangs.
+class Signals {
  public:
-  StopSignals() {
+  Signals() {
     ::sigemptyset(&signals_);
-    ::sigaddset(&signals_, SIGTERM);
-    ::sigaddset(&signals_, SIGINT);
+    for (const int number : {SIGTERM, SIGINT, SIGHUP}) ::sigaddset(&signals_, number);
     ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     thread_ = std::jthread([this](const std::stop_token& over) { take(over); });
   }
-  ~StopSignals() {
+  ~Signals() {
     thread_.request_stop();
     ::pthread_kill(thread_.native_handle(), SIGTERM);
   }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
 
-  /// Waits for the first signal.
-  [[nodiscard]] const char* wait() {
+  struct News {
+    int ends = 0;  ///< the signal that ends the service; 0: none
+    bool reload = false;
+  };
+  /// Waits for a signal, `limit` at most.
+  [[nodiscard]] News wait(std::chrono::milliseconds limit) {
     MutexLock lock(mutex_);
-    came_.wait(lock, [this]() TRAMMEL_REQUIRES(mutex_) { return number_ != 0; });
-    return ::strsignal(number_);
+    came_.wait_for(lock, std::stop_token(), limit,
+                   [this]() TRAMMEL_REQUIRES(mutex_) { return news_.ends != 0 || news_.reload; });
+    return std::exchange(news_, {});
   }
 
  private:
@@ -223,14 +168,20 @@ class StopSignals {
 
   void take(const std::stop_token& over) {
     ::pthread_setname_np(::pthread_self(), "signals");
-    int number = 0;
-    while (::sigwait(&signals_, &number) != 0) continue;
-    if (over.stop_requested()) return;
-    {
-      const MutexLock lock(mutex_);
-      number_ = number;
+    int number = SIGHUP;
+    while (number == SIGHUP) {
+      while (::sigwait(&signals_, &number) != 0) continue;
+      if (over.stop_requested()) return;
+      {
+        const MutexLock lock(mutex_);
+        if (number == SIGHUP) {
+          news_.reload = true;
+        } else {
+          news_.ends = number;
+        }
+      }
+      came_.notify_all();
     }
-    came_.notify_all();
     // Counts ticks, not time: the process may be paused meanwhile, and that is no hang.
     const timespec tick{0, std::chrono::nanoseconds(kTick).count()};
     for (auto waited = kTick; waited <= kOrderlyStop; waited += kTick) {
@@ -243,7 +194,7 @@ class StopSignals {
   sigset_t signals_;
   Mutex mutex_;
   Condition came_;
-  int number_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  News news_ TRAMMEL_GUARDED_BY(mutex_);
   std::jthread thread_;
 };
 
@@ -257,34 +208,92 @@ void ignore_what_calls_report() {
   }
 }
 
+/// Reads the server file again and takes on what can change while it serves. Of a file that is refused nothing is
+/// taken.
+void reload(const std::string& path, ServerConfig& config, DdsService& service, Trainer& trainer) {
+  tell_manager_reloading();
+  const ServerReading read = read_server(path);
+  for (const Error& problem : read.problems)
+    tell(LogLevel::kError, "reload_refused", "everything stays as it was: " + sentence(problem));
+  if (read.problems.empty()) {
+    const ReloadPlan plan = plan_reload(config, read.config);
+    for (const std::string& key : plan.later)
+      tell(LogLevel::kWarn, "reload_later", fmt::format("{} changes with the next start only", key), {{"key", key}});
+    config = plan.config;
+    change_log(config.log);
+    service.set_limits(config.dds);
+    trainer.set_limits(config.trainer.queue_capacity, config.trainer.keep);
+    tell(LogLevel::kInfo, "reloaded",
+         plan.now.empty() ? "read again: nothing has changed"
+                          : fmt::format("read again, and taken on: {}", fmt::join(plan.now, ", ")));
+  }
+  tell_manager_ready("serves");
+}
+
+/// The parts of a server that serves, and what is told of them.
+struct Serving {
+  ServerConfig& config;
+  const std::string& path;
+  DdsService& service;
+  Trainer& trainer;
+  const ModelRegistry& registry;
+};
+
+/// Gives signs of life, and reads files again, until a signal ends it; returns that.
+int watch(Signals& signals, const Serving& serving) {
+  using std::chrono::milliseconds;
+  constexpr milliseconds kTick{1000};
+  const auto period = manager_watches_every();
+  const milliseconds tick = period ? std::min(kTick, std::chrono::duration_cast<milliseconds>(*period) / 3) : kTick;
+  std::string told;
+  for (;;) {
+    const Signals::News news = signals.wait(tick);
+    if (news.ends != 0) return news.ends;
+    if (news.reload) reload(serving.path, serving.config, serving.service, serving.trainer);
+    if (serving.service.movement().still.empty()) tell_manager_alive();
+    const std::string status = fmt::format("{} of {} cells have a model, {} jobs wait", serving.registry.cells_served(),
+                                           serving.trainer.cells().size(), serving.trainer.queued_jobs());
+    if (status != told) tell_manager_status(status);
+    told = status;
+  }
+}
+
 /// Serves until a signal ends it.
-Status serve(const ServerConfig& config) {
-  StopSignals signals;  // before any thread starts
+Status serve(ServerConfig config, const std::string& path) {
+  Signals signals;  // before any thread starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
   ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
+  HttpServer http(config.http,
+                  {config.dds.server_id, config.dds.program_version, config.store, trainer, **store, registry,
+                   [&service] { return service.figures(); }, [&service] { return service.movement(); }});
+  if (const Status listens = http.start(); !listens) return listens;
   service.set_call_listener(log_call);
-  service.set_packet_listener([](const std::string& dropped) { spdlog::warn("{}", dropped); });
+  service.set_packet_listener([](const std::string& dropped) { tell(LogLevel::kWarn, "packets_dropped", dropped); });
   trainer.set_listeners(
-      [&service](const JobProgress& progress) {
+      [&service, &http](const JobProgress& progress) {
         log_progress(progress);
+        http.job_changed(progress);
         service.publish_progress(progress);
       },
       [&service](const ServedModel& model, bool in_force) {
         if (!in_force) return;
-        spdlog::info("{}: version {} ({}) is in force", model.cell, model.version, model.model.provenance().id);
+        const std::string& id = model.model.provenance().id;
+        tell(LogLevel::kInfo, "model_in_force",
+             fmt::format("{}: version {} ({}) is in force", model.cell, model.version, id),
+             {{"cell", model.cell}, {"version", std::to_string(model.version)}, {"model", id}});
         service.publish_model(model.cell);
       },
       [](const std::string& trouble, bool over) {
-        if (over) return spdlog::info("over: {}", trouble);
-        spdlog::warn("{}", trouble);
+        if (over) return tell(LogLevel::kInfo, "trouble_over", "over: " + trouble);
+        tell(LogLevel::kWarn, "trouble", trouble);
       });
 
   const auto notices = trainer.take_up();
   if (!notices) return tl::make_unexpected(notices.error());
-  for (const std::string& notice : *notices) spdlog::warn("{}", notice);
+  for (const std::string& notice : *notices) tell(LogLevel::kWarn, "notice", notice);
   // A second copy of this server is told about the port first.
   const Status free = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
   if (!free) return free;
@@ -292,13 +301,21 @@ Status serve(const ServerConfig& config) {
   if (!name) return tl::make_unexpected(name.error());
   if (const Status started = service.start(); !started) return started;
   if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
-  spdlog::info("ready: {} serves {} cells on {}:{}, domain {}, store {}", config.dds.server_id, config.cells.size(),
-               config.dds.address, config.dds.port, config.dds.domain, config.store);
+  http.set_phase(ServerPhase::kServing);
+  const std::string pages =
+      config.http.port == 0 ? "" : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
+  tell(LogLevel::kInfo, "ready",
+       fmt::format("ready: {} serves {} cells on {}:{}, domain {}, store {}{}", config.dds.server_id,
+                   config.cells.size(), config.dds.address, config.dds.port, config.dds.domain, config.store, pages));
+  tell_manager_ready("serves");
 
-  spdlog::info("stopping: {}", signals.wait());
+  const int ended_by = watch(signals, {config, path, service, trainer, registry});
+  tell(LogLevel::kInfo, "stopping", fmt::format("stopping: {}", ::strsignal(ended_by)));
+  tell_manager_stopping();
+  http.set_phase(ServerPhase::kStopping);
   service.stop();
   trainer.stop();
-  spdlog::info("stopped");
+  tell(LogLevel::kInfo, "stopped", "stopped");
   return {};
 }
 
@@ -309,12 +326,13 @@ int run(const Arguments& arguments) {
   if (arguments.store) config.store = *arguments.store;
   if (arguments.port) config.dds.port = *arguments.port;
   if (arguments.domain) config.dds.domain = *arguments.domain;
+  if (arguments.http_port) config.http.port = *arguments.http_port;
   if (arguments.check) return check(server, arguments.config);
   if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
-  const Status served = serve(config);
+  const Status served = serve(config, arguments.config);
   if (served) return 0;
-  if (!config.log.file.empty()) spdlog::error("{}", sentence(served.error()));
+  if (!config.log.file.empty()) tell(LogLevel::kError, "start_refused", sentence(served.error()));
   return refuse(served.error());
 }
 
@@ -327,9 +345,9 @@ int main(int argc, char** argv) {
   CLI::App app("Serves compensated robot models over DDS, and trains new ones. Runs until SIGTERM or SIGINT.",
                "trammeld");
   app.footer(
-      "Exit codes: 0 stopped by a signal, or checked and good; 2 wrong usage, or an address that this host does not\n"
-      "have; 3 a file, the store or the port is refused; 70 the process hung and ended itself (start it again:\n"
-      "deploy/supervise does). Each problem is a line of its own on standard error.");
+      "Exit codes: 0 stopped by a signal, or checked and good; 1 checked, and cells would go dark; 2 wrong usage, or\n"
+      "an address that this host does not have; 3 a file, the store or the port is refused; 70 the process hung and\n"
+      "ended itself (start it again: deploy/supervise does). Each problem is a line of its own on standard error.");
   trammel::Arguments arguments;
   app.add_option("--config", arguments.config, "Server file (YAML); config/server.yaml has every key with its default")
       ->required();
@@ -339,6 +357,8 @@ int main(int argc, char** argv) {
   app.add_option("--port", arguments.port, "UDP port where clients look for it, instead of the server file's")
       ->check(CLI::Range(1024, 65535));
   app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));
+  app.add_option("--http-port", arguments.http_port, "TCP port for metrics and pages, instead of the server file's")
+      ->check(CLI::Range(1024, 65535));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

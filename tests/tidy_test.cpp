@@ -62,6 +62,9 @@ const std::vector<Reserved> kReserved = {
     {"the YAML reader", std::regex("^server/base/yaml_file\\.h$"),
      std::regex("^server/config/.*|^(server|clients)/.*_file\\.(h|cpp)$")},
     {"SQLite", std::regex("^(sqlite3\\.h|SQLiteCpp/.*)$"), std::regex("^server/store/.*")},
+    {"the HTTP library", std::regex("^httplib\\.h$"), std::regex("^server/http/.*")},
+    {"Prometheus", std::regex("^prometheus/.*"), std::regex("^server/http/.*")},
+    {"spdlog and systemd", std::regex("^(spdlog|systemd)/.*"), std::regex("^server/host/.*")},
 };
 
 const std::set<std::string> kTestFoldersWithoutMirror = {"support", "end_to_end", "benchmarks",
@@ -398,7 +401,7 @@ Complaints check_causes(const SourceTree& tree) {
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
   static const std::regex kMayStart(
-      R"(^server/main\.cpp$|^(server/trainer|server/dds|clients/session|clients/cli/work)/.*)");
+      R"(^server/main\.cpp$|^(server/trainer|server/dds|server/http|clients/session|clients/cli/work)/.*)");
   Complaints complaints;
   find_in_code(
       tree, kThread, "starts a thread",

@@ -77,6 +77,7 @@ int run_command_line(int argc, const char* const* argv) {
   add_study_command(app, chosen);
   add_service_commands(app, chosen);
   add_audit_command(app, chosen);
+  add_store_backup_command(app, chosen);
   add_history_command(app, chosen);
   try {
     app.parse(argc, argv);

@@ -123,17 +123,35 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
   map.attempt([&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
 }
 
-void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
-  map.only({"level", "file"});
+std::string word_of(const YamlMap& map, const std::string& key, const std::string& otherwise,
+                    const std::vector<std::string>& known) {
+  const std::string word = map.text(key, otherwise);
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    map.refuse(key,
+               refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known)).with_text(word));
+  return word;
+}
+
+/// Pages and metrics stay on this host: whoever reads them from elsewhere goes through a server that asks who he is.
+void read_http(const YamlMap& map, HttpOptions& http) {
+  map.only({"address", "port"});
   map.attempt([&] {
-    log.level = map.text("level", log.level);
-    const std::vector<std::string> known = {"debug", "info", "warn", "error"};
-    if (std::find(known.begin(), known.end(), log.level) == known.end()) {
-      map.refuse("level",
-                 refused("'{}', expected {}{}", log.level, fmt::join(known, ", "), did_you_mean(log.level, known))
-                     .with_text(log.level));
-    }
+    http.address = map.text("address", http.address);
+    in_addr parsed{};
+    const bool is_address = ::inet_pton(AF_INET, http.address.c_str(), &parsed) == 1;
+    if (!is_address || ntohl(parsed.s_addr) >> 24 != 127)
+      map.refuse("address", refused("'{}', expected 127.x.x.x: pages and metrics stay on this host", http.address)
+                                .with_text(http.address));
   });
+  map.attempt([&] {
+    if (!map.is_null("port")) http.port = static_cast<std::uint16_t>(integer_within(map, "port", 0, 1024, 65535));
+  });
+}
+
+void read_log(const YamlMap& map, LogOptions& log, const std::filesystem::path& folder) {
+  map.only({"level", "file", "format"});
+  map.attempt([&] { log.level = word_of(map, "level", log.level, {"debug", "info", "warn", "error"}); });
+  map.attempt([&] { log.format = word_of(map, "format", log.format, {"text", "json"}); });
   map.attempt([&] {
     if (!map.is_null("file")) log.file = (folder / map.text("file")).string();
   });
@@ -162,7 +180,7 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log"});
+  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log", "http"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -184,6 +202,9 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
   map.attempt([&] {
     if (map.has("log")) read_log(map.map("log"), config.log, folder);
+  });
+  map.attempt([&] {
+    if (map.has("http")) read_http(map.map("http"), config.http);
   });
 }
 

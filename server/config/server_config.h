@@ -7,15 +7,12 @@
 
 #include "server/base/result.h"
 #include "server/dds/dds_options.h"
+#include "server/host/log_options.h"
+#include "server/http/http_options.h"
 #include "server/robot/cell.h"
 #include "server/trainer/trainer.h"
 
 namespace trammel {
-
-struct LogOptions {
-  std::string level = "info";  ///< `debug`, `info`, `warn` or `error`
-  std::string file;            ///< empty: standard error
-};
 
 /// The configuration of a server.
 struct ServerConfig {
@@ -25,6 +22,7 @@ struct ServerConfig {
   DdsOptions dds;
   TrainerOptions trainer;
   LogOptions log;
+  HttpOptions http;
 };
 
 /// Reads a server file (`config/server.yaml` has every key) and the cell files that it names. Paths in it are relative

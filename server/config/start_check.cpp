@@ -1,11 +1,15 @@
 #include "server/config/start_check.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "server/base/text_file.h"
 #include "server/dds/port_lock.h"
+#include "server/http/http_server.h"
 #include "server/store/store_check.h"
+#include "server/trainer/dark_cells.h"
 
 namespace trammel {
 
@@ -25,11 +29,34 @@ Error at_key(const std::string& key, const std::string& path, Error found) {
   return Failure(std::move(found)).with_text(named).under(key).in(path).value();
 }
 
+/// What this program would make of the models in force.
+void look_at_cells(const ServerConfig& config, StartCheck& check) {
+  const auto cells = cells_at_start(config.store, config.cells);
+  if (!cells) {
+    check.notes.push_back("what the cells would be served with is not known: " + sentence(cells.error()));
+    return;
+  }
+  for (const CellAtStart& one : *cells) {
+    switch (one.state) {
+      case CellAtStart::State::kServed:
+        break;
+      case CellAtStart::State::kOlderServed:
+        check.notes.push_back(fmt::format("cell {} would be served with an older version: {}", one.cell, one.why));
+        break;
+      case CellAtStart::State::kUntrained:
+        check.notes.push_back(fmt::format("cell {} has no model yet", one.cell));
+        break;
+      case CellAtStart::State::kDark:
+        check.dark.push_back(fmt::format("cell {} would go dark: {}", one.cell, one.why));
+    }
+  }
+}
+
 }  // namespace
 
 StartCheck check_start(const ServerReading& server, const std::string& path) {
   const ServerConfig& config = server.config;
-  StartCheck check{server.problems, {}};
+  StartCheck check{server.problems, {}, {}};
   const auto wrong = [&](const char* key, const Error& error) { check.problems.push_back(at_key(key, path, error)); };
   const Status store = config.store.empty() ? Status() : check_store(config.store);
   Status port;
@@ -40,10 +67,15 @@ StartCheck check_start(const ServerReading& server, const std::string& path) {
   } else {
     if (!store) wrong("store", store.error());
     if (!port) wrong(port.error().code == ErrorCode::kConflict ? "dds: port" : "dds: address", port.error());
+    const Status http = was_read(server, "http") ? check_http_options(config.http) : Status();
+    if (!http) wrong(http.error().code == ErrorCode::kConflict ? "http: port" : "http: address", http.error());
   }
   if (!config.log.file.empty()) {
     if (const Status log = check_writable(config.log.file); !log) wrong("log: file", log.error());
   }
+  std::error_code error;
+  const bool is_there = store || store_held;
+  if (is_there && std::filesystem::exists(config.store, error)) look_at_cells(config, check);
   return check;
 }
 

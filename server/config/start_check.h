@@ -11,11 +11,12 @@ namespace trammel {
 struct StartCheck {
   std::vector<Error> problems;     ///< a start would fail; with file, key and what to do
   std::vector<std::string> notes;  ///< good to know
+  std::vector<std::string> dark;   ///< cells that would lose the model that they are served with, and why
 };
 
 /// Checks the store, the log file, the address and the port that the server file at `path` names, if they could be
 /// read. The errors of reading come first. If this server seems to run already (its port and its store are both held by
-/// servers), that is a note.
+/// servers), that is a note. Looks also at what the cells would be served with by this program, in the store as it is.
 [[nodiscard]] StartCheck check_start(const ServerReading& server, const std::string& path);
 
 }  // namespace trammel

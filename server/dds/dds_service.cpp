@@ -145,6 +145,7 @@ class DdsService::Running {
     running->replies_thread_ =
         std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
     running->packets_.emplace(dropped);
+    running->dropped_ = dropped;
     running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
@@ -181,6 +182,33 @@ class DdsService::Running {
     }
     events_->status_changed();
   }
+
+  void set_limits(const DdsOptions& options) {
+    room_.set_limits(room_limits(options));
+    for (Lane* lane : lanes()) lane->set_limits(compute_limits(options));
+  }
+
+  [[nodiscard]] ServiceFigures figures() const {
+    ServiceFigures now;
+    for (const auto& endpoint : endpoints_) now.operations.push_back(endpoint->figures());
+    now.queues = {{"predictions", predictions_.requests()},
+                  {"corrections", corrections_.requests()},
+                  {"reads", reads_.requests()},
+                  {"changes", changes_.requests()}};
+    now.waiting_bytes = room_.bytes();
+    now.clients = channels_.clients();
+    now.unheard = channels_.unheard();
+    now.misdirected = core_.counts.misdirected;
+    now.unreadable = *core_.unreadable;
+    now.lost = core_.counts.lost;
+    for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
+      const auto reason = static_cast<wire::Dropped>(i);
+      now.dropped_packets[wire::name_of(reason)] = dropped_->of(reason);
+    }
+    return now;
+  }
+
+  [[nodiscard]] Movement movement() const { return {true, watchdog_->still()}; }
 
  private:
   Running(const DdsOptions& options, Trainer& trainer, Store& store, const ModelRegistry& registry, PortLock port,
@@ -265,6 +293,9 @@ class DdsService::Running {
     parts.push_back({"corrections", [this] { return corrections_.unseen(); }});
     parts.push_back({"reading requests", [this] { return reads_.unseen(); }});
     parts.push_back({"changing requests", [this] { return changes_.unseen(); }});
+    // A portion of these takes milliseconds. Who waits for them is told at once; an end would lose what others compute.
+    parts.push_back({"computing predictions", [this] { return predictions_.oldest_portion(); }, false});
+    parts.push_back({"computing corrections", [this] { return corrections_.oldest_portion(); }, false});
     return parts;
   }
 
@@ -308,6 +339,7 @@ class DdsService::Running {
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
+  std::shared_ptr<const wire::DropCounts> dropped_;
   std::optional<PacketReport> packets_;  // of the status thread
   PacketListener packet_listener_;
   std::jthread replies_thread_;
@@ -350,21 +382,37 @@ void DdsService::stop() {
 }
 
 void DdsService::publish_progress(const JobProgress& progress) {
-  publish([&](Running& running) { running.publish_progress(progress); });
+  while_running([&](Running& running) { running.publish_progress(progress); });
 }
 
 void DdsService::publish_model(const std::string& cell) {
-  publish([&](Running& running) { running.publish_model(cell); });
+  while_running([&](Running& running) { running.publish_model(cell); });
 }
 
-template <typename Publish>
-void DdsService::publish(const Publish& publish) {
+void DdsService::set_limits(const DdsOptions& options) {
+  while_running([&](Running& running) { running.set_limits(options); });
+}
+
+ServiceFigures DdsService::figures() {
+  ServiceFigures now;
+  while_running([&](const Running& running) { now = running.figures(); });
+  return now;
+}
+
+Movement DdsService::movement() {
+  Movement now;
+  while_running([&](const Running& running) { now = running.movement(); });
+  return now;
+}
+
+template <typename Work>
+void DdsService::while_running(const Work& work) {
   MutexLock lock(mutex_);
   if (!running_) return;
   Running& running = *running_;  // stays alive: stop() waits until publishing_ is 0
   ++publishing_;
   lock.unlock();
-  publish(running);
+  work(running);
   lock.lock();
   --publishing_;
   published_.notify_all();

@@ -8,6 +8,7 @@
 #include "server/base/result.h"
 #include "server/dds/call_report.h"
 #include "server/dds/dds_options.h"
+#include "server/metrics/service_figures.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -42,11 +43,18 @@ class DdsService {
   /// Publishes the model that is in force for `cell` now.
   void publish_model(const std::string& cell);
 
+  /// From now on these limits of what may wait; of the rest of the options nothing changes.
+  void set_limits(const DdsOptions& options);
+  /// What was done since start(); nothing where it does not run.
+  [[nodiscard]] ServiceFigures figures();
+  /// Whether its threads do their work. Waits for none of them.
+  [[nodiscard]] Movement movement();
+
  private:
   class Running;
-  /// Calls `publish(running)` if the service runs. Holds no lock during the call: a large model takes a while.
-  template <typename Publish>
-  void publish(const Publish& publish);
+  /// Calls `work(running)` if the service runs. Holds no lock during the call: to publish a large model takes a while.
+  template <typename Work>
+  void while_running(const Work& work);
 
   const DdsOptions options_;
   std::function<void(const std::string&)> packet_listener_ = [](const std::string&) {};
@@ -57,7 +65,7 @@ class DdsService {
   Mutex mutex_;
   Condition published_;  // publishing_ has decreased
   std::unique_ptr<Running> running_ TRAMMEL_GUARDED_BY(mutex_);
-  int publishing_ TRAMMEL_GUARDED_BY(mutex_) = 0;  // threads that publish, each without the lock
+  int publishing_ TRAMMEL_GUARDED_BY(mutex_) = 0;  // threads in while_running(), each without the lock
 };
 
 }  // namespace trammel

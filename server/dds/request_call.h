@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -17,7 +18,9 @@
 #include "server/dds/reply_memory.h"
 #include "server/dds/reply_sink.h"
 #include "server/dds/request_weight.h"
+#include "server/dds/result_words.h"
 #include "server/dds/schedule/job.h"
+#include "server/metrics/operation_counts.h"
 
 namespace trammel {
 
@@ -47,6 +50,13 @@ struct CallCounts {
 inline const wire::Fault kIdIsUsed{
     wire::RESULT_CONFLICT, "request_id is that of another request", {}, "request_id", {}, {}};
 
+/// A DDS participant, as request ids begin.
+[[nodiscard]] inline std::string participant_text(const std::string& participant) {
+  std::string text;
+  for (const char byte : participant) text += fmt::format("{:02x}", static_cast<unsigned char>(byte));
+  return text;
+}
+
 /// What the calls of one operation share. Outlives them.
 template <typename Operation>
 struct CallContext {
@@ -63,6 +73,7 @@ struct CallContext {
   ReplyMemory<Reply> lately{kLately};             ///< of long computations, by writer and request id
   UnderWay under_way = {};
   CallListener listener = {};  ///< told of what was to change something, and of what was refused
+  OperationCounts operation = {};
 };
 
 /// A request from its arrival to its reply.
@@ -95,6 +106,7 @@ class Call final : public Job {
     put_identity();
     ++context_.counts.requests;
     ++context_.counts.refused;
+    context_.operation.answered(reply_.header().result(), 1);
     report(false);
     const std::size_t bytes = bytes_of_reply(reply_);
     context_.replies.post(to_, std::make_shared<Reply>(std::move(reply_)), bytes);
@@ -126,13 +138,16 @@ class Call final : public Job {
     if constexpr (kComputes) {
       if (portions_ && !is_refused()) reply_ = portions_->take();
     }
-    const bool is_good = reply_.header().result() == wire::RESULT_OK;
+    const wire::ResultCode result = reply_.header().result();
+    const bool is_good = result == wire::RESULT_OK;
     put_identity();
     if (is_good && !is_known_) remember();
     report(is_good);
     const std::uint64_t times = answer(&ReplySink::send);
     context_.counts.requests += times;
     if (!is_good) context_.counts.refused += times;
+    context_.operation.answered(result, times);
+    context_.operation.took(std::chrono::steady_clock::now() - arrived_);
   }
 
   void shed(const Shed& shed) override {
@@ -145,7 +160,9 @@ class Call final : public Job {
                        {}});
     reply_.header().retry_after_ms(static_cast<std::uint32_t>(shed.retry_after.count()));
     put_identity();
-    context_.counts.shed += answer(&ReplySink::post);
+    const std::uint64_t times = answer(&ReplySink::post);
+    context_.counts.shed += times;
+    context_.operation.answered(is_over ? wire::RESULT_DEADLINE_MISSED : wire::RESULT_BUSY, times);
   }
 
  private:
@@ -225,8 +242,9 @@ class Call final : public Job {
     const bool changes = happens_once(*request_);
     if (!context_.listener || (is_good && !changes)) return;
     const wire::RequestHeader& header = request_->header();
-    context_.listener({Operation::kName, request_id_text(header.request_id()), header.trace_id().to_string(),
-                       request_->about().cell(), changes, reply_.header().message()});
+    context_.listener({Operation::kName, participant_text(to_.participant), request_id_text(header.request_id()),
+                       header.trace_id().to_string(), request_->about().cell(), changes, reply_.header().message(),
+                       result_word(reply_.header().result())});
   }
 
   /// Returns how many were answered: with the repeats that have come meanwhile.
@@ -242,6 +260,7 @@ class Call final : public Job {
   }
 
   CallContext<Operation>& context_;
+  const SteadyTime arrived_ = std::chrono::steady_clock::now();
   const std::unique_ptr<Request> request_;
   const ReplyAddress to_;
   const std::string sent_;

@@ -12,9 +12,11 @@
 #include "idl/transport.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_call.h"
+#include "server/dds/result_words.h"
 #include "server/dds/schedule/lane.h"
 #include "server/dds/sent_type.h"
 #include "server/dds/stillness.h"
+#include "server/metrics/service_figures.h"
 
 namespace trammel {
 
@@ -44,6 +46,7 @@ class RequestEndpointBase {
   virtual ~RequestEndpointBase() = default;
   /// No more requests come in. The lanes must be stopped between this and the destruction.
   virtual void close() = 0;
+  [[nodiscard]] virtual OperationFigures figures() const = 0;
 };
 
 /// One operation and its DDS reader. The DDS listener takes each request out of the reader at once, so that none is
@@ -74,6 +77,10 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   void close() override {
     if (reader_ != nullptr) core_.subscriber.delete_datareader(reader_);
     reader_ = nullptr;
+  }
+
+  OperationFigures figures() const override {
+    return {Operation::kName, context_.operation.latency(), by_result_words(context_.operation)};
   }
 
  private:

@@ -16,9 +16,17 @@ std::vector<const char*> Stillness::look(Duration since_last) {
     const bool moved = !mark || mark != watched.mark;
     watched.mark = mark;
     watched.still = moved ? Duration(0) : watched.still + std::min(since_last, tick_);
-    if (watched.still >= limit_) stopped.push_back(watched.part.name);
+    if (watched.still >= limit_ && watched.part.ends_process) stopped.push_back(watched.part.name);
   }
   return stopped;
+}
+
+std::uint64_t Stillness::still_for(Duration time) const {
+  std::uint64_t still = 0;
+  for (std::size_t i = 0; i < watched_.size(); ++i) {
+    if (watched_[i].still >= time) still |= std::uint64_t{1} << i;
+  }
+  return still;
 }
 
 WorkUnderWay::Piece WorkUnderWay::begin() {

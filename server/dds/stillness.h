@@ -16,10 +16,11 @@ struct MovingPart {
   const char* name;
   /// A number that changes with every piece of work done; empty while there is no work. Never waits.
   std::function<std::optional<std::uint64_t>()> mark;
+  bool ends_process = true;  ///< false: its stillness is told and nothing more
 };
 
-/// Tells which parts have stopped. A look may come late because the process was stopped or the machine was busy. A late
-/// look counts as one tick only, so that such pauses do not look like a hang. Not thread-safe.
+/// Tells which parts, 64 at most, have stopped. A look may come late because the process was stopped or the machine was
+/// busy. A late look counts as one tick only, so that such pauses do not look like a hang. Not thread-safe.
 class Stillness {
  public:
   using Duration = std::chrono::milliseconds;
@@ -29,6 +30,8 @@ class Stillness {
 
   /// Returns the names of the parts that have stopped. `since_last` is the time since the last look, by a steady clock.
   [[nodiscard]] std::vector<const char*> look(Duration since_last);
+  /// Those that had not moved for `time` at the last look, a bit each, in their order; also those that end nothing.
+  [[nodiscard]] std::uint64_t still_for(Duration time) const;
 
  private:
   struct Watched {

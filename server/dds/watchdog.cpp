@@ -42,7 +42,19 @@ void end_at_once(const char* line) {
 }
 
 Watchdog::Watchdog(std::vector<MovingPart> parts)
-    : stillness_(std::move(parts), kTick, kLimit), thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+    : parts_(std::move(parts)),
+      stillness_(parts_, kTick, kLimit),
+      thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+std::vector<std::string> Watchdog::still() const {
+  std::vector<std::string> names;
+  const std::uint64_t still = still_;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if ((still >> i & 1) != 0) names.emplace_back(parts_[i].name);
+  }
+  if (Clock::now().time_since_epoch() - looked_.load() >= kLong) names.emplace_back("watchdog");
+  return names;
+}
 
 void Watchdog::watch(const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "watchdog");
@@ -56,6 +68,8 @@ void Watchdog::watch(const std::stop_token& stop) {
     const auto passed = std::min<Clock::duration>(now - last, kTick) * given_.since_last();
     const auto stopped = stillness_.look(std::chrono::duration_cast<std::chrono::milliseconds>(passed));
     last = now;
+    still_ = stillness_.still_for(kLong);
+    looked_ = now.time_since_epoch();
     if (!stopped.empty() && !stop.stop_requested()) end_hung(stopped);
   }
 }

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <functional>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -25,12 +28,20 @@ class Watchdog {
   static constexpr std::chrono::milliseconds kTick{250};
   static constexpr std::chrono::milliseconds kLimit{2500};  ///< the slowest part moves once a second
 
+  static constexpr std::chrono::milliseconds kLong{1750};  ///< without a movement: told, within two periods of a second
+
   explicit Watchdog(std::vector<MovingPart> parts);
+
+  /// The parts that have not moved for kLong; `watchdog` where it has not looked itself for as long. Takes no lock.
+  [[nodiscard]] std::vector<std::string> still() const;
 
  private:
   void watch(const std::stop_token& stop);
 
+  const std::vector<MovingPart> parts_;
   Stillness stillness_;
+  std::atomic<std::uint64_t> still_{0};  // as Stillness::still_for()
+  std::atomic<std::chrono::steady_clock::duration> looked_{std::chrono::steady_clock::now().time_since_epoch()};
   ProcessorShare given_;
   std::jthread thread_;
 };

@@ -134,6 +134,17 @@ std::vector<ServedModelPtr> ModelRegistry::all() const {
   return models;
 }
 
+std::map<std::string, ModelRegistry::Place> ModelRegistry::places() const {
+  const MutexLock lock(mutex_);
+  std::map<std::string, Place> places;
+  for (const auto& [cell, version] : in_force_) {
+    const bool comes = has_room() && never_loaded_.contains(cell);
+    const auto elsewhere = comes ? Place::Where::kComes : Place::Where::kOnDisk;
+    places[cell] = {version, held_.contains({cell, version}) ? Place::Where::kInMemory : elsewhere};
+  }
+  return places;
+}
+
 std::size_t ModelRegistry::cells_served() const {
   const MutexLock lock(mutex_);
   return in_force_.size();
@@ -219,7 +230,7 @@ std::optional<ModelRegistry::Key> ModelRegistry::next_to_load() const {
     wanted_.pop_front();
     return key;
   }
-  if (never_loaded_.empty() || bytes_ >= budget_ - budget_ / 8) return std::nullopt;
+  if (never_loaded_.empty() || !has_room()) return std::nullopt;
   const std::string& cell = *never_loaded_.begin();
   return Key(cell, in_force_.at(cell));
 }

@@ -70,6 +70,17 @@ class ModelRegistry {
   [[nodiscard]] ServedModelPtr reclaimed(ServedModel model) const { return reclaimer_->watch(std::move(model)); }
   /// The models in force that are in memory, ordered by cell name.
   [[nodiscard]] std::vector<ServedModelPtr> all() const;
+  /// Where the model in force of a cell is.
+  struct Place {
+    int version = 0;
+    enum class Where {
+      kInMemory,
+      kComes,  ///< it was never loaded, and will be without being asked for
+      kOnDisk  ///< it is loaded when it is asked for
+    } where = Where::kOnDisk;
+  };
+  /// Of every cell that has a model in force.
+  [[nodiscard]] std::map<std::string, Place> places() const;
   /// How many cells have a model in force.
   [[nodiscard]] std::size_t cells_served() const;
   [[nodiscard]] std::size_t bytes() const;
@@ -103,6 +114,8 @@ class ModelRegistry {
   [[nodiscard]] Result<ServedModelPtr> from_source(const Key& key, bool in_force) const;
   void settle(const Key& key, bool in_force, const Result<ServedModelPtr>& loaded) const TRAMMEL_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Key> next_to_load() const TRAMMEL_REQUIRES(mutex_);
+  /// Whether models are loaded that nobody has asked for.
+  [[nodiscard]] bool has_room() const TRAMMEL_REQUIRES(mutex_) { return bytes_ < budget_ - budget_ / 8; }
 
   const std::size_t budget_;
   const std::shared_ptr<Reclaimer<ServedModel>> reclaimer_ = std::make_shared<Reclaimer<ServedModel>>();

@@ -75,25 +75,12 @@ Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
   });
 }
 
-/// The path as a URI that says that nobody writes the file.
-std::string immutable(const std::string& path) {
-  std::string uri = "file:";
-  for (const char c : path) {
-    if (c == '%' || c == '?' || c == '#') {
-      uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-    } else {
-      uri += c;
-    }
-  }
-  return uri + "?immutable=1";
-}
-
 /// With its journal where that can be had, with one in memory, or without what the journal holds.
 Attempt open_for_reading(const std::string& path, ServedCopies& copies) {
   using Open = std::pair<std::string, int>;
   const std::array<Open, 3> ways = {{{path, SQLite::OPEN_READONLY},
                                      {path, SQLite::OPEN_READWRITE},
-                                     {immutable(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI}}};
+                                     {immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI}}};
   Attempt last;
   for (const auto& [name, flags] : ways) {
     last = attempt(path, [&, named = name, how = flags](std::unique_ptr<SQLite::Database>& file) -> Status {
@@ -123,6 +110,24 @@ Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copi
   return OpenedDatabase{nullptr, std::move(writing.why_not)};
 }
 
+std::string immutable_uri(const std::string& path) {
+  std::string uri = "file:";
+  for (const char c : path) {
+    if (c == '%' || c == '?' || c == '#') {
+      uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?immutable=1";
+}
+
+std::string uri_to_look_at(const std::string& path) {
+  std::error_code error;
+  const std::string uri = immutable_uri(path);
+  return fs::exists(path + "-wal", error) ? uri.substr(0, uri.rfind('?')) : uri;
+}
+
 Status check_state(const std::string& path, const std::optional<StoreMark>& mark) {
   const auto wrong = [&path](const std::string& what) {
     return failure(ErrorCode::kBusy, "{}", what)
@@ -132,7 +137,8 @@ Status check_state(const std::string& path, const std::optional<StoreMark>& mark
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return wrong("was replaced by what is no file");
   const Attempt look = attempt(path, [&](std::unique_ptr<SQLite::Database>& file) -> Status {
-    file = std::make_unique<SQLite::Database>(immutable(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    file =
+        std::make_unique<SQLite::Database>(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
     if (auto ours = check_readable(*file, path); !ours) return ours;
     const auto is = mark_of(*file);
     if (!mark) return {};

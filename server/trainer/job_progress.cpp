@@ -63,6 +63,13 @@ void ProgressBook::report(const JobProgress& progress) {
   if (listener_) listener_(progress);
 }
 
+std::vector<JobProgress> ProgressBook::unfinished() const {
+  const MutexLock lock(mutex_);
+  std::vector<JobProgress> all;
+  for (const auto& [id, progress] : unfinished_) all.push_back(progress);
+  return all;
+}
+
 std::optional<JobProgress> ProgressBook::find(std::int64_t job) const {
   const MutexLock lock(mutex_);
   const auto found = unfinished_.find(job);

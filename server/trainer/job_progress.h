@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/base/mutex.h"
 #include "server/store/store.h"
@@ -44,6 +45,8 @@ class ProgressBook {
   void report(const JobProgress& progress);
   /// Empty where the job is over or unknown.
   [[nodiscard]] std::optional<JobProgress> find(std::int64_t job) const;
+  /// Oldest first.
+  [[nodiscard]] std::vector<JobProgress> unfinished() const;
 
  private:
   Listener listener_;

@@ -61,6 +61,8 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       store_(store),
       registry_(registry),
       options_(options),
+      queue_capacity_(options.queue_capacity),
+      keep_(options.keep),
       history_(cells_, store, registry),
       runner_(cells_, store, registry, history_, book_, options) {}
 
@@ -144,9 +146,20 @@ Result<std::vector<std::string>> Trainer::start() {
   return notices;
 }
 
+void Trainer::set_limits(int queue_capacity, const KeepRule& keep) {
+  queue_capacity_ = queue_capacity;
+  const MutexLock lock(keep_mutex_);
+  keep_ = keep;
+}
+
 void Trainer::prune(const std::string& cell, const std::stop_token& stop) {
+  KeepRule keep;
+  {
+    const MutexLock lock(keep_mutex_);
+    keep = keep_;
+  }
   // What the store refuses now is pruned after the next job.
-  while (!stop.stop_requested() && store_.prune_one(cell, options_.keep).value_or(false)) {
+  while (!stop.stop_requested() && store_.prune_one(cell, keep).value_or(false)) {
   }
 }
 
@@ -504,11 +517,11 @@ Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) c
 
 Status Trainer::check_room(const std::string& cell) const {
   const std::size_t waiting = queue_.asked_for(cell);
-  if (waiting < static_cast<std::size_t>(options_.queue_capacity)) return {};
-  return failure(ErrorCode::kBusy, "{} jobs that were asked for wait for cell {}, limit {}", waiting, cell,
-                 options_.queue_capacity)
+  const int capacity = queue_capacity_;
+  if (waiting < static_cast<std::size_t>(capacity)) return {};
+  return failure(ErrorCode::kBusy, "{} jobs that were asked for wait for cell {}, limit {}", waiting, cell, capacity)
       .of("queue")
-      .beyond(waiting, options_.queue_capacity)
+      .beyond(waiting, capacity)
       .next("try again later");
 }
 

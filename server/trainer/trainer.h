@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,6 +55,8 @@ class Trainer {
   void stop();
 
   [[nodiscard]] const ServedCells& cells() const { return cells_; }
+  /// From now on TrainerOptions::queue_capacity and TrainerOptions::keep are these. Thread-safe.
+  void set_limits(int queue_capacity, const KeepRule& keep);
   /// What is wrong now: with the store, with its disk, with the models of cells; one sentence each. Never waits.
   [[nodiscard]] std::vector<std::string> troubles() const;
 
@@ -127,6 +131,10 @@ class Trainer {
   };
   /// Of one cell or (empty) of all, oldest first: those that wait or run, and the last ones that ended.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell) const;
+  /// Those that wait or run, oldest first, as they go on. From memory.
+  [[nodiscard]] std::vector<JobProgress> unfinished_jobs() const { return book_.unfinished(); }
+  /// What is wrong with the models that cells are served with; see ModelHistory.
+  [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const { return history_.cell_troubles(); }
   /// Waiting, without the one being trained.
   [[nodiscard]] int queued_jobs() const;
 
@@ -166,6 +174,9 @@ class Trainer {
   Store& store_;
   ModelRegistry& registry_;
   const TrainerOptions options_;
+  std::atomic<int> queue_capacity_;
+  mutable Mutex keep_mutex_;
+  KeepRule keep_ TRAMMEL_GUARDED_BY(keep_mutex_);
   ModelHistory history_;
   TroubleListener trouble_listener_;
   ProgressBook book_;

@@ -69,11 +69,14 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->models_in_memory, minimal.models_in_memory);
   EXPECT_EQ(shipped->log.level, minimal.log.level);
   EXPECT_EQ(shipped->log.file, minimal.log.file);
+  EXPECT_EQ(shipped->log.format, minimal.log.format);
+  EXPECT_EQ(shipped->http.address, minimal.http.address);
+  EXPECT_EQ(shipped->http.port, minimal.http.port);
 }
 
 TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
   const std::string shipped = test::read_file(kShipped);
-  for (const std::string section : {"", "dds: ", "trainer: ", "log: "}) {
+  for (const std::string section : {"", "dds: ", "trainer: ", "log: ", "http: "}) {
     const std::string more = section.empty() ? "bogus: 1\n" : section + "{bogus: 1}\n";
     const auto config = read_server_config(folder_.write("server.yaml", kMinimal + more));
     ASSERT_FALSE(config);
@@ -81,10 +84,21 @@ TEST_F(ServerConfigTest, WhatShipsHasEveryKeyWithAComment) {
     for (std::string key; keys >> key;) {
       const auto at = shipped.find((section.empty() ? "\n" : "\n  ") + key + ":");
       ASSERT_NE(at, std::string::npos) << key << " is not in " << kShipped;
-      if (key == "version" || key == "dds" || key == "trainer" || key == "log") continue;
+      if (key == "version" || key == "dds" || key == "trainer" || key == "log" || key == "http") continue;
       EXPECT_NE(shipped.substr(at + 1, shipped.find('\n', at + 1) - at).find('#'), std::string::npos) << key;
     }
   }
+}
+
+TEST_F(ServerConfigTest, PagesStayOnThisHostWhateverTheFileSays) {
+  for (const char* address : {"0.0.0.0", "192.168.1.4", "localhost", "::1", "plant"}) {
+    const auto config =
+        read_server_config(folder_.write("server.yaml", kMinimal + fmt::format("http: {{address: '{}'}}\n", address)));
+    ASSERT_FALSE(config) << address;
+    EXPECT_NE(sentence(config.error()).find("stay on this host"), std::string::npos) << sentence(config.error());
+  }
+  EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {allow_network: true}\n")));
+  EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {port: 80}\n")));
 }
 
 TEST_F(ServerConfigTest, ReadsEveryKey) {
@@ -94,7 +108,11 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
       "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
       "cpu_s: 30}\n"
-      "log: {level: debug, file: trammel.log}\n");
+      "log: {level: debug, file: trammel.log, format: json}\n"
+      "http: {address: 127.0.0.2, port: 9464}\n");
+  EXPECT_EQ(config.log.format, "json");
+  EXPECT_EQ(config.http.address, "127.0.0.2");
+  EXPECT_EQ(config.http.port, 9464);
   EXPECT_EQ(config.dds.server_id, "a");
   EXPECT_EQ(config.store, folder_.file("t.db")) << "relative to the file";
   EXPECT_EQ(config.models_in_memory, std::size_t{512} << 20);

@@ -1,6 +1,9 @@
 #include "server/config/start_check.h"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -171,13 +174,31 @@ TEST_F(StartCheckTest, TheServerThatRunsAlreadyIsANote) {
   const auto port = test::demand(PortLock::take("127.0.0.1", own_port()));
   const StartCheck found = check_start(read_server(server_), server_);
   EXPECT_TRUE(found.problems.empty()) << sentence(found.problems.front());
-  ASSERT_EQ(found.notes.size(), 1u);
+  ASSERT_EQ(found.notes.size(), 3u);
   EXPECT_NE(found.notes[0].find("runs already"), std::string::npos);
+  EXPECT_EQ(found.notes[1], "cell cell-7 has no model yet");
 }
 
 TEST_F(StartCheckTest, ALogFileThatCannotBeWrittenIsNamed) {
   write_server("log: {file: nowhere/x.log}\n");
   expect_problem("server.yaml", "log: file", "nowhere/x.log");
+}
+
+TEST_F(StartCheckTest, APortForPagesThatIsTakenIsAProblem) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(own_port() + 1));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), 0);
+  ASSERT_EQ(::listen(socket, 1), 0);
+  write_server(fmt::format("http: {{port: {}}}\n", own_port() + 1));
+  expect_problem("server.yaml", "http: port");
+  ::close(socket);
+  const StartCheck free = check();
+  EXPECT_TRUE(free.problems.empty()) << problems();
+  EXPECT_TRUE(free.dark.empty());
+  EXPECT_TRUE(free.notes.empty()) << "there is no store yet";
 }
 
 }  // namespace

@@ -34,6 +34,17 @@ TEST(Stillness, APartThatStopsIsNamedAfterItsLimit) {
   EXPECT_EQ(parts.after(1), "discovery");
 }
 
+TEST(Stillness, APartIsToldBeforeItsLimitAndOneThatEndsNothingIsOnlyTold) {
+  Stillness watched({{"status", [] { return Mark(1); }}, {"computing", [] { return Mark(2); }, false}}, kTick, kLimit);
+  for (int i = 0; i < 1 + 7; ++i) EXPECT_TRUE(watched.look(kTick).empty());
+  EXPECT_EQ(watched.still_for(milliseconds(1750)), 3u) << "a bit each";
+  EXPECT_EQ(watched.still_for(milliseconds(2000)), 0u);
+  std::vector<const char*> stopped;
+  for (int i = 0; i < 100; ++i) stopped = watched.look(kTick);
+  ASSERT_EQ(stopped.size(), 1u);
+  EXPECT_STREQ(stopped[0], "status");
+}
+
 TEST(Stillness, APartThatMovesAtAllHasNotStopped) {
   Parts parts;
   for (int i = 0; i < 100; ++i) {

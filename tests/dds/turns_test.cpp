@@ -83,6 +83,21 @@ void work_until_answered(Shop& shop, const std::string& client, int answers) {
   while (shop.answered[client] < answers) ASSERT_TRUE(shop.lane.step());
 }
 
+TEST(Turns, LimitsThatAreChangedHoldForTheNextRequest) {
+  Shop shop;
+  TurnLimits limits;
+  limits.client_requests = 1;
+  shop.lane.set_limits(limits);
+  EXPECT_TRUE(ask(shop, "a", {}));
+  EXPECT_FALSE(ask(shop, "a", {}));
+  limits.client_requests = 2;
+  shop.lane.set_limits(limits);
+  EXPECT_TRUE(ask(shop, "a", {}));
+  shop.room.set_limits({0, 0, 1});
+  EXPECT_FALSE(ask(shop, "b", {})) << "there is no room";
+  EXPECT_EQ(shop.lane.oldest_portion(), std::nullopt) << "nobody works";
+}
+
 TEST(Turns, AShortRequestWaitsForOnePortionOfALongOneAndNotForAllOfIt) {
   Shop shop;
   ASSERT_TRUE(ask(shop, "long", {10000}));

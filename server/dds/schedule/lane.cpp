@@ -67,6 +67,11 @@ std::optional<Shed> Lane::submit(std::shared_ptr<Job> job, Ask ask) {
   return std::nullopt;
 }
 
+void Lane::set_limits(const TurnLimits& limits) {
+  const MutexLock lock(mutex_);
+  turns_.set_limits(limits);
+}
+
 std::optional<Turns::Portion> Lane::next(Turns::Which which) {
   auto portion = turns_.next(now_(), which);
   if (which == Turns::Which::kShort) {
@@ -141,6 +146,7 @@ void Lane::run(const Turns::Portion& portion) {
 }
 
 Turns::Done Lane::work_on(const Turns::Portion& portion) {
+  const WorkUnderWay::Piece piece = under_way_.begin();
   Turns::Entry& entry = *portion.entry;
   const SteadyTime begun = now_();
   Turns::Done done;

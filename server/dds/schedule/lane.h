@@ -15,6 +15,7 @@
 #include "server/dds/schedule/job.h"
 #include "server/dds/schedule/room.h"
 #include "server/dds/schedule/turns.h"
+#include "server/dds/stillness.h"
 
 namespace trammel {
 
@@ -35,12 +36,16 @@ class Lane {
   void stop();
   /// Takes the request in, or tells why not. Does not wait and does not work; the caller sheds what is not taken in.
   [[nodiscard]] std::optional<Shed> submit(std::shared_ptr<Job> job, Ask ask);
+  /// See Turns::set_limits().
+  void set_limits(const TurnLimits& limits);
   /// Works on one portion in the calling thread. False: there was nothing to do.
   [[nodiscard]] bool step(Turns::Which which = Turns::Which::kAll);
   /// Sheds what waits although its time is over, however busy the workers are.
   void shed_late();
 
   [[nodiscard]] std::size_t requests() const;
+  /// A number while workers are at portions, that of the portion begun first. Takes no lock.
+  [[nodiscard]] std::optional<std::uint64_t> oldest_portion() const { return under_way_.oldest(); }
   /// For the watchdog: a number while a request could be worked on and an idle worker has not taken it up; else empty.
   /// The number is how many portions were taken up before. Takes no lock.
   [[nodiscard]] std::optional<std::uint64_t> unseen() const;
@@ -70,6 +75,7 @@ class Lane {
   std::atomic<bool> workable_{false};                      // as waits_, for the watchdog
   std::atomic<int> idle_{0};                               // workers asleep, the express ones left out
   std::atomic<std::uint64_t> taken_up_{0};                 // portions
+  WorkUnderWay under_way_;                                 // portions
   std::vector<std::jthread> workers_;
 };
 

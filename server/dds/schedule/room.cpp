@@ -32,9 +32,9 @@ Room::Place::~Place() {
 }
 
 std::optional<Room::Place> Room::take(const std::string& client, const std::string& cell, std::size_t bytes) {
-  const auto cell_limit = static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.bytes));
   const std::size_t some = bytes + 1;  // an entry of nothing must not look like no entry
   const MutexLock lock(mutex_);
+  const auto cell_limit = static_cast<std::size_t>(limits_.cell_share * static_cast<double>(limits_.bytes));
   if (bytes_ + some > limits_.bytes || used(by_client_, client) + some > limits_.client_bytes) return std::nullopt;
   if (!cell.empty() && used(by_cell_, cell) + some > cell_limit) return std::nullopt;
   bytes_ += some;
@@ -48,6 +48,11 @@ void Room::give_back(const Place& place) {
   bytes_ -= place.bytes_;
   take_off(by_client_, place.client_, place.bytes_);
   take_off(by_cell_, place.cell_, place.bytes_);
+}
+
+void Room::set_limits(const RoomLimits& limits) {
+  const MutexLock lock(mutex_);
+  limits_ = limits;
 }
 
 std::size_t Room::bytes() const {

@@ -38,12 +38,14 @@ class Room {
   /// Empty when the room, the client's share or the cell's share (no cell: no such limit) is used up.
   [[nodiscard]] std::optional<Place> take(const std::string& client, const std::string& cell, std::size_t bytes);
   [[nodiscard]] std::size_t bytes() const;
+  /// From now on; what is in the room already stays.
+  void set_limits(const RoomLimits& limits);
 
  private:
   void give_back(const Place& place);
 
-  const RoomLimits limits_;
   mutable Mutex mutex_;
+  RoomLimits limits_ TRAMMEL_GUARDED_BY(mutex_);
   std::size_t bytes_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::map<std::string, std::size_t> by_client_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, std::size_t> by_cell_ TRAMMEL_GUARDED_BY(mutex_);

@@ -19,6 +19,12 @@ std::chrono::milliseconds as_retry(Cost wait) {
 
 }  // namespace
 
+void Turns::set_limits(const TurnLimits& limits) {
+  limits_.client_requests = limits.client_requests;
+  limits_.requests = limits.requests;
+  limits_.cell_share = limits.cell_share;
+}
+
 std::size_t Turns::Entry::claim(std::size_t most, std::size_t* first) {
   if (next_.load() >= items_) return 0;
   *first = next_.fetch_add(most);

@@ -37,6 +37,9 @@ class Turns {
  public:
   explicit Turns(const TurnLimits& limits) : limits_(limits) {}
 
+  /// From now on as many requests may wait, of each client, of all and of one cell; the rest stays.
+  void set_limits(const TurnLimits& limits);
+
   /// A request from its admission to its answer.
   class Entry {
    public:
@@ -127,7 +130,7 @@ class Turns {
   void remove(Client& client, Entry& entry);
   void forget_clients();
 
-  const TurnLimits limits_;
+  TurnLimits limits_;
   CostBook costs_;
   std::unordered_map<std::string, Client> clients_;
   std::unordered_map<std::string, CellUse> cells_;

@@ -63,34 +63,43 @@ Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
     }
     const auto fits = check_fits_cell(*model, *cells_.at(cell), fmt::format("version {} of cell {}", version, cell));
     if (!fits) {
-      set_trouble(cell, sentence(fits.error()));
+      set_trouble(cell, CellTrouble{CellTrouble::Kind::kOfAnotherRobot, sentence(fits.error())});
       return tl::make_unexpected(fits.error());
     }
     // A version that lost its copy gets a new one; where the store cannot give it, it was made from its copy.
     static_cast<void>(store_.copy_model_in_force(cell));
-    set_trouble(cell, why_not ? fmt::format("cell {}: version {} is served instead of a newer one: {}", cell, version,
-                                            sentence(*why_not))
-                              : "");
+    std::optional<CellTrouble> trouble;
+    if (why_not)
+      trouble = {
+          CellTrouble::Kind::kOlderServed,
+          fmt::format("cell {}: version {} is served instead of a newer one: {}", cell, version, sentence(*why_not))};
+    set_trouble(cell, trouble);
     return ServedModel{cell, version, std::move(*model)};
   }
   if (!why_not) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
-  set_trouble(cell, fmt::format("cell {} is not served: {}", cell, sentence(*why_not)));
+  set_trouble(cell, CellTrouble{CellTrouble::Kind::kUnreadable,
+                                fmt::format("cell {} is not served: {}", cell, sentence(*why_not))});
   return tl::make_unexpected(*why_not);
 }
 
 std::vector<std::string> ModelHistory::troubles() const {
   const MutexLock lock(troubles_mutex_);
   std::vector<std::string> all;
-  for (const auto& [cell, trouble] : troubles_) all.push_back(trouble);
+  for (const auto& [cell, trouble] : troubles_) all.push_back(trouble.what);
   return all;
 }
 
-void ModelHistory::set_trouble(const std::string& cell, const std::string& trouble) {
+std::map<std::string, CellTrouble> ModelHistory::cell_troubles() const {
   const MutexLock lock(troubles_mutex_);
-  if (trouble.empty()) {
-    troubles_.erase(cell);
+  return troubles_;
+}
+
+void ModelHistory::set_trouble(const std::string& cell, const std::optional<CellTrouble>& trouble) {
+  const MutexLock lock(troubles_mutex_);
+  if (trouble) {
+    troubles_[cell] = *trouble;
   } else {
-    troubles_[cell] = trouble;
+    troubles_.erase(cell);
   }
 }
 
@@ -261,7 +270,7 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
 }
 
 void ModelHistory::put_in_force(ServedModelPtr model) {
-  set_trouble(model->cell, "");
+  set_trouble(model->cell, std::nullopt);
   registry_.publish(model);
   if (listener_) listener_(*model, true);
 }

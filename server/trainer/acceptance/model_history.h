@@ -45,6 +45,16 @@ struct ChangeRequest {
   std::optional<int> expected = {};  ///< the version served now, 0: none; with another one (kConflict) nothing changes
 };
 
+/// Why a cell is not served with the model that it should be served with.
+struct CellTrouble {
+  enum class Kind {
+    kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
+    kUnreadable,      ///< not served: no version in force can be read
+    kOlderServed      ///< served with an older version
+  } kind = Kind::kUnreadable;
+  std::string what;  ///< one sentence
+};
+
 /// The models of all cells: which versions there are, which one is in force, and what takes its place by itself.
 ///
 /// Thread-safe, set_listener() excepted. One change of what is in force at a time, cell by cell: a cell never waits for
@@ -68,6 +78,8 @@ class ModelHistory {
   [[nodiscard]] Status announce_from_store(const std::string& cell);
   /// Cells that are not served with the model they should be served with, one sentence each.
   [[nodiscard]] std::vector<std::string> troubles() const;
+  /// The same by cell.
+  [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
 
   /// What the cells were lately asked for: a candidate that moves one of these poses by more than the cell's step limit
   /// is put in force by a person only.
@@ -97,7 +109,7 @@ class ModelHistory {
   /// What the cell is to be served with.
   [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
   /// Empty: there is none any more.
-  void set_trouble(const std::string& cell, const std::string& trouble);
+  void set_trouble(const std::string& cell, const std::optional<CellTrouble>& trouble);
   /// The cell's lock is held, or what it guards is looked at again when it is.
   [[nodiscard]] Status check_expected(const std::string& cell, const ChangeRequest& request) const;
   /// Where a rollback leads.
@@ -138,7 +150,7 @@ class ModelHistory {
   RecentPoses recent_poses_;
   std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
   mutable Mutex troubles_mutex_;           // taken last
-  std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
+  std::map<std::string, CellTrouble> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
 };
 
 }  // namespace trammel

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/config/server_config.h"
+
+namespace trammel {
+
+/// What becomes of a server file that is read again while it is served.
+struct ReloadPlan {
+  ServerConfig config;             ///< from now on
+  std::vector<std::string> now;    ///< keys that have changed
+  std::vector<std::string> later;  ///< keys that differ and change with the next start
+};
+
+/// Takes on: level and format of the log; of `dds` how much may wait (client_requests, client_mb, queued_requests,
+/// queued_mb, cell_share); of `trainer` queue_capacity and keep_models, keep_batches, keep_answers. Options of the
+/// command line (store, ports, domain) stand in `present`, and what `file` says instead is no change.
+[[nodiscard]] ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file);
+
+}  // namespace trammel

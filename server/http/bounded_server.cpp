@@ -1,0 +1,237 @@
+#include "server/http/bounded_server.h"
+
+#include <arpa/inet.h>
+#include <httplib.h>
+#include <netinet/in.h>
+#include <pthread.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/base/mutex.h"
+#include "server/http/deadline_stream.h"
+
+namespace trammel {
+namespace {
+
+constexpr int kNiceness = 10;              // of all its threads: answering on DDS comes first
+constexpr std::size_t kLongestUri = 2048;  // bytes
+
+constexpr const char* kTooMany =
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 9\r\nContent-Type: text/plain\r\nRetry-After: 1\r\n"
+    "Connection: close\r\n\r\ntoo many\n";
+
+/// Whether the thread may only send away whoever it has accepted.
+thread_local bool sends_away = false;
+
+void become(const char* name) {
+  ::pthread_setname_np(::pthread_self(), name);
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // of this thread alone, as Linux has it
+}
+
+/// A bounded queue of connections and the threads that serve them.
+class Connections final : public httplib::TaskQueue {
+ public:
+  explicit Connections(const HttpLimits& limits) : limits_(limits) {
+    for (std::size_t i = 0; i < limits.workers; ++i)
+      workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+  }
+
+  void enqueue(std::function<void()> serve) override {
+    {
+      const MutexLock lock(mutex_);
+      if (waiting_.size() < limits_.waiting) {
+        waiting_.push_back(std::move(serve));
+        came_.notify_one();
+        return;
+      }
+    }
+    sends_away = true;
+    serve();
+    sends_away = false;
+  }
+
+  void shutdown() override {
+    for (std::jthread& worker : workers_) worker.request_stop();
+    workers_.clear();
+    sends_away = true;
+    const MutexLock lock(mutex_);
+    for (const auto& serve : waiting_) serve();
+    waiting_.clear();
+    sends_away = false;
+  }
+
+ private:
+  void work(const std::stop_token& stop) {
+    become("http");
+    for (;;) {
+      std::function<void()> serve;
+      {
+        MutexLock lock(mutex_);
+        came_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty(); });
+        if (stop.stop_requested()) return;
+        serve = std::move(waiting_.front());
+        waiting_.pop_front();
+      }
+      serve();
+    }
+  }
+
+  const HttpLimits limits_;
+  Mutex mutex_;
+  Condition came_;
+  std::deque<std::function<void()>> waiting_ TRAMMEL_GUARDED_BY(mutex_);
+  std::vector<std::jthread> workers_;
+};
+
+/// `127.0.0.1:9464` and `localhost` name this host; a name that somebody else's server may have given it does not.
+bool is_of_this_host(const std::string& host) {
+  const std::string name = host.substr(0, host.rfind(':'));
+  in_addr parsed{};
+  const bool is_loopback = ::inet_pton(AF_INET, name.c_str(), &parsed) == 1 && ntohl(parsed.s_addr) >> 24 == 127;
+  return name == "localhost" || is_loopback;
+}
+
+/// The words between the slashes of a path that is read already.
+std::vector<std::string> words_of(const std::string& path) {
+  std::vector<std::string> words;
+  std::size_t at = 0;
+  while (at < path.size()) {
+    const std::size_t end = std::min(path.find('/', at), path.size());
+    if (end > at) words.push_back(path.substr(at, end - at));
+    at = end + 1;
+  }
+  return words;
+}
+
+HttpReply reply_to(const httplib::Request& request, const HttpHandler& handler) {
+  if (request.method != "GET" && request.method != "HEAD")
+    return {405, "text/plain; charset=utf-8", "nothing can be changed here\n", {{"Allow", "GET, HEAD"}}};
+  if (request.target.size() > kLongestUri) return {414, "text/plain; charset=utf-8", "the address is too long\n"};
+  if (!is_of_this_host(request.get_header_value("Host")))
+    return {421, "text/plain; charset=utf-8", "ask for 127.0.0.1 or localhost\n"};
+  HttpAsk ask{words_of(request.path), {}};
+  for (const auto& [name, value] : request.params) ask.options[name] = value;
+  try {
+    return handler(ask);
+  } catch (const std::exception& failed) {
+    return {500, "text/plain; charset=utf-8", std::string(failed.what()) + "\n"};
+  }
+}
+
+sockaddr_in socket_address(const std::string& address, std::uint16_t port) {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(port);
+  ::inet_pton(AF_INET, address.c_str(), &to.sin_addr);
+  return to;
+}
+
+}  // namespace
+
+class BoundedServer::Running final : public httplib::Server {
+ public:
+  Running(const HttpLimits& limits, HttpHandler handler) : limits_(limits), handler_(std::move(handler)) {
+    new_task_queue = [this] { return new Connections(limits_); };
+    // By itself it would share the port with whoever listens there.
+    set_socket_options([](int socket) {
+      const int yes = 1;
+      ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+    });
+    // Before it looks for a route: those are regular expressions, which a long path makes too deep.
+    set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
+      HttpReply reply = reply_to(request, handler_);
+      response.status = reply.code;
+      for (const auto& [name, value] : reply.headers) response.set_header(name, value);
+      response.set_header("X-Content-Type-Options", "nosniff");
+      response.set_header("Referrer-Policy", "no-referrer");
+      response.set_header("Cache-Control", "no-store");
+      response.set_content(std::move(reply.body), reply.type);
+      return HandlerResponse::Handled;
+    });
+  }
+  ~Running() override {
+    stop();
+    thread_ = {};
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  void listen_in_a_thread() {
+    thread_ = std::jthread([this] {
+      become("http accept");
+      listen_after_bind();
+    });
+  }
+
+  [[nodiscard]] std::uint64_t shed() const { return shed_; }
+
+ private:
+  bool process_and_close_socket(socket_t socket) override {
+    DeadlineStream stream(socket, limits_.reading, limits_.writing);
+    if (sends_away) {
+      ++shed_;
+      static_cast<void>(::send(socket, kTooMany, std::strlen(kTooMany), MSG_NOSIGNAL | MSG_DONTWAIT));
+      return false;
+    }
+    bool closed = false;
+    // One request a connection; neither compressed nor in pieces: that is work, and nobody is far away.
+    return process_request(stream, true, closed, [](httplib::Request& request) {
+      request.headers.erase("Accept-Encoding");
+      request.ranges.clear();
+    });
+  }
+
+  const HttpLimits limits_;
+  const HttpHandler handler_;
+  std::atomic<std::uint64_t> shed_{0};
+  std::jthread thread_;
+};
+
+BoundedServer::BoundedServer(std::unique_ptr<Running> running) : running_(std::move(running)) {}
+
+BoundedServer::~BoundedServer() = default;
+
+std::uint64_t BoundedServer::shed() const { return running_->shed(); }
+
+Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& address, std::uint16_t port,
+                                                            const HttpLimits& limits, HttpHandler handler) {
+  if (const Status free = check_http_address(address, port); !free) return tl::make_unexpected(free.error());
+  auto running = std::make_unique<Running>(limits, std::move(handler));
+  if (!running->bind_to_port(address, port))
+    return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port).of("port").with_value(port);
+  running->listen_in_a_thread();
+  while (!running->is_running()) std::this_thread::yield();  // stop() does nothing before
+  return std::unique_ptr<BoundedServer>(new BoundedServer(std::move(running)));
+}
+
+Status check_http_address(const std::string& address, std::uint16_t port) {
+  if (!is_of_this_host(address) || address == "localhost")
+    return failure(ErrorCode::kUsage, "'{}' is not 127.x.x.x: pages and metrics stay on this host", address)
+        .of("address")
+        .with_text(address);
+  const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int yes = 1;
+  ::setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  const sockaddr_in to = socket_address(address, port);
+  const bool free = ::bind(probe, reinterpret_cast<const sockaddr*>(&to), sizeof(to)) == 0 && ::listen(probe, 1) == 0;
+  const int why = errno;
+  ::close(probe);
+  if (free) return {};
+  return failure(why == EADDRNOTAVAIL ? ErrorCode::kUsage : ErrorCode::kConflict, "{}:{} cannot be listened on: {}",
+                 address, port, std::strerror(why))
+      .of("port")
+      .with_value(port)
+      .next("give it another port, or end who has it");
+}
+
+}  // namespace trammel

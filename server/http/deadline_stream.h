@@ -1,0 +1,43 @@
+#pragma once
+
+#include <httplib.h>
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace trammel {
+
+/// A connection that ends when its time is over, however slowly the other side sends or reads. Closes it at the end.
+class DeadlineStream final : public httplib::Stream {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  DeadlineStream(int socket, std::chrono::milliseconds reading, std::chrono::milliseconds writing);
+  ~DeadlineStream() override;
+  DeadlineStream(const DeadlineStream&) = delete;
+  DeadlineStream& operator=(const DeadlineStream&) = delete;
+
+  using httplib::Stream::write;
+  [[nodiscard]] bool is_readable() const override;
+  [[nodiscard]] bool is_writable() const override;
+  ssize_t read(char* bytes, std::size_t size) override;
+  ssize_t write(const char* bytes, std::size_t size) override;
+  void get_remote_ip_and_port(std::string& ip, int& port) const override;
+  void get_local_ip_and_port(std::string& ip, int& port) const override;
+  [[nodiscard]] int socket() const override { return socket_; }
+
+ private:
+  /// Until the socket is ready for `events`; false once `until` is over.
+  [[nodiscard]] bool wait(short events, Clock::time_point until) const;
+
+  const int socket_;
+  const Clock::time_point read_until_;
+  const std::chrono::milliseconds writing_;
+  Clock::time_point write_until_{};  // set by the first byte written
+  std::array<char, 4096> buffer_{};
+  std::size_t from_ = 0, to_ = 0;  // what of the buffer is not read yet
+};
+
+}  // namespace trammel

@@ -1,0 +1,339 @@
+#include "server/http/live_pages.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "server/base/units.h"
+#include "server/base/unix_time.h"
+#include "server/http/readiness.h"
+#include "server/report/history.h"
+#include "server/report/html.h"
+#include "server/report/model_page.h"
+
+namespace trammel {
+namespace {
+
+constexpr int kLiveAgain = 5;                 // s
+constexpr std::size_t kMostVersions = 100;    // of a cell's page
+constexpr std::size_t kHistoryVersions = 10;  // whose parameters are read
+constexpr std::size_t kEvents = 30;
+constexpr int kJobs = 20;  // of those done, and of those failed
+
+struct Row {
+  std::vector<std::string> cells;  ///< HTML
+  std::string kind = {};           ///< class for the style sheet; empty: none
+};
+
+/// A table; on narrow screens each cell stands on a line of its own, behind the name of its column.
+std::string table(const std::vector<std::string>& head, const std::vector<Row>& rows) {
+  std::string html = "<div class=\"wide\"><table>\n<thead>" + html_head(head) + "</thead>\n<tbody>\n";
+  for (const Row& row : rows) {
+    html += row.kind.empty() ? "<tr>" : fmt::format("<tr class=\"{}\">", row.kind);
+    for (std::size_t i = 0; i < row.cells.size(); ++i)
+      html += fmt::format("<td title=\"{}\">{}</td>", i < head.size() ? html_text(head[i]) : "", row.cells[i]);
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table></div>";
+}
+
+std::string section(const std::string& title, const std::string& body) {
+  return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", html_text(title), body);
+}
+
+std::string in_words(std::string word) {
+  std::replace(word.begin(), word.end(), '_', ' ');
+  return word;
+}
+
+/// A list with a blank behind each comma, so that lines can end there.
+std::string spaced(const std::string& list) {
+  std::string text;
+  for (const char c : list) text += c == ',' ? std::string(", ") : std::string(1, c);
+  return text;
+}
+
+std::string millimetres(const std::optional<double>& m) { return m && *m > 0 ? fmt::format("{:.4f}", to_mm(*m)) : "–"; }
+
+std::string model_address(const std::string& cell, int version) {
+  return fmt::format("{}/models/{}", cell_address(cell), version);
+}
+
+std::string job_address(std::int64_t job) { return fmt::format("/jobs/{}", job); }
+
+const char* kind_of(JobKind kind) {
+  switch (kind) {
+    case JobKind::kTrain:
+      return "training";
+    case JobKind::kDiagnose:
+      return "diagnosis";
+    case JobKind::kCheck:
+      return "check";
+  }
+  return "";
+}
+
+std::string state_of(const CellReadiness& one) {
+  std::string text = html_text(in_words(to_text(one.state)));
+  if (!one.why.empty()) text += "<br><span class=\"note\">" + html_text(one.why) + "</span>";
+  return text;
+}
+
+std::string troubles_of(const Watched& server) {
+  const std::vector<std::string> troubles = server.trainer.troubles();
+  if (troubles.empty()) return "";
+  std::string list;
+  for (const std::string& one : troubles) list += "<li>" + html_text(one) + "</li>";
+  return section("What is wrong now", "<ul>" + list + "</ul>");
+}
+
+using InMemory = std::map<std::string, ServedModelPtr>;
+
+InMemory in_memory(const Watched& server) {
+  InMemory models;
+  for (ServedModelPtr& model : server.registry.all()) {
+    std::string cell = model->cell;
+    models[std::move(cell)] = std::move(model);
+  }
+  return models;
+}
+
+Row fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now) {
+  Row row{{html_link(cell_address(one.cell), one.cell), state_of(one)}, one.is_dark() ? "dark" : "served"};
+  const auto found = models.find(one.cell);
+  const ServedModel* model = found == models.end() ? nullptr : found->second.get();
+  const int version = model == nullptr ? one.version : model->version;
+  row.cells.push_back(version == 0 ? "–" : html_link(model_address(one.cell, version), std::to_string(version)));
+  if (model == nullptr) {
+    row.cells.insert(row.cells.end(), 3, "–");
+    return row;
+  }
+  const ModelProvenance& made = model->model.provenance();
+  const auto& judged = model->model.parts().validation;
+  row.cells.push_back(shown_time(made.trained_at));
+  row.cells.push_back(made.measured_at ? shown_age(static_cast<double>(now - *made.measured_at)) : "–");
+  row.cells.push_back(millimetres(judged ? std::optional(judged->compensated.rms) : std::nullopt));
+  return row;
+}
+
+std::string outcome_of(const StoredJob& job, const std::optional<JobProgress>& now) {
+  if (now && now->stage == JobStage::kQueued) return now->what.empty() ? "waits" : "waits: " + html_text(now->what);
+  if (now) return fmt::format("{}, {:.0f} %", html_text(now->what), 100 * now->share);
+  const std::string verdict = in_words(to_text(job.outcome.verdict));
+  const std::string& why = job.outcome.why.empty() ? job.message : job.outcome.why;
+  return html_text(why.empty() ? verdict : verdict + ": " + why);
+}
+
+using Unfinished = std::map<std::int64_t, JobProgress>;
+
+Unfinished unfinished(const Watched& server) {
+  Unfinished jobs;
+  for (JobProgress& job : server.trainer.unfinished_jobs()) jobs[job.job] = std::move(job);
+  return jobs;
+}
+
+std::optional<JobProgress> progress_in(const Unfinished& jobs, std::int64_t job) {
+  const auto found = jobs.find(job);
+  return found == jobs.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::string batches_of(const StoredJob& job) {
+  return job.batch_ids.empty() ? "sent with it" : html_text(fmt::format("{}", fmt::join(job.batch_ids, ", ")));
+}
+
+/// Newest first.
+Result<std::string> job_table(const Watched& server, const std::string& cell) {
+  const auto jobs = server.store.recent_jobs(cell, kJobs);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  if (jobs->empty()) return std::string("<p>None.</p>");
+  const Unfinished running = unfinished(server);
+  std::vector<Row> rows;
+  for (auto job = jobs->rbegin(); job != jobs->rend(); ++job) {
+    const auto now = progress_in(running, job->id);
+    rows.push_back({{html_link(job_address(job->id), std::to_string(job->id)),
+                     html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
+                     shown_time(job->created_at), shown_time(job->finished_at), outcome_of(*job, now)},
+                    now ? "now" : ""});
+  }
+  return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "outcome"}, rows);
+}
+
+Result<std::string> version_table(const Watched& server, const std::string& cell) {
+  const auto versions = server.store.models(cell);
+  if (!versions) return tl::make_unexpected(versions.error());
+  if (versions->empty()) return std::string("<p>None yet.</p>");
+  const int in_force = server.registry.version_in_force(cell);
+  std::vector<Row> rows;
+  for (auto one = versions->rbegin(); one != versions->rend() && rows.size() < kMostVersions; ++one) {
+    const bool now = one->version == in_force;
+    rows.push_back(
+        {{html_link(model_address(cell, one->version), std::to_string(one->version)) + (now ? " in force" : ""),
+          shown_time(one->trained_at), shown_time(one->measured_at), html_text(one->batch_id),
+          html_text(spaced(one->level)), std::to_string(one->training_poses), millimetres(one->validation_rms)},
+         now ? "now" : ""});
+  }
+  return table({"version", "trained (UTC)", "measured (UTC)", "batches", "error sources", "poses", "held-out rms, mm"},
+               rows);
+}
+
+Result<std::string> quarantine_table(const Watched& server, const std::string& cell) {
+  const auto batches = server.trainer.quarantined(cell);
+  if (!batches) return tl::make_unexpected(batches.error());
+  std::vector<Row> rows;
+  for (const StoredBatch& batch : *batches)
+    rows.push_back({{html_text(batch.id), std::to_string(batch.poses), shown_time(batch.accepted_at),
+                     html_text(batch.quarantine)}});
+  return rows.empty() ? std::string() : table({"batch", "poses", "came (UTC)", "why it is kept out"}, rows);
+}
+
+std::string event_table(const AuditTrail& trail) {
+  std::vector<Row> rows;
+  for (auto row = trail.rows.rbegin(); row != trail.rows.rend(); ++row)
+    rows.push_back({{shown_time(row->at), html_text(row->what), html_text(row->subject),
+                     html_text(row->before + (row->after.empty() ? "" : " → " + row->after)), html_text(row->why),
+                     html_text(row->who)}});
+  std::string html =
+      rows.empty() ? "<p>None.</p>" : table({"when (UTC)", "what", "of what", "before → after", "why", "who"}, rows);
+  if (trail.broken) html = "<p>The trail is broken: " + html_text(sentence(*trail.broken)) + "</p>" + html;
+  return html;
+}
+
+/// A section, or why there is none.
+void add_section(std::string* body, const std::string& title, const Result<std::string>& html) {
+  if (html && html->empty()) return;
+  *body += section(title, html ? *html : "<p>Cannot be read: " + html_text(sentence(html.error())) + "</p>");
+}
+
+CellReadiness readiness_of(const Watched& server, const std::string& cell) {
+  for (CellReadiness& one : cells_readiness(server)) {
+    if (one.cell == cell) return std::move(one);
+  }
+  return {cell, CellReadiness::State::kUntrained};
+}
+
+Status check_served(const Watched& server, const std::string& cell) {
+  return find_cell(server.trainer.cells(), cell).map([](const auto&) {});
+}
+
+Result<CompensatedModel> model_of(const Watched& server, const std::string& cell, int version) {
+  const InMemory models = in_memory(server);
+  const auto found = models.find(cell);
+  if (found != models.end() && found->second->version == version) return found->second->model;
+  return server.store.model(cell, version);
+}
+
+}  // namespace
+
+ServicePage fleet_page(const Watched& server) {
+  const std::vector<CellReadiness> cells = cells_readiness(server);
+  const InMemory models = in_memory(server);
+  const auto dark = std::count_if(cells.begin(), cells.end(), [](const auto& one) { return one.is_dark(); });
+  std::vector<Row> rows;
+  for (const CellReadiness& one : cells) rows.push_back(fleet_row(one, models, unix_now()));
+  const std::string verdict =
+      dark == 0 ? fmt::format("All {} cells are answered for.", cells.size())
+                : fmt::format("{} of {} cells are dark: nobody gets an answer for them.", dark, cells.size());
+  const Movement movement = server.movement();
+  const std::string still =
+      movement.still.empty()
+          ? ""
+          : fmt::format("<p>No progress in: {}</p>", html_text(fmt::format("{}", fmt::join(movement.still, ", "))));
+  const auto running = server.trainer.unfinished_jobs().size();
+  const std::string body =
+      section("Now", fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run.</p><p class=\"note\">{} {}, read "
+                                 "at {} UTC, again every {} s.</p>",
+                                 verdict, still, html_link("/jobs", "Jobs"), running, html_text(server.server_id),
+                                 html_text(server.program_version), shown_time(unix_now()), kLiveAgain)) +
+      troubles_of(server) +
+      section("Cells",
+              table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));
+  return {"Cells of " + server.server_id, body, kLiveAgain};
+}
+
+Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
+  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
+  const CellReadiness now = readiness_of(server, cell);
+  const std::string report =
+      now.version == 0
+          ? ""
+          : html_link(model_address(cell, now.version), fmt::format("Report of version {}", now.version)) + " · ";
+  std::string body =
+      section("Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>", now.is_dark() ? "Dark" : "Answered for",
+                                 state_of(now), report,
+                                 html_link(cell_address(cell) + "/history", "History of its parameters")));
+  add_section(&body, "Versions", version_table(server, cell));
+  add_section(&body, "Batches that are kept out", quarantine_table(server, cell));
+  add_section(&body, "Jobs", job_table(server, cell));
+  add_section(&body, "Changes", server.store.audit({cell, 0, kEvents}).map(event_table));
+  return ServicePage{"Cell " + cell, body};
+}
+
+Result<ServicePage> jobs_page(const Watched& server) {
+  const auto jobs = job_table(server, "");
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  return ServicePage{"Jobs", section("Newest first", *jobs), kLiveAgain};
+}
+
+Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
+  const auto job = server.store.job(id);
+  if (!job) return tl::make_unexpected(job.error());
+  const auto now = progress_in(unfinished(server), id);
+  std::vector<Row> rows = {{{"cell", html_link(cell_address(job->cell), job->cell)}},
+                           {{"what", kind_of(job->kind)}},
+                           {{"batches", batches_of(*job)}},
+                           {{"asked (UTC)", shown_time(job->created_at)}},
+                           {{"begun (UTC)", shown_time(job->started_at)}},
+                           {{"ended (UTC)", shown_time(job->finished_at)}},
+                           {{"outcome", outcome_of(*job, now)}}};
+  const JobOutcome& outcome = job->outcome;
+  if (outcome.before || outcome.after)
+    rows.push_back({{"held-out rms, mm", fmt::format("before {}, after {}, limit {}", millimetres(outcome.before),
+                                                     millimetres(outcome.after), millimetres(outcome.limit))}});
+  if (!outcome.next.empty()) rows.push_back({{"next", html_text(outcome.next)}});
+  if (job->model_version > 0)
+    rows.push_back({{"model", html_link(model_address(job->cell, job->model_version),
+                                        fmt::format("version {}", job->model_version))}});
+  if (job->kind != JobKind::kTrain && !now)
+    rows.push_back({{"found", html_link(job_address(id) + "/findings", "what it found")}});
+  return ServicePage{fmt::format("Job {}", id), section("What became of it", table({}, rows)), now ? kLiveAgain : 0};
+}
+
+Result<std::string> model_report(const Watched& server, const std::string& cell, int version) {
+  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
+  return model_of(server, cell, version).map([](const CompensatedModel& model) {
+    return model_page(model, std::nullopt);
+  });
+}
+
+Result<std::string> history_report(const Watched& server, const std::string& cell) {
+  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
+  const auto versions = server.store.models(cell);
+  if (!versions) return tl::make_unexpected(versions.error());
+  CellHistory history{cell};
+  const int in_force = server.registry.version_in_force(cell);
+  const std::size_t skipped = versions->size() - std::min(versions->size(), kHistoryVersions);
+  for (std::size_t i = skipped; i < versions->size(); ++i) {
+    const StoredModel& stored = (*versions)[i];
+    VersionOnRecord one{stored.version,
+                        stored.id,
+                        stored.batch_id,
+                        stored.trained_at,
+                        stored.training_poses,
+                        stored.validation_rms > 0 ? std::optional(stored.validation_rms) : std::nullopt,
+                        stored.version == in_force};
+    if (const auto model = model_of(server, cell, stored.version)) put_on_record(*model, one);
+    history.versions.push_back(std::move(one));
+  }
+  for (const StoredJob& job : server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>())) {
+    if (job.kind != JobKind::kTrain || !job.finished_at) continue;
+    history.trainings.push_back({*job.finished_at, fmt::format("{}", fmt::join(job.batch_ids, "+")),
+                                 to_text(job.outcome.verdict), job.outcome.why, job.outcome.before, job.outcome.after});
+  }
+  if (const auto trail = server.store.audit({cell, 0, 10 * kEvents})) {
+    for (const AuditRow& row : trail->rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+  }
+  return history_page(history);
+}
+
+}  // namespace trammel

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/http/exchange.h"
+
+namespace trammel {
+
+/// A page of the service: its title, its body as HTML, and after how many seconds it is read again (0: never).
+struct ServicePage {
+  std::string title;
+  std::string body;
+  int again_after = 0;  ///< s
+};
+[[nodiscard]] HttpReply page_reply(const ServicePage& page, int code = 200);
+
+/// A page that stands for itself (a model, a history), with the way back to the others above it.
+[[nodiscard]] HttpReply report_reply(const std::string& page, const std::string& cell);
+/// The same of a page that an earlier version of the program may have written: its scripts run, shut off from
+/// everything else.
+[[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);
+
+/// A link; `text` is shown as it stands.
+[[nodiscard]] std::string html_link(const std::string& address, const std::string& text);
+/// The page of a cell, whatever its name is.
+[[nodiscard]] std::string cell_address(const std::string& cell);
+
+/// `2026-11-22 14:03`, UTC; a dash where there is none.
+[[nodiscard]] std::string shown_time(std::optional<std::int64_t> unix_s);
+/// `3 days`, `2 h`.
+[[nodiscard]] std::string shown_age(double seconds);
+
+}  // namespace trammel

@@ -1,0 +1,104 @@
+#include "server/http/pages.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "server/http/live_pages.h"
+#include "server/http/page_shell.h"
+#include "server/report/html.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::size_t kMostKept = 16;  // pages
+constexpr std::chrono::seconds kForAMoment{2}, kForAWhile{60};
+
+HttpReply told(int code, const std::string& title, const std::string& text) {
+  return page_reply({title, "<section><p>" + html_text(text) + "</p></section>"}, code);
+}
+
+HttpReply not_there() { return told(404, "Not there", "There is no such page."); }
+
+HttpReply refused_reply(const Error& error) {
+  const bool missing = error.code == ErrorCode::kNotFound;
+  const bool later = error.code == ErrorCode::kBusy;
+  return told(missing ? 404 : later ? 503 : 500, missing ? "Not there" : "Cannot be shown", sentence(error));
+}
+
+HttpReply reply_of(const Result<ServicePage>& page) { return page ? page_reply(*page) : refused_reply(page.error()); }
+
+template <typename Number>
+std::optional<Number> number_in(const std::string& word) {
+  Number number = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (error != std::errc{} || end != word.data() + word.size() || number <= 0) return std::nullopt;
+  return number;
+}
+
+/// What a diagnosis or a check found: its page, or its findings as they are.
+HttpReply findings_reply(const Watched& server, std::int64_t job) {
+  const auto asked = server.store.job(job);
+  if (!asked) return refused_reply(asked.error());
+  const auto found = server.trainer.diagnosis(job);
+  if (!found) return refused_reply(found.error());
+  if (!found->page.empty()) return stored_page_reply(found->page, asked->cell);
+  return {200, "application/json", found->findings};
+}
+
+}  // namespace
+
+HttpReply Pages::answer(const HttpAsk& ask, ServerPhase phase) {
+  if (phase != ServerPhase::kServing)
+    return told(503, "Not up", phase == ServerPhase::kStarting ? "The service is starting." : "The service stops.");
+  const auto& path = ask.path;
+  if (path.empty()) return kept("/", kForAMoment, [this] { return page_reply(fleet_page(server_)); });
+  if (path[0] == "cells" && path.size() >= 2) return of_cell(ask);
+  if (path[0] == "jobs") return of_job(ask);
+  return not_there();
+}
+
+HttpReply Pages::of_cell(const HttpAsk& ask) {
+  const auto& path = ask.path;
+  const std::string& cell = path[1];
+  if (path.size() == 2)
+    return kept(cell_address(cell), kForAMoment, [&] { return reply_of(cell_page(server_, cell)); });
+  const auto report = [&](const Result<std::string>& page) {
+    return page ? report_reply(*page, cell) : refused_reply(page.error());
+  };
+  if (path.size() == 3 && path[2] == "history")
+    return kept(cell_address(cell) + "/history", kForAWhile, [&] { return report(history_report(server_, cell)); });
+  if (path.size() != 4 || path[2] != "models") return not_there();
+  const auto version = number_in<int>(path[3]);
+  if (!version) return not_there();
+  return kept(fmt::format("{}/models/{}", cell_address(cell), *version), kForAWhile,
+              [&] { return report(model_report(server_, cell, *version)); });
+}
+
+HttpReply Pages::of_job(const HttpAsk& ask) {
+  const auto& path = ask.path;
+  if (path.size() == 1) return kept("/jobs", kForAMoment, [this] { return reply_of(jobs_page(server_)); });
+  const auto job = number_in<std::int64_t>(path[1]);
+  if (!job || path.size() > 3) return not_there();
+  if (path.size() == 2) return reply_of(job_page(server_, *job));
+  return path[2] == "findings" ? findings_reply(server_, *job) : not_there();
+}
+
+std::optional<HttpReply> Pages::find_kept(const std::string& address) {
+  const MutexLock lock(mutex_);
+  std::erase_if(kept_, [now = Clock::now()](const Kept& one) { return one.until <= now; });
+  const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& one) { return one.address == address; });
+  return found == kept_.end() ? std::nullopt : std::optional(found->reply);
+}
+
+HttpReply Pages::kept(const std::string& address, std::chrono::seconds keep, const std::function<HttpReply()>& make) {
+  if (auto reply = find_kept(address)) return *reply;
+  const MutexLock one_at_a_time(making_);
+  if (auto reply = find_kept(address)) return *reply;
+  HttpReply reply = make();
+  const MutexLock lock(mutex_);
+  if (reply.code == 200) kept_.push_front({address, reply, Clock::now() + keep});
+  if (kept_.size() > kMostKept) kept_.pop_back();
+  return reply;
+}
+
+}  // namespace trammel

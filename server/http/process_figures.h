@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace trammel {
+
+/// What the system says of this process, and of the disk that the store is on. What it does not say is 0.
+struct ProcessFigures {
+  double resident_bytes = 0;
+  double processor_s = 0;
+  double threads = 0;
+  double open_files = 0;
+  double started = 0;  ///< Unix time, s
+};
+[[nodiscard]] ProcessFigures process_figures();
+
+struct StoreFileFigures {
+  double bytes = 0;
+  double journal_bytes = 0;  ///< of the write-ahead log
+  double free_bytes = 0;     ///< of the disk, for this process
+};
+[[nodiscard]] StoreFileFigures store_file_figures(const std::string& path);
+
+}  // namespace trammel

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "server/http/watched.h"
+
+namespace trammel {
+
+/// Whether a cell is answered for, and if not, why. README.md of this folder has the table.
+struct CellReadiness {
+  enum class State {
+    kServed,
+    kOnDisk,         ///< served; its model is loaded when it is asked for
+    kOlderServed,    ///< served, with an older version than the one in force
+    kLoading,        ///< dark: its model is not loaded yet
+    kUntrained,      ///< dark: there is no model
+    kInTraining,     ///< dark: the first model is being made
+    kTrainingEnded,  ///< dark: a training has ended without a model in force
+    kOfAnotherRobot,
+    kUnreadable
+  };
+  std::string cell;
+  State state = State::kServed;
+  int version = 0;  ///< in force; 0: none
+  std::string why = {};
+
+  [[nodiscard]] bool is_dark() const { return state > State::kOlderServed; }
+};
+/// `served`, `in_training`.
+[[nodiscard]] const char* to_text(CellReadiness::State state);
+
+/// Of every cell, by name. Asks the store about at most a few dark cells.
+[[nodiscard]] std::vector<CellReadiness> cells_readiness(const Watched& server);
+
+/// What /readyz answers: ready where every cell asked about is, and the server moves.
+struct Readiness {
+  bool ready = false;
+  nlohmann::ordered_json told;
+};
+/// `cell`: of this one alone; empty: of all.
+[[nodiscard]] Readiness readiness(const Watched& server, ServerPhase phase, const std::string& cell);
+
+}  // namespace trammel

@@ -1,0 +1,137 @@
+#include "server/store/backup.h"
+
+#include <SQLiteCpp/Backup.h>
+#include <fcntl.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "server/store/audit.h"
+#include "server/store/audit_rows.h"
+#include "server/store/file_header.h"
+#include "server/store/open_database.h"
+#include "server/store/schema.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPagesAtOnce = 256;  // between two looks at the progress
+
+/// Removes the file in which a copy is made; one that is whole has another name by then.
+class Unfinished {
+ public:
+  explicit Unfinished(std::string path) : path_(std::move(path)) {}
+  ~Unfinished() {
+    std::error_code error;
+    fs::remove(path_, error);
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+
+ private:
+  const std::string path_;
+};
+
+Status on_disk(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool is_there = file >= 0 && ::fsync(file) == 0;
+  const int why = errno;
+  if (file >= 0) ::close(file);
+  if (is_there) return {};
+  return failure(ErrorCode::kInternal, "cannot be written to the disk: {}", std::strerror(why)).in(path);
+}
+
+Status check_is_store(SQLite::Database& database, const std::string& path) {
+  if (database.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return {};
+  return refused("no store").in(path);
+}
+
+std::int64_t count(SQLite::Database& database, const char* sql) { return database.execAndGet(sql).getInt64(); }
+
+/// The trail as a whole, as `read_audit()` verifies it.
+Status check_trail(SQLite::Database& database, StoreCopy& copy) {
+  if (!database.tableExists("audit")) return {};  // of before there was one
+  AuditChain chain;
+  AuditTrail trail;
+  const AuditQuery last{"", 0, 1};
+  while (read_more(database, last, chain, trail)) continue;
+  if (trail.broken) return tl::make_unexpected(*trail.broken);
+  copy.audit_rows = trail.verified;
+  if (!trail.rows.empty()) copy.audit_hash = trail.rows.back().hash;
+  return {};
+}
+
+Result<StoreCopy> checked(SQLite::Database& database, const std::string& path) {
+  if (const Status ours = check_is_store(database, path); !ours) return tl::make_unexpected(ours.error());
+  const std::string pages = database.execAndGet("PRAGMA integrity_check(1)").getString();
+  if (pages != "ok") return failure(ErrorCode::kInternal, "damaged: {}", pages).in(path);
+  StoreCopy copy;
+  if (const auto mark = mark_of(database)) copy.identity = mark->identity;
+  copy.models = count(database, "SELECT COUNT(*) FROM models");
+  copy.batches = count(database, "SELECT COUNT(*) FROM batches");
+  std::error_code error;
+  copy.bytes = static_cast<std::int64_t>(fs::file_size(path, error));
+  if (const Status whole = check_trail(database, copy); !whole) return Failure(whole.error()).in(path);
+  return copy;
+}
+
+/// Copies one moment of it: what is read is held for as long as the transaction is open.
+Status copy_pages(const std::string& from, const std::string& to, const std::function<void(double)>& progress) {
+  SQLite::Database source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+  const SQLite::Transaction moment(source);
+  if (const Status ours = check_is_store(source, from); !ours) return ours;
+  SQLite::Database target(to, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
+  SQLite::Backup backup(target, source);
+  while (backup.executeStep(kPagesAtOnce) != SQLITE_DONE) {
+    const int total = backup.getTotalPageCount();
+    if (progress && total > 0) progress(1 - static_cast<double>(backup.getRemainingPageCount()) / total);
+  }
+  return {};
+}
+
+Status check_is_new(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(path, error))) return {};
+  return refused("is there already").in(path).next("name another, or move it away");
+}
+
+}  // namespace
+
+Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
+                                const std::function<void(double)>& progress) {
+  if (const Status is_new = check_is_new(to); !is_new) return tl::make_unexpected(is_new.error());
+  const std::string part = fmt::format("{}.{}.part", to, ::getpid());
+  const Unfinished unfinished(part);
+  Result<StoreCopy> copy;
+  try {
+    if (const Status copied = copy_pages(from, part, progress); !copied) return tl::make_unexpected(copied.error());
+    copy = check_store_copy(part);
+  } catch (const SQLite::Exception& error) {
+    return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
+  }
+  if (!copy) return copy;
+  if (const Status there = on_disk(part); !there) return tl::make_unexpected(there.error());
+  if (::link(part.c_str(), to.c_str()) != 0)  // unlike a rename it replaces nothing
+    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(to);
+  const fs::path folder = fs::path(to).parent_path();
+  if (const Status there = on_disk(folder.empty() ? "." : folder.string()); !there)
+    return tl::make_unexpected(there.error());
+  return copy;
+}
+
+Result<StoreCopy> check_store_copy(const std::string& path) {
+  try {
+    SQLite::Database database(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    return checked(database, path);
+  } catch (const SQLite::Exception& error) {
+    return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);
+  }
+}
+
+}  // namespace trammel

@@ -1,0 +1,50 @@
+#include "server/trainer/dark_cells.h"
+
+#include "server/compensate/model_file.h"
+#include "server/store/served_models.h"
+#include "server/trainer/acceptance/fits_cell.h"
+
+namespace trammel {
+namespace {
+
+using State = CellAtStart::State;
+
+Result<CellAtStart> look_at(const ServedModels& models, const std::string& name, const Cell& cell) {
+  CellAtStart one{name, State::kDark};
+  bool fits_not = false;
+  const auto served = models.find(name, [&](int version, const std::string& text) {
+    const std::string where = fmt::format("version {} of cell {}", version, name);
+    const auto model = deserialize(text, where, ModelTexts::kAsTheyAre);
+    Status good = model ? check_fits_cell(*model, cell, where) : Status(tl::make_unexpected(model.error()));
+    fits_not = model && !good;
+    if (one.version == 0) one.version = version;
+    if (good && one.why.empty()) one.state = State::kServed;
+    if (good && !one.why.empty()) one.state = State::kOlderServed;
+    if (!good && one.why.empty()) one.why = sentence(good.error());
+    return good || fits_not;  // of a model that does not fit, no other version takes the place
+  });
+  if (!served) return tl::make_unexpected(served.error());
+  if (one.version == 0) {
+    const auto has = models.has(name);
+    if (!has) return tl::make_unexpected(has.error());
+    if (*has) one.why = fmt::format("the versions of cell {} that were in force are not there", name);
+    if (!*has) one.state = State::kUntrained;
+  }
+  return one;
+}
+
+}  // namespace
+
+Result<std::vector<CellAtStart>> cells_at_start(const std::string& path, const ServedCells& cells) {
+  const auto models = ServedModels::open(path);
+  if (!models) return tl::make_unexpected(models.error());
+  std::vector<CellAtStart> all;
+  for (const auto& [name, cell] : cells) {
+    auto one = look_at(*models, name, *cell);
+    if (!one) return tl::make_unexpected(one.error());
+    all.push_back(std::move(*one));
+  }
+  return all;
+}
+
+}  // namespace trammel

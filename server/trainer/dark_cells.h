@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/base/result.h"
+#include "server/trainer/served_cells.h"
+
+namespace trammel {
+
+/// What a start of this program would do to a cell.
+struct CellAtStart {
+  enum class State {
+    kServed,
+    kOlderServed,  ///< with another version than the one in force
+    kUntrained,    ///< nothing was ever in force
+    kDark          ///< something was in force, and this program would serve nothing
+  };
+  std::string cell;
+  State state = State::kServed;
+  int version = 0;  ///< in force; 0: none
+  std::string why = {};
+};
+
+/// Of every cell, by name, from the store at `path`, which is only read, also while a service runs on it: whether this
+/// program can read the model in force, and whether it fits the cell as its file is now. Copies of models beside the
+/// store are not looked at.
+[[nodiscard]] Result<std::vector<CellAtStart>> cells_at_start(const std::string& path, const ServedCells& cells);
+
+}  // namespace trammel

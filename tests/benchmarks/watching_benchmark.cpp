@@ -1,0 +1,100 @@
+// What it costs to be watched: a scrape of a server of many cells over HTTP, and what counting costs each request.
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "server/http/http_server.h"
+#include "server/metrics/operation_counts.h"
+#include "tests/support/demand.h"
+#include "tests/support/http_client.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using test::demand;
+
+constexpr int kCells = 200;
+constexpr int kScrapes = 50;
+
+double milliseconds_since(Clock::time_point began) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - began).count();
+}
+
+ServedCells cells() {
+  ServedCells cells;
+  for (int i = 0; i < kCells; ++i) {
+    const std::string name = fmt::format("cell-{:03}", i);
+    cells[name] = test::small_cell(name);
+  }
+  return cells;
+}
+
+/// As many operations and codes as a service has.
+ServiceFigures figures() {
+  ServiceFigures figures;
+  const LatencyHistogram none;
+  for (int i = 0; i < 9; ++i)
+    figures.operations.push_back(
+        {fmt::format("Operation{}", i), none.counts(), {{"ok", 1}, {"busy", 2}, {"refused", 3}}});
+  figures.queues = {{"predictions", 0}, {"corrections", 0}, {"reads", 0}, {"changes", 0}};
+  for (int i = 0; i < 16; ++i) figures.dropped_packets[fmt::format("reason {}", i)] = 0;
+  return figures;
+}
+
+void print_times(const char* what, std::vector<double> times) {
+  std::sort(times.begin(), times.end());
+  fmt::print("figure {}, median, ms: {:.2f}\n", what, times[times.size() / 2]);
+  fmt::print("figure {}, longest of {}, ms: {:.2f}\n", what, times.size(), times.back());
+}
+
+void scrape() {
+  const test::TemporaryFolder folder;
+  const auto store = demand(Store::open(folder.file("t.db")));
+  ModelRegistry registry;
+  const ServedCells served = cells();
+  Trainer trainer(served, *store, registry, {});
+  for (const auto& [name, cell] : served)
+    registry.publish(std::make_shared<const ServedModel>(ServedModel{name, 1, test::nominal_model(cell, 40)}));
+  const auto port = static_cast<std::uint16_t>(20003 + 4 * (::getpid() % 3000));
+  HttpServer http({"127.0.0.1", port},
+                  {"server-a", "0.1.0", folder.file("t.db"), trainer, *store, registry, figures, [] {
+                     return Movement{true, {}};
+                   }});
+  static_cast<void>(demand(http.start().map([] { return true; })));
+  http.set_phase(ServerPhase::kServing);
+  for (const char* path : {"/metrics", "/readyz", "/healthz"}) {
+    std::vector<double> times;
+    std::size_t bytes = 0;
+    for (int i = 0; i < kScrapes; ++i) {
+      const auto began = Clock::now();
+      bytes = test::http_get(port, path).body.size();
+      times.push_back(milliseconds_since(began));
+    }
+    print_times(fmt::format("{}, {} cells", path, kCells).c_str(), times);
+    fmt::print("{}: {} bytes\n", path, bytes);
+  }
+}
+
+void count() {
+  constexpr int kTimes = 2'000'000;
+  OperationCounts counts;
+  const auto began = Clock::now();
+  for (int i = 0; i < kTimes; ++i) {
+    counts.answered(static_cast<std::size_t>(i % 2), 1);
+    counts.took(std::chrono::nanoseconds(1000 * (i % 4096)));
+  }
+  fmt::print("figure counting one request, ns: {:.1f}\n", 1e6 * milliseconds_since(began) / kTimes);
+}
+
+}  // namespace
+}  // namespace trammel
+
+int main() {
+  trammel::scrape();
+  trammel::count();
+}

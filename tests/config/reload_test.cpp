@@ -1,0 +1,63 @@
+#include "server/config/reload.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/small_cell.h"
+
+namespace trammel {
+namespace {
+
+ServerConfig config() {
+  ServerConfig config;
+  config.cells = {{"cell-7", test::small_cell("cell-7")}};
+  config.dds.server_id = "a";
+  return config;
+}
+
+TEST(Reload, TakesOnLimitsAndTheLogAndNamesWhatHasChanged) {
+  ServerConfig file = config();
+  file.log = {"debug", "", "json"};
+  file.dds.client_requests = 3;
+  file.trainer.queue_capacity = 5;
+  file.trainer.keep.models = 7;
+  const ReloadPlan plan = plan_reload(config(), file);
+  EXPECT_EQ(plan.config.log.level, "debug");
+  EXPECT_EQ(plan.config.log.format, "json");
+  EXPECT_EQ(plan.config.dds.client_requests, 3);
+  EXPECT_EQ(plan.config.trainer.queue_capacity, 5);
+  EXPECT_EQ(plan.config.trainer.keep.models, 7);
+  EXPECT_EQ(plan.now, (std::vector<std::string>{"log: level", "log: format", "dds: client_requests",
+                                                "trainer: queue_capacity", "trainer: keep_models"}));
+  EXPECT_TRUE(plan.later.empty());
+}
+
+TEST(Reload, LeavesAndNamesWhatChangesWithTheNextStartOnly) {
+  ServerConfig file = config();
+  file.cells = {{"cell-8", test::small_cell("cell-8")}};
+  file.dds.compute_workers = 9;
+  file.trainer.max_poses = 11;
+  file.log.file = "elsewhere.log";
+  const ReloadPlan plan = plan_reload(config(), file);
+  EXPECT_TRUE(plan.now.empty());
+  EXPECT_EQ(plan.config.dds.compute_workers, config().dds.compute_workers);
+  EXPECT_TRUE(plan.config.cells.contains("cell-7"));
+  EXPECT_FALSE(plan.config.cells.contains("cell-8"));
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"dds: compute_workers", "trainer: max_poses", "log: file",
+                                                  "cells: cell-8", "cells: cell-7 (left out)"}));
+}
+
+TEST(Reload, OptionsOfTheCommandLineAreNoChange) {
+  ServerConfig present = config();
+  present.dds.port = 20000;
+  present.dds.domain = 7;
+  present.store = "other.db";
+  present.http.port = 20001;
+  const ReloadPlan plan = plan_reload(present, config());
+  EXPECT_TRUE(plan.now.empty() && plan.later.empty());
+  EXPECT_EQ(plan.config.dds.port, 20000);
+  EXPECT_EQ(plan.config.store, "other.db");
+  EXPECT_EQ(plan.config.http.port, 20001);
+}
+
+}  // namespace
+}  // namespace trammel

@@ -1,0 +1,283 @@
+// A real daemon, watched over HTTP.
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/base/text_file.h"
+#include "tests/support/daemon.h"
+#include "tests/support/http_client.h"
+#include "tests/support/stopped_thread.h"
+#include "tests/support/virtual_cell.h"
+
+namespace trammel {
+namespace {
+
+using std::chrono::seconds;
+constexpr seconds kLimit{30};
+
+class WatchingTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_config("");
+    daemon_.start();
+  }
+  /// The daemon's file with more sections.
+  void write_config(const std::string& more, const std::string& log = "log: {level: debug}\n") {
+    if (original_.empty()) original_ = test::read_file(daemon_.config_path());
+    std::string text = original_.substr(0, original_.find("log:"));
+    ASSERT_TRUE(
+        write_text_file(daemon_.config_path(), fmt::format("{}{}http: {{port: {}}}\n{}", text, log, port(), more)));
+  }
+  [[nodiscard]] std::uint16_t port() const { return static_cast<std::uint16_t>(daemon_.port() + 1); }
+  [[nodiscard]] test::HttpAnswer get(const std::string& path) const { return test::http_get(port(), path); }
+  /// The value of the first series that begins so; -1: there is none.
+  [[nodiscard]] double metric(const std::string& beginning) const {
+    const std::string text = "\n" + get("/metrics").body;
+    const std::size_t at = text.find("\n" + beginning);
+    if (at == std::string::npos) return -1;
+    const std::size_t end = text.find('\n', at + 1);
+    return std::stod(text.substr(text.rfind(' ', end) + 1));
+  }
+
+  std::string original_;
+  test::Daemon daemon_;
+};
+
+TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
+  EXPECT_EQ(get("/healthz").code, 200);
+  const auto dark = get("/readyz");
+  EXPECT_EQ(dark.code, 503);
+  EXPECT_EQ(nlohmann::json::parse(dark.body)["dark"][0]["state"], "untrained");
+
+  auto session = client::Session::open(daemon_.session_options());
+  ASSERT_TRUE(session) << session.error().message;
+  client::CallContext context;
+  context.cell = "cell-7";
+  EXPECT_FALSE((*session)->predict_error(context, test::virtual_joints(1, 7))) << "there is no model";
+  const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+  ASSERT_TRUE(job) << job.error().message;
+  ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
+  ASSERT_TRUE((*session)->predict_error(context, test::virtual_joints(3, 7)));
+
+  EXPECT_EQ(get("/readyz").code, 200) << get("/readyz").body;
+  EXPECT_EQ(get("/readyz?cell=cell-7").code, 200);
+  EXPECT_EQ(get("/readyz?cell=cell-9").code, 503);
+  EXPECT_GE(metric("trammel_requests_total{operation=\"PredictError\",result=\"not_found\"}"), 1);
+  EXPECT_GE(metric("trammel_requests_total{operation=\"PredictError\",result=\"ok\"}"), 1);
+  EXPECT_GE(metric("trammel_request_seconds_count{operation=\"SubmitMeasurements\"}"), 1);
+  EXPECT_EQ(metric("trammel_jobs_ended_total{verdict=\"in_force\"}"), 1);
+  EXPECT_EQ(metric("trammel_cell_ready{cell=\"cell-7\",state=\"served\"}"), 1);
+  EXPECT_GT(metric("trammel_store_bytes"), 10000);
+  EXPECT_NE(get("/").body.find("All 1 cells are answered for"), std::string::npos);
+  EXPECT_NE(get("/cells/cell-7/models/1").body.find("lt-07"), std::string::npos);
+  EXPECT_EQ(get("/nothing").code, 404);
+  EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
+}
+
+TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
+  pid_t status = 0;
+  for (const test::ThreadOf& thread : test::threads_of(daemon_.process().pid()))
+    if (thread.name == "status") status = thread.id;
+  ASSERT_NE(status, 0);
+  EXPECT_EQ(get("/healthz").code, 200);
+  test::StoppedThread stopped(status);
+  ASSERT_TRUE(stopped.is_stopped());
+  bool told = false;
+  const auto until = std::chrono::steady_clock::now() + kLimit;
+  while (std::chrono::steady_clock::now() < until) {
+    const auto health = get("/healthz");
+    if (health.code == 0) break;  // it has ended
+    if (health.code != 503 || health.body.find("\"status\"") == std::string::npos) continue;
+    told = true;
+    const auto ready = get("/readyz");
+    if (ready.code != 0) {
+      EXPECT_EQ(ready.code, 503);
+    }
+    break;
+  }
+  EXPECT_TRUE(told);
+  EXPECT_TRUE(daemon_.process().wait_for_line("ends at once", kLimit)) << daemon_.process().standard_error();
+  stopped.bury();
+  EXPECT_EQ(daemon_.process().wait(kLimit), 70);
+}
+
+TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNothing) {
+  EXPECT_FALSE(daemon_.process().wait_for_line("\"event\"", std::chrono::milliseconds(1)));
+  write_config("trainer: {queue_capacity: 3, max_poses: 4000}\n", "log: {level: debug, format: json}\n");
+  daemon_.process().signal(SIGHUP);
+  ASSERT_TRUE(daemon_.process().wait_for_line("\"event\":\"reloaded\"", kLimit)) << daemon_.process().standard_error();
+  const std::string said = daemon_.process().standard_error();
+  EXPECT_NE(said.find("log: format, trainer: queue_capacity"), std::string::npos) << said;
+  EXPECT_NE(said.find("trainer: max_poses changes with the next start only"), std::string::npos) << said;
+
+  write_config("trainr: {}\n", "log: {level: wran, format: text}\n");
+  daemon_.process().signal(SIGHUP);
+  ASSERT_TRUE(daemon_.process().wait_for_line("everything stays as it was", kLimit));
+  EXPECT_TRUE(daemon_.process().wait_for_line("did you mean warn", kLimit)) << daemon_.process().standard_error();
+  const std::string last = daemon_.process().standard_error();
+  EXPECT_EQ(last.find('{', last.rfind('\n', last.size() - 2) + 1), last.rfind('\n', last.size() - 2) + 1)
+      << "still JSON";
+  EXPECT_EQ(get("/healthz").code, 200);
+  EXPECT_EQ(daemon_.stop(), 0);
+}
+
+TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
+  EXPECT_EQ(daemon_.stop(), 0);
+  write_config("", "log: {level: debug, format: json}\n");
+  daemon_.start();
+  auto session = client::Session::open(daemon_.session_options());
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_FALSE((*session)->submit_measurements("cell-9", "b1", "q1_deg\n"));
+  ASSERT_TRUE(daemon_.process().wait_for_line("request_refused", kLimit)) << daemon_.process().standard_error();
+  EXPECT_EQ(daemon_.stop(), 0);
+  std::istringstream lines(daemon_.process().standard_error());
+  bool refused = false;
+  for (std::string line; std::getline(lines, line);) {
+    const auto fact = nlohmann::json::parse(line, nullptr, false);
+    ASSERT_TRUE(fact.is_object()) << line;
+    EXPECT_TRUE(fact.contains("time") && fact.contains("level") && fact.contains("event")) << line;
+    if (fact["event"] != "request_refused") continue;
+    refused = true;
+    EXPECT_EQ(fact["operation"], "SubmitMeasurements");
+    EXPECT_EQ(fact["cell"], "cell-9");
+    EXPECT_EQ(fact["result"], "not_found");
+    EXPECT_EQ(fact["who"].get<std::string>().size(), 24u) << line;
+    EXPECT_TRUE(fact["request"].get<std::string>().starts_with(fact["who"].get<std::string>())) << line;
+    EXPECT_FALSE(fact["trace"].get<std::string>().empty()) << line;
+  }
+  EXPECT_TRUE(refused);
+}
+
+/// Where a manager of services listens.
+class ManagerSocket {
+ public:
+  ManagerSocket() : path_(folder_.file("notify")), socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un to{};
+    to.sun_family = AF_UNIX;
+    path_.copy(to.sun_path, sizeof(to.sun_path) - 1);
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), 0);
+  }
+  ~ManagerSocket() { ::close(socket_); }
+  ManagerSocket(const ManagerSocket&) = delete;
+  ManagerSocket& operator=(const ManagerSocket&) = delete;
+
+  /// Until it hears something with this in it.
+  [[nodiscard]] bool hears(const std::string& what) {
+    const auto until = std::chrono::steady_clock::now() + kLimit;
+    while (std::chrono::steady_clock::now() < until) {
+      pollfd look{socket_, POLLIN, 0};
+      if (::poll(&look, 1, 200) <= 0) continue;
+      std::array<char, 4096> text{};
+      const ssize_t size = ::recv(socket_, text.data(), text.size(), 0);
+      if (size > 0 && std::string(text.data(), static_cast<std::size_t>(size)).find(what) != std::string::npos)
+        return true;
+    }
+    return false;
+  }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  test::TemporaryFolder folder_;
+  const std::string path_;
+  const int socket_;
+};
+
+TEST(ServiceManagerTest, ItIsToldWhatTheDaemonDoesFromItsStartToItsEnd) {
+  ManagerSocket manager;
+  test::Daemon daemon;
+  std::vector<std::string> command = {"/usr/bin/env", "NOTIFY_SOCKET=" + manager.path(), "WATCHDOG_USEC=1500000"};
+  for (const std::string& word : daemon.command_line()) command.push_back(word);
+  test::Process process(command);
+  EXPECT_TRUE(manager.hears("READY=1"));
+  EXPECT_TRUE(manager.hears("WATCHDOG=1"));
+  process.signal(SIGHUP);
+  EXPECT_TRUE(manager.hears("RELOADING=1"));
+  EXPECT_TRUE(manager.hears("READY=1"));
+  process.signal(SIGTERM);
+  EXPECT_TRUE(manager.hears("STOPPING=1"));
+  EXPECT_EQ(process.wait(kLimit), 0) << process.standard_error();
+}
+
+TEST(SupervisedReloadTest, ASupervisorPassesTheRequestOnAndGoesOnSupervising) {
+  const test::Daemon daemon;
+  std::vector<std::string> command = {TRAMMEL_SOURCE_DIR "/deploy/supervise"};
+  for (const std::string& word : daemon.command_line()) command.push_back(word);
+  test::Process supervisor(command);
+  ASSERT_TRUE(supervisor.wait_for_line("ready", kLimit)) << supervisor.standard_error();
+  supervisor.signal(SIGHUP);
+  EXPECT_TRUE(supervisor.wait_for_line("read again", kLimit)) << supervisor.standard_error();
+  supervisor.signal(SIGTERM);
+  EXPECT_EQ(supervisor.wait(kLimit), 0) << supervisor.standard_error();
+  EXPECT_NE(supervisor.standard_error().find("after SIGTERM; not started again"), std::string::npos);
+}
+
+TEST(DaemonCheckTest, TheCellsThatWouldGoDarkAreNamedAlsoWhileTheServiceRuns) {
+  test::Daemon daemon;
+  daemon.start();
+  {
+    auto session = client::Session::open(daemon.session_options());
+    ASSERT_TRUE(session) << session.error().message;
+    const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+    ASSERT_TRUE(job) << job.error().message;
+    ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
+  }
+  std::vector<std::string> command = daemon.command_line();
+  command.emplace_back("--check");
+  EXPECT_EQ(test::run(command).exit_code, 0);
+  const std::string cell_file = std::filesystem::path(daemon.config_path()).replace_filename("cell-7.yaml");
+  std::string cell = test::read_file(cell_file);
+  const std::string tool = "xyz_mm: [100, 0, 150]";
+  ASSERT_NE(cell.find(tool), std::string::npos) << cell;
+  cell.replace(cell.find(tool), tool.size(), "xyz_mm: [140, 0, 150]");
+  ASSERT_TRUE(write_text_file(cell_file, cell));
+  const test::Finished checked = test::run(command);
+  EXPECT_EQ(checked.exit_code, 1) << checked.err;
+  EXPECT_NE(checked.err.find("cell cell-7 would go dark"), std::string::npos) << checked.err;
+  EXPECT_EQ(daemon.stop(), 0);
+}
+
+TEST(DaemonBackupTest, ACopyThatIsMadeWhileTheDaemonServesServesTheSameModelElsewhere) {
+  test::Daemon daemon;
+  daemon.start();
+  const auto answer = [&daemon]() -> std::string {
+    auto session = client::Session::open(daemon.session_options());
+    EXPECT_TRUE(session) << session.error().message;
+    const auto text = (*session)->export_model("cell-7", 0);
+    EXPECT_TRUE(text) << text.error().message;
+    return text.value_or("");
+  };
+  {
+    auto session = client::Session::open(daemon.session_options());
+    ASSERT_TRUE(session) << session.error().message;
+    const auto job = (*session)->submit_measurements("cell-7", "lt-07", test::virtual_batch_csv(40, 1));
+    ASSERT_TRUE(job) << job.error().message;
+    ASSERT_TRUE((*session)->wait_for_job(*job, seconds(120), nullptr));
+  }
+  const std::string before = answer();
+  const test::TemporaryFolder folder;
+  const test::Finished copied = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--store",
+                                           daemon.store_path(), "-o", folder.file("copy.db"), "--json", "-"});
+  ASSERT_EQ(copied.exit_code, 0) << copied.err;
+  EXPECT_EQ(nlohmann::json::parse(copied.out)["models"], 1);
+  EXPECT_EQ(test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "backup", "--check", folder.file("copy.db")}).exit_code,
+            0);
+  EXPECT_EQ(answer(), before) << "it serves on";
+  EXPECT_EQ(daemon.stop(), 0);
+  std::filesystem::remove_all(daemon.store_path() + ".models");
+  std::filesystem::remove(daemon.store_path());
+  std::filesystem::rename(folder.file("copy.db"), daemon.store_path());
+  daemon.start();
+  EXPECT_EQ(answer(), before) << "bit for bit";
+  EXPECT_EQ(daemon.stop(), 0);
+}
+
+}  // namespace
+}  // namespace trammel

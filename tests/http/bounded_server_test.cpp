@@ -1,0 +1,141 @@
+#include "server/http/bounded_server.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <memory>
+#include <vector>
+
+#include "tests/support/http_client.h"
+
+namespace trammel {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using test::http_exchange;
+using test::http_get;
+using test::OpenConnection;
+using test::parse_http;
+
+class BoundedServerTest : public testing::Test {
+ protected:
+  void start(const HttpLimits& limits = {}, HttpHandler handler = echo) {
+    auto started = BoundedServer::start("127.0.0.1", kPort, limits, std::move(handler));
+    ASSERT_TRUE(started) << started.error().message;
+    server_ = std::move(*started);
+  }
+  static HttpReply echo(const HttpAsk& ask) {
+    std::string text;
+    for (const std::string& word : ask.path) text += word + "|";
+    for (const auto& [name, value] : ask.options) text += name + "=" + value + "|";
+    return {200, "text/plain; charset=utf-8", text};
+  }
+  static int code_of(const std::string& request) { return parse_http(http_exchange(kPort, request)).code; }
+
+  inline static const auto kPort = static_cast<std::uint16_t>(20002 + 4 * (::getpid() % 3000));
+  std::unique_ptr<BoundedServer> server_;
+};
+
+TEST_F(BoundedServerTest, AnswersWithTheWordsOfThePathAndTheOptions) {
+  start();
+  EXPECT_EQ(http_get(kPort, "/cells/a%20b/models/3?cell=x%2Fy").body, "cells|a b|models|3|cell=x/y|");
+  EXPECT_EQ(http_get(kPort, "/").body, "");
+}
+
+TEST_F(BoundedServerTest, TakesNothingButReading) {
+  start();
+  EXPECT_EQ(code_of("POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 3\r\n\r\nabc"), 405);
+  EXPECT_EQ(code_of("DELETE /cells/a HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"), 405);
+  const auto head = parse_http(http_exchange(kPort, "HEAD /a HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+  EXPECT_EQ(head.code, 200);
+  EXPECT_EQ(head.body, "");
+}
+
+TEST_F(BoundedServerTest, AnswersToNamesOfThisHostOnly) {
+  start();
+  for (const char* host : {"127.0.0.1", "127.0.0.1:9464", "localhost", "localhost:80", "127.1.2.3"})
+    EXPECT_EQ(code_of(std::string("GET / HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"), 200) << host;
+  for (const char* host : {"evil.example", "127.0.0.1.evil.example", "10.0.0.1", "", "127.0.0.1@evil.example"})
+    EXPECT_EQ(code_of(std::string("GET / HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"), 421) << host;
+}
+
+TEST_F(BoundedServerTest, BytesThatAreNoRequestEndTheirConnectionAndNothingElse) {
+  start();
+  const std::string long_line(20000, 'a'), deep = "/" + std::string(1900, '/');
+  for (const std::string& bytes :
+       {std::string("\r\n\r\n"), std::string("GET\r\n\r\n"), std::string(3000, '\0'),
+        "GET /" + long_line + " HTTP/1.1\r\n\r\n", "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + long_line + "\r\n\r\n",
+        "GET " + deep + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        std::string("GET /%zz%00%ff HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        "GET / HTTP/1.1\r\nHost: localhost\r\nRange: bytes=" + std::string(4000, '0') + "-\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-0" +
+            [] {
+              std::string more;
+              for (int i = 0; i < 1800; ++i) more += ",1-1";
+              return more;
+            }() +
+            "\r\n\r\n",
+        std::string(
+            "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n")}) {
+    static_cast<void>(http_exchange(kPort, bytes, seconds(5)));
+    EXPECT_EQ(http_get(kPort, "/still").body, "still|") << bytes.substr(0, 60);
+  }
+}
+
+TEST_F(BoundedServerTest, WhoeverSendsSlowlyIsCutOffAndHoldsUpNobodyForLong) {
+  HttpLimits limits;
+  limits.workers = 2;
+  limits.reading = milliseconds(300);
+  start(limits);
+  std::vector<std::unique_ptr<OpenConnection>> slow;
+  for (int i = 0; i < 8; ++i) {
+    slow.push_back(std::make_unique<OpenConnection>(kPort));
+    slow.back()->send("GET / HT");
+  }
+  EXPECT_EQ(http_get(kPort, "/a").code, 200) << "behind four times the time for a request";
+  for (const auto& connection : slow) EXPECT_TRUE(connection->closes_within(seconds(20)));
+}
+
+TEST_F(BoundedServerTest, MoreThanMayWaitAreSentAwayAtOnceAndCounted) {
+  HttpLimits limits;
+  limits.workers = 1;
+  limits.waiting = 2;
+  limits.reading = seconds(20);
+  start(limits);
+  std::vector<std::unique_ptr<OpenConnection>> waiting;
+  for (int i = 0; i < 3; ++i) waiting.push_back(std::make_unique<OpenConnection>(kPort));
+  // The first may not be taken from the queue yet.
+  for (int i = 0; i < 3; ++i) waiting.push_back(std::make_unique<OpenConnection>(kPort));
+  EXPECT_EQ(parse_http(waiting.back()->read(seconds(10))).code, 503);
+  EXPECT_GE(server_->shed(), 1u);
+  waiting.front()->send("GET /first HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "first|") << "who came first is served";
+}
+
+TEST_F(BoundedServerTest, AHandlerThatThrowsIsAnAnswer) {
+  start({}, [](const HttpAsk&) -> HttpReply { throw std::runtime_error("no memory"); });
+  EXPECT_EQ(http_get(kPort, "/").code, 500);
+  EXPECT_EQ(http_get(kPort, "/").code, 500);
+}
+
+TEST_F(BoundedServerTest, APortThatIsTakenAndAnAddressThatLeavesThisHostAreRefused) {
+  start();
+  const auto second = BoundedServer::start("127.0.0.1", kPort, {}, echo);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kConflict);
+  for (const char* address : {"0.0.0.0", "192.168.1.4", "localhost", "::1", "", "128.0.0.1"})
+    EXPECT_FALSE(BoundedServer::start(address, static_cast<std::uint16_t>(kPort + 1), {}, echo)) << address;
+}
+
+TEST_F(BoundedServerTest, EndsWhileConnectionsWait) {
+  start();
+  const OpenConnection idle(kPort);
+  server_.reset();
+  EXPECT_TRUE(idle.closes_within(seconds(20)));
+  start();
+  EXPECT_EQ(http_get(kPort, "/again").body, "again|");
+}
+
+}  // namespace
+}  // namespace trammel

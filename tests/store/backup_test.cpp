@@ -1,0 +1,156 @@
+#include "server/store/backup.h"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "server/base/hash.h"
+#include "server/compensate/model_file.h"
+#include "server/store/store.h"
+#include "tests/support/demand.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+using test::demand;
+namespace fs = std::filesystem;
+
+/// Every row of every table, as SQLite prints it.
+std::string content_of(const std::string& path) {
+  SQLite::Database file(path, SQLite::OPEN_READONLY);
+  std::vector<std::string> tables;
+  SQLite::Statement names(file, "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name");
+  while (names.executeStep()) tables.push_back(names.getColumn(0).getString());
+  std::string content;
+  for (const std::string& table : tables) {
+    content += table + "\n";
+    SQLite::Statement rows(file, "SELECT * FROM " + table);
+    while (rows.executeStep()) {
+      for (int i = 0; i < rows.getColumnCount(); ++i) content += rows.getColumn(i).getString() + "|";
+      content += "\n";
+    }
+  }
+  return content;
+}
+
+class BackupTest : public testing::Test {
+ protected:
+  std::int64_t submit(const std::string& id) {
+    StoredJob job;
+    job.cell = "cell-7";
+    job.batch_ids = {id};
+    const std::string csv = "q1_deg\n" + id + "\n" + std::string(20000, '#');
+    return demand(store_->add_batch({"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1}, job)).id;
+  }
+  void train(const std::string& id) {
+    ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id), true, "judged"));
+  }
+  Result<StoreCopy> back_up() { return back_up_store(path_, copy_); }
+
+  test::TemporaryFolder folder_;
+  const std::string path_ = folder_.file("trammel.db"), copy_ = folder_.file("copy.db");
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
+  std::unique_ptr<Store> store_ = demand(Store::open(path_));
+  int trained_ = 0;
+};
+
+TEST_F(BackupTest, ACopyOfAStoreThatIsServedHoldsEveryRowOfIt) {
+  train("lt-07");
+  train("lt-08");
+  const auto copy = back_up();
+  ASSERT_TRUE(copy) << copy.error().message;
+  EXPECT_EQ(copy->models, 2);
+  EXPECT_EQ(copy->batches, 2);
+  EXPECT_EQ(copy->audit_rows, demand(store_->audit()).verified);
+  EXPECT_EQ(copy->audit_hash, demand(store_->audit()).rows.back().hash);
+  EXPECT_EQ(content_of(copy_), content_of(path_));
+}
+
+TEST_F(BackupTest, AStoreThatIsPutBackServesWhatItServedBitForBit) {
+  train("lt-07");
+  train("lt-08");
+  const std::string before = serialize(demand(store_->model("cell-7", 2)));
+  const std::string batch = demand(store_->batch("cell-7", "lt-07")).csv;
+  ASSERT_TRUE(back_up());
+  store_.reset();
+  fs::remove_all(path_ + ".models");
+  for (const char* more : {"", "-wal", "-shm"}) fs::remove(path_ + more);
+  fs::rename(copy_, path_);
+  store_ = demand(Store::open(path_));
+  EXPECT_FALSE(store_->state().why_not_written);
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 2);
+  EXPECT_EQ(serialize(demand(store_->model("cell-7", 2))), before);
+  EXPECT_EQ(demand(store_->batch("cell-7", "lt-07")).csv, batch);
+  EXPECT_FALSE(demand(store_->audit()).broken);
+  train("lt-09");
+  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 3) << "and it goes on";
+}
+
+TEST_F(BackupTest, WhatIsWrittenMeanwhileIsWrittenAndTheCopyIsOfOneMoment) {
+  for (int i = 0; i < 60; ++i) submit(fmt::format("b{}", i));
+  std::atomic<int> written = 0;
+  std::jthread writer;
+  const auto copy = back_up_store(path_, copy_, [&](double share) {
+    if (!writer.joinable() && share > 0.1) {
+      writer = std::jthread([&] {
+        for (int i = 0; i < 20; ++i) {
+          submit(fmt::format("more{}", i));
+          ++written;
+        }
+      });
+    }
+    if (share > 0.5) {
+      while (written < 20) std::this_thread::yield();
+    }
+  });
+  ASSERT_TRUE(copy) << copy.error().message;
+  EXPECT_EQ(written, 20) << "the writer waited for nothing";
+  EXPECT_EQ(copy->batches, 60);
+  EXPECT_EQ(demand(store_->batches("cell-7")).size(), 80u);
+  EXPECT_FALSE(store_->state().why_not_written);
+  submit("last");
+  store_.reset();
+  EXPECT_EQ(SQLite::Database(path_, SQLite::OPEN_READONLY).execAndGet("PRAGMA integrity_check").getString(), "ok");
+}
+
+TEST_F(BackupTest, AFileThatIsThereIsNotWrittenOver) {
+  submit("b1");
+  std::ofstream(copy_) << "mine";
+  const auto copy = back_up();
+  ASSERT_FALSE(copy);
+  EXPECT_EQ(copy.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(test::read_file(copy_), "mine");
+  EXPECT_FALSE(back_up_store(path_, path_)) << "nor the store itself";
+}
+
+TEST_F(BackupTest, WhatIsNoStoreOrIsDamagedIsRefusedAndLeavesNoFile) {
+  const std::string text = folder_.write("notes.txt", std::string(5000, 'x'));
+  EXPECT_FALSE(back_up_store(text, copy_));
+  EXPECT_FALSE(back_up_store(folder_.file("nothing.db"), copy_));
+  EXPECT_FALSE(fs::exists(folder_.file("nothing.db")));
+  EXPECT_FALSE(fs::exists(copy_));
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
+    EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
+}
+
+TEST_F(BackupTest, ACopyThatWasChangedAfterwardsIsNotWhole) {
+  train("lt-07");
+  ASSERT_TRUE(back_up());
+  ASSERT_TRUE(check_store_copy(copy_));
+  SQLite::Database(copy_, SQLite::OPEN_READWRITE).exec("UPDATE audit SET who = 'nobody' WHERE number = 2");
+  const auto changed = check_store_copy(copy_);
+  ASSERT_FALSE(changed);
+  EXPECT_EQ(changed.error().row, 2);
+  std::string bytes = test::read_file(copy_);
+  std::ofstream(copy_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
+  EXPECT_FALSE(check_store_copy(copy_)) << "half of it is missing";
+}
+
+}  // namespace
+}  // namespace trammel
