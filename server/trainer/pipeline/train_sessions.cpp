@@ -1,6 +1,7 @@
 #include "server/trainer/pipeline/train_sessions.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/measurement/sessions.h"
 #include "server/trainer/pipeline/given_up.h"
@@ -10,7 +11,8 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostChanges = 12;
-constexpr double kInsteadOfNoise = 10;  // nat of evidence: so much more likely must a change be than a noisy session
+// Nat, beside Schwarz's price of what it adds: so much more likely must a change make the data than a noisy session.
+constexpr double kInsteadOfNoise = 10;
 
 /// The sources of the model as they are: each in the form and with the orders that were found.
 std::vector<std::string> names_of(const PhysicalModel& model) {
@@ -19,22 +21,27 @@ std::vector<std::string> names_of(const PhysicalModel& model) {
   return names;
 }
 
-/// A change, and by how much the log evidence must rise with it; none: the log likelihood must rise.
 struct Proposal {
   Change change;
-  std::optional<double> evidence = {};
+  bool instead_of_noise = false;
 };
 
 std::optional<Proposal> proposed_change(const CalibrationResult& found, const MeasurementBatch& batch) {
   if (std::optional<Change> seen = strongest_change(found, batch)) return Proposal{std::move(*seen)};
   std::optional<Change> instead = change_instead_of_noise(found, batch);
   if (!instead) return std::nullopt;
-  return Proposal{std::move(*instead), kInsteadOfNoise};
+  return Proposal{std::move(*instead), true};
 }
 
 bool is_better(const CalibrationResult& with, const CalibrationResult& without, const Proposal& proposal) {
-  if (proposal.evidence) return with.log_evidence > without.log_evidence + *proposal.evidence;
-  return with.log_likelihood > without.log_likelihood;
+  double price = 0;
+  if (proposal.instead_of_noise) {
+    double rows = 0;  // that show it
+    for (std::size_t s = proposal.change.session; s < with.sessions.size(); ++s) rows += 3.0 * with.sessions[s].poses;
+    const auto added = static_cast<double>(with.parameters.size()) - static_cast<double>(without.parameters.size());
+    price = kInsteadOfNoise + 0.5 * added * std::log(rows);
+  }
+  return with.log_likelihood > without.log_likelihood + price;
 }
 
 /// The sources of the model, and what the change adds.
