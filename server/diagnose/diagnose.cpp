@@ -141,7 +141,8 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   diagnosis.batch = as_recorded(prepared->surrogates, found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, *prepared, diagnosis);
-  tell_findings(explained, *prepared, diagnosis.batch, diagnosis);
+  tell_findings(explained, *prepared, diagnosis.batch, leaves_more_than_noise(explained.after, prepared->repeats),
+                diagnosis);
   tell_since(batch.rows(), diagnosis);
   tell_noise(explained, *prepared, diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);

@@ -95,12 +95,13 @@ inline constexpr double kMisjudgedHeldOut = 0.01;
 
 // What is left, against what is stated for one measurement.
 
-/// Times the stated standard deviation, which is known to a tenth: worth a note.
-inline constexpr double kLargerNoise = 1.1;
-/// Times the stated standard deviation: something is there that is not the measurement.
-inline constexpr double kMoreThanNoise = 1.3;
-/// Standard deviations that chance exceeds in 1 of 100 batches.
-inline constexpr double kOneInHundred = 2.326;
+/// Standard uncertainty of the stated standard deviation, as a share of it.
+inline constexpr double kSigmaKnownTo = 0.1;
+/// Standard uncertainties, of sigma and of chance together, beyond which what is left is not the measurement; of chance
+/// alone, beyond which it is worth a note.
+inline constexpr double kNoiseDeviations = 2;
+/// Times the stated standard deviation, beyond which nobody calls it noise: with poses enough that chance is small.
+inline constexpr double kMoreThanNoise = 1 + kNoiseDeviations * kSigmaKnownTo;
 
 // What these poses could not have shown, and what they cannot tell apart.
 

@@ -62,6 +62,7 @@ class Plan {
     decidable();
     nulls();
     for (const std::string& kind : hidden::unknown_kinds()) add("unknown", kind, 120, settings_.trials);
+    for (const std::string& kind : hidden::slow_kinds()) add("slow", kind, 120, settings_.trials);
     for (const std::string& kind : hidden::undecidable_kinds()) add("undecidable", kind, 120, settings_.trials);
     add("three", "mixture3", 60, settings_.trials);
     add("two", "mixture2", 60, settings_.trials);

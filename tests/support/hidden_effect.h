@@ -51,5 +51,7 @@ struct Scene {
 [[nodiscard]] HiddenCause draw_cause(const std::string& cause, const Scene& scene, Random& random);
 /// `cause` with its numbers and shape drawn, of a size as robots show it.
 [[nodiscard]] Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random);
+/// What moves slowly with time: the zero of a joint (`slow_zero`) or the stand of the tracker (`slow_stand`).
+[[nodiscard]] Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random);
 
 }  // namespace trammel::hidden

@@ -38,6 +38,14 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
+/// Whether the cause begins at more than one pose.
+bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
+  return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose &&
+         std::count_if(found.begin(), found.end(), [&](const Cause& other) {
+           return other.cause == cause.cause && other.joint == cause.joint;
+         }) > 1;
+}
+
 /// Adds what is told by the time alone.
 void add_going_with_time(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
@@ -66,7 +74,8 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 
 }  // namespace
 
-Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside) {
+Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside,
+                bool in_both_halves) {
   const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
   const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
   std::vector<Cause> many = descriptions_of_many(cause, beside.found);
@@ -77,16 +86,25 @@ Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>&
   if (by_surrogate) add_rivals_of_surrogate(cause, could_also_be);
   if (dwarfed) could_also_be.push_back(unknown_cause());
   could_also_be.insert(could_also_be.end(), many.begin(), many.end());
+  const bool again = begins_again(cause, beside.found);
+  if (again) add(could_also_be, unknown_cause(cause.joint));
+  const bool by_half = beside.more_than_noise && !in_both_halves;
+  if (by_half) add(could_also_be, unknown_cause(cause.joint));
+  const bool whole = !beside.more_than_noise || !could_also_be.empty();
+  if (!whole) could_also_be.push_back(unknown_cause(cause.joint));
 
   const auto action = [&]() -> std::string {
     if (!many.empty())
       return fmt::format("measure more poses over the range of joint {}: its error has no single order",
                          cause.joint + 1);
     if (dwarfed) return "find first what is unknown here: it is several times larger";
+    if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
+    if (by_half)
+      return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
     if (by_surrogate) return what_to_record(cause, beside.surrogates);
     return action_for(cause, rivals);
   };
-  return {std::move(could_also_be), action()};
+  return {std::move(could_also_be), whole, action()};
 }
 
 }  // namespace trammel::cause_search
