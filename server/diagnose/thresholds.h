@@ -24,6 +24,11 @@ inline constexpr double kBeyondFolds = 6;
 inline constexpr double kFoldContender = 0.3;
 /// Nat by which an anonymous function must beat the best named cause: odds of 7 to 1.
 inline constexpr double kUnnamedMargin = 2;
+/// Nat by which something slow must beat a step or a drift to be taken in its place: odds of 150 to 1. Steps are what
+/// happens to robots, and what is slow has more courses than anybody lists.
+inline constexpr double kSlowInstead = 5;
+/// The same to put it in doubt.
+inline constexpr double kSlowDoubted = 0;
 /// How many named causes together may beat one anonymous function.
 inline constexpr int kNamedPath = 3;
 /// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and a map of a joint an

@@ -45,7 +45,7 @@ TEST_P(SlowTime, IsNotNamedAStepAndNothingOfItGoesIntoTheCell) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Effects, SlowTime, testing::Values("slow_zero", "slow_stand"),
+INSTANTIATE_TEST_SUITE_P(Effects, SlowTime, testing::Values("slow_zero", "slow_stand", "slow_growth"),
                          [](const auto& kind) { return std::string(kind.param).substr(5); });
 
 TEST(SlowTime, AStepIsStillAStep) {

@@ -125,7 +125,7 @@ void arrange(Draft& draft) {
   if (has("payload")) draft.plan.loads = 2;
   if (whole(draft.random, 0, 1) == 1) draft.plan.approach = Approach::kBothSides;
   if (has("backlash_one_side")) draft.plan.approach = Approach::kFromBelow;
-  if (has("constant_warmth")) draft.plan.constant_temperature = true;
+  if (has("constant_warmth") || has("slow_growth")) draft.plan.constant_temperature = true;
   if (has("replica_ripple_1dim")) draft.plan.ranges = "1dim";
   if (has("replica_ripple_6dim") || has("replica_tool")) draft.plan.ranges = "6dim-l";
   if (has("replica_p28")) world.orientation = false;
@@ -438,7 +438,7 @@ const std::vector<std::string>& unknown_kinds() {
 }
 
 const std::vector<std::string>& slow_kinds() {
-  static const std::vector<std::string> kinds = {"slow_zero", "slow_stand"};
+  static const std::vector<std::string> kinds = {"slow_zero", "slow_stand", "slow_growth", "slow_walk"};
   return kinds;
 }
 

@@ -284,6 +284,29 @@ Effect slow_zero(const HiddenCause& cause, const Scene& scene, Random& random) {
                 });
 }
 
+/// The zero of a joint wanders: as much again at every pose, to either side.
+Effect slow_walk(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const Index j = cause.depends_on.front().at(1) - '1';
+  std::vector<double> way = {0};
+  while (way.size() < scene.poses->size()) way.push_back(way.back() + normal(random));
+  const double size = 1 / std::sqrt(static_cast<double>(way.size()));
+  return effect(cause, {"size"}, one(some(random, 1e-4)),
+                [j, way, size](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) += v(0) * size * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
+                });
+}
+
+/// The links grow with a heat that the thermometer, which is stuck, does not see.
+Effect slow_growth(const HiddenCause& cause, const Scene& scene, Random& random) {
+  return effect(cause, {"size"}, one(uniform(random, 3e-5, 1e-4)),
+                [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  for (Link& link : m.arm.links) {
+                    link.a *= 1 + v(0) * course(p);
+                    link.d *= 1 + v(0) * course(p);
+                  }
+                });
+}
+
 /// The stand of the tracker settles, or the floor under it gives way with the sun.
 Effect slow_stand(const HiddenCause& cause, const Scene& scene, Random& random) {
   return effect(cause, kMotionNames, draw_motion(random, 0.08, 2e-5),
@@ -390,8 +413,10 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
 
 Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random) {
   if (kind == "slow_stand") return slow_stand({"unknown", 0, "", -1, {"time"}}, scene, random);
+  if (kind == "slow_growth") return slow_growth({"unknown", 0, "", -1, {"time"}}, scene, random);
   const int joint = whole(random, 2, 5);
-  return slow_zero({"unknown", 0, "", -1, {"q" + std::to_string(joint), "time"}}, scene, random);
+  const HiddenCause zero{"unknown", 0, "", -1, {"q" + std::to_string(joint), "time"}};
+  return kind == "slow_walk" ? slow_walk(zero, scene, random) : slow_zero(zero, scene, random);
 }
 
 Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random) {

@@ -69,7 +69,9 @@ class Search {
   [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const;
   [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen, std::size_t place) const;
 
-  void take_function(const LinearProblem& problem, const Family& family, const Best& best, double score);
+  /// `columns`: R x k, whitened, of the fitted size.
+  void take_function(const LinearProblem& problem, const MatrixXd& columns, const std::vector<std::string>& depends_on,
+                     const std::string& wanderer, double score);
   [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice, std::size_t place);
   void take_outlier(const LinearProblem& problem, Accepted one);
   [[nodiscard]] Status take_cause(Accepted one);
@@ -107,7 +109,9 @@ Result<bool> Search::step() {
   if (!best || choice.seen.score[*best] < chance_.limit) return false;
   const auto named = best_named(standing.families, choice);
   if (is_function(standing, choice, *best, named)) {
-    take_function(standing.problem, *standing.families[*best], choice.seen.best[*best], choice.seen.score[*best]);
+    const Family& family = *standing.families[*best];
+    take_function(standing.problem, family.columns(choice.seen.best[*best]), family.depends_on(), family.wanderer(),
+                  choice.seen.score[*best]);
     return true;
   }
   if (const Status taken = take_named(standing, choice, *named); !taken) return tl::make_unexpected(taken.error());
@@ -155,7 +159,8 @@ bool Search::is_function(const Standing& standing, const Choice& choice, std::si
   if (standing.families[best]->named()) return false;
   if (!named) return true;
   const std::vector<double>& score = choice.seen.score;
-  return score[best] > score[*named] + thresholds::kUnnamedMargin &&
+  const bool is_slow = !standing.families[best]->wanderer().empty();
+  return score[best] > score[*named] + (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
          named_path_score(standing, choice.open) < score[best];
 }
 
@@ -211,20 +216,19 @@ Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_
                                 options_.seed + kNamingDraw);
   one.naming_frequency = naming.frequency;
   one.could_also_be = std::move(naming.could_also_be);
-  const auto slow = one.cause.pose_id.empty() ? std::nullopt : slow_rival(standing, seen, place);
-  if (slow && slow->gap > -thresholds::kDecided) one.could_also_be.push_back(unknown_cause(one.cause.joint));
+  const auto slow = slow_rival(standing, seen, place);
+  if (slow && slow->gap > thresholds::kSlowDoubted) one.could_also_be.push_back(unknown_cause(one.cause.joint));
   return one;
 }
 
-void Search::take_function(const LinearProblem& problem, const Family& family, const Best& best, double score) {
-  const MatrixXd all = family.columns(best);
+void Search::take_function(const LinearProblem& problem, const MatrixXd& columns,
+                           const std::vector<std::string>& depends_on, const std::string& wanderer, double score) {
   std::vector<Index> telling;
-  for (Index k = 0; k < all.cols(); ++k) {
-    if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
+  for (Index k = 0; k < columns.cols(); ++k) {
+    if (columns.col(k).norm() > kTellingColumn) telling.push_back(k);
   }
-  result_.unnamed.push_back({family.depends_on(),
-                             problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling), score,
-                             chance_.p_value(score), family.wanderer()});
+  result_.unnamed.push_back({depends_on, problem.weight().cwiseInverse().asDiagonal() * columns(Eigen::all, telling),
+                             score, chance_.p_value(score), wanderer});
   refine_all();
 }
 
@@ -234,8 +238,9 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
     return {};
   }
   const auto slow = slow_rival(standing, choice.seen, place);
-  if (slow && slow->gap > thresholds::kUnnamedMargin) {
-    take_function(standing.problem, *slow->family, slow->best, choice.seen.score[place] + slow->gap);
+  if (slow && slow->gap > thresholds::kSlowInstead) {
+    take_function(standing.problem, slow->columns, slow->depends_on, slow->wanderer,
+                  choice.seen.score[place] + slow->gap);
     return {};
   }
   Accepted one = accepted(standing, choice.seen, place);
