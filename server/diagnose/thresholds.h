@@ -39,6 +39,9 @@ inline constexpr double kSameOrder = 0.5;
 /// Share of the poses that may be out, in a diagnosis and in triage. With more of them it is not single poses that are
 /// wrong.
 inline constexpr double kMostOutliers = 0.1;
+/// Share of the evidence of the pose that is farthest out that makes another one out as well. What one bad pose draws
+/// the others by is far less: its share in the fit, squared.
+inline constexpr double kOutAsWell = 0.25;
 /// rad: a joint that moves less shows no function of its angle. Two degrees.
 inline constexpr double kSmallestSpan = 0.035;
 /// K between the coldest and the warmest pose: less is one temperature, and nothing grows.
@@ -89,6 +92,10 @@ inline constexpr double kDwarfed = 0.25;
 inline constexpr double kOthersSpeak = 5;
 /// Orders of one joint's gear that are believed beside each other. More are an error that has no single order.
 inline constexpr std::ptrdiff_t kMostOrders = 2;
+/// Times its prior beyond which an off-centre encoder (1 mrad) is larger than robots have it.
+inline constexpr double kUnlikelyEccentricity = 2;
+/// The same of the centre of gravity of a payload (100 mm).
+inline constexpr double kUnlikelyPayload = 5;
 /// Standard deviations below zero at which the play of a joint has the wrong sign: 95 %, one side.
 inline constexpr double kWrongSign = 1.645;
 /// The same of the play at one pose, of which there are many: 98 %, one side.
@@ -98,6 +105,18 @@ inline constexpr double kPosesOfWrongSign = 0.25;
 /// Chance that any of the held-out poses that fit is called one that fits neither model.
 inline constexpr double kMisjudgedHeldOut = 0.01;
 
+// Rows that say what was done wrong with them.
+
+/// Standard deviations of an axis within which a pose that fits nothing fits as another tool, payload or row: of three
+/// axes chance leaves more in 1 of 30 000 poses.
+inline constexpr double kFitsOtherwise = 5;
+/// Share of its distance as it stands to which that must come down.
+inline constexpr double kFitsBetter = 0.3;
+/// Standard deviations that play must make at a pose for the pose to show which side it came from.
+inline constexpr double kShowsItsSide = 4;
+/// Nat by which the other side must be the likelier: odds of 160 000 to 1, for there are many poses.
+inline constexpr double kSureOfSide = 12;
+
 // What is left, against what is stated for one measurement.
 
 /// Standard uncertainty of the stated standard deviation, as a share of it.
@@ -105,8 +124,8 @@ inline constexpr double kSigmaKnownTo = 0.1;
 /// Standard uncertainties, of sigma and of chance together, beyond which what is left is not the measurement; of chance
 /// alone, beyond which it is worth a note.
 inline constexpr double kNoiseDeviations = 2;
-/// Times the stated standard deviation, beyond which nobody calls it noise: with poses enough that chance is small.
-inline constexpr double kMoreThanNoise = 1 + kNoiseDeviations * kSigmaKnownTo;
+/// Times the stated standard deviation, beyond which nobody calls it noise: exp(2 * 0.104), of 200 poses.
+inline constexpr double kMoreThanNoise = 1.23;
 
 // What these poses could not have shown, and what they cannot tell apart.
 

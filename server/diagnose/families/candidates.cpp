@@ -226,12 +226,23 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
   return sources;
 }
 
+bool is_path_without_times(const MeasurementBatch& batch) {
+  for (std::size_t i = 1; i < batch.measurements.size(); ++i) {
+    const JointVector step = batch.measurements[i].context.q - batch.measurements[i - 1].context.q;
+    if (step.cwiseAbs().maxCoeff() > thresholds::kPathStep) return false;
+  }
+  return !any(batch, [](const PoseContext& c) { return c.velocity.has_value(); });
+}
+
 std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
   const Chain& robot = problem.model().cell->robot;
   Families families(problem);
   for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add(record, joint); });
-  for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
-  families.add(make_slow_family(problem, size_of_arm(problem), "the size of the arm", -1));
+  // Along such a path a lag goes on as smoothly.
+  if (!is_path_without_times(problem.batch())) {
+    for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
+    families.add(make_slow_family(problem, size_of_arm(problem), "the size of the arm", -1));
+  }
   families.add(make_anonymous_family(problem, {}));
   for (int joint = 0; joint < robot.size(); ++joint) {
     families.add(make_anonymous_family(problem, {joint}));

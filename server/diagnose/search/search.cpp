@@ -73,6 +73,8 @@ class Search {
   void take_function(const LinearProblem& problem, const MatrixXd& columns, const std::vector<std::string>& depends_on,
                      const std::string& wanderer, double score);
   [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice, std::size_t place);
+  [[nodiscard]] std::vector<Accepted> all_out(const Standing& standing, const Scan& seen, std::size_t place) const;
+  void take_outliers(const LinearProblem& problem, std::vector<Accepted> out);
   void take_outlier(const LinearProblem& problem, Accepted one);
   [[nodiscard]] Status take_cause(Accepted one);
   [[nodiscard]] Result<bool> name_again(Accepted& one);
@@ -243,10 +245,35 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
                   choice.seen.score[place] + slow->gap);
     return {};
   }
-  Accepted one = accepted(standing, choice.seen, place);
-  if (standing.families[place]->predicts()) return take_cause(std::move(one));
-  take_outlier(standing.problem, std::move(one));
+  if (standing.families[place]->predicts()) return take_cause(accepted(standing, choice.seen, place));
+  take_outliers(standing.problem, all_out(standing, choice.seen, place));
   return {};
+}
+
+/// The pose at `place` of the scan, and those that are out nearly as far: they need no look of their own.
+std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen, std::size_t place) const {
+  const Family& family = *standing.families[place];
+  const VectorXd projected = standing.background.project(standing.problem.residual());
+  const double enough = std::max(thresholds::kOutAsWell * seen.best[place].evidence,
+                                 chance_.penalty_of(family) + thresholds::kBeyondFolds * chance_.limit);
+  std::vector<Accepted> out;
+  VectorXd keep = VectorXd::Ones(standing.problem.rows());
+  Scan next = seen;
+  do {
+    out.push_back(accepted(standing, next, place));
+    const Index pose = next.best[place].pose;
+    keep.segment(standing.problem.first_row(pose), standing.problem.row_count(pose)).setZero();
+    next.best[place] = family.scan({standing.background, &keep}, projected).front();
+    next.score[place] = next.best[place].evidence - chance_.penalty_of(family);
+  } while (next.best[place].evidence >= enough);
+  return out;
+}
+
+void Search::take_outliers(const LinearProblem& problem, std::vector<Accepted> out) {
+  // The last first: the places of the others stay what they are.
+  std::sort(out.begin(), out.end(), [](const Accepted& a, const Accepted& b) { return a.best.pose > b.best.pose; });
+  for (Accepted& one : out) take_outlier(problem, std::move(one));
+  refine_all();
 }
 
 void Search::take_outlier(const LinearProblem& problem, Accepted one) {
@@ -269,7 +296,6 @@ void Search::take_outlier(const LinearProblem& problem, Accepted one) {
     drop_rows(function.columns, problem.first_row(pose), problem.row_count(pose));
   }
   result_.accepted.push_back(std::move(one));
-  refine_all();
 }
 
 /// Puts the cause into the model. A second map of a joint is more of the first, and takes its place.

@@ -1,6 +1,7 @@
 #include "server/diagnose/tell/doubts.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/tell/wording.h"
@@ -9,6 +10,8 @@
 namespace trammel::cause_search {
 
 namespace {
+
+constexpr Eigen::Index kNumbersOfPayload = 4;  // its mass, then its centre of gravity
 
 bool contains(const std::vector<Cause>& causes, const Cause& cause) {
   return std::find(causes.begin(), causes.end(), cause) != causes.end();
@@ -61,6 +64,14 @@ void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
+/// What pulls at the joints as a payload does.
+void add_what_weighs(std::vector<Cause>& rivals) {
+  for (const CauseRecord* record : all_causes()) {
+    if (record->acts.on == causes::ActsOn::kLoad && record->search == causes::SearchFamily::kNone)
+      add(rivals, cause_at(*record));
+  }
+}
+
 std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
   if (record_of(cause).needs.direction)
     return "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
@@ -74,8 +85,20 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 
 }  // namespace
 
+bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size) {
+  const CauseRecord& record = record_of(cause);
+  if (record.lasting != causes::Lasting::kAlways || size.size() == 0) return false;
+  if (record.summary == causes::Summary::kAmplitude) return size.norm() > thresholds::kUnlikelyEccentricity;
+  if (record.part != causes::Part::kPayload) return false;
+  double farthest = 0;  // of a centre of gravity; a mass may be anything
+  for (Eigen::Index k = 0; k < size.size(); ++k) {
+    if (k % kNumbersOfPayload != 0) farthest = std::max(farthest, std::abs(size(k)));
+  }
+  return farthest > thresholds::kUnlikelyPayload;
+}
+
 Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside,
-                bool in_both_halves) {
+                bool in_both_halves, bool unlikely) {
   const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
   const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
   std::vector<Cause> many = descriptions_of_many(cause, beside.found);
@@ -88,6 +111,7 @@ Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>&
   could_also_be.insert(could_also_be.end(), many.begin(), many.end());
   const bool again = begins_again(cause, beside.found);
   if (again) add(could_also_be, unknown_cause(cause.joint));
+  if (unlikely) add_what_weighs(could_also_be);
   const bool by_half = beside.more_than_noise && !in_both_halves;
   if (by_half) add(could_also_be, unknown_cause(cause.joint));
   const bool whole = !beside.more_than_noise || !could_also_be.empty();
@@ -99,6 +123,10 @@ Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>&
                          cause.joint + 1);
     if (dwarfed) return "find first what is unknown here: it is several times larger";
     if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
+    if (unlikely)
+      return "it is larger than robots have it: measure with another known payload, which the arm's own weight does "
+             "not "
+             "follow";
     if (by_half)
       return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
     if (by_surrogate) return what_to_record(cause, beside.surrogates);

@@ -226,7 +226,9 @@ Finding Findings::cause(const Accepted& one) const {
   const ErrorFigures before = figures_of(problem_.positions(without));
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
   const bool in_both_halves = !beside_.more_than_noise || is_in_both_halves(one, effect, others);
-  Judgement judgement = judge(one.cause, effect_rms, one.could_also_be, beside_, in_both_halves);
+  const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
+  Judgement judgement =
+      judge(one.cause, effect_rms, one.could_also_be, beside_, in_both_halves, is_unlikely(one.cause, own.size));
   return {.cause = cause,
           .source = one.source,
           .parameters = std::move(parameters),
@@ -235,7 +237,7 @@ Finding Findings::cause(const Accepted& one) const {
           .held_out_before = before,
           .held_out_after = after,
           .held_out_gain = before.rms - after.rms,
-          .strength = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance).strength(),
+          .strength = own.strength(),
           .p_value = one.p_value,
           .naming_frequency = one.naming_frequency,
           .could_also_be = std::move(judgement.could_also_be),
