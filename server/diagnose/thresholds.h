@@ -27,8 +27,11 @@ inline constexpr double kUnnamedMargin = 2;
 /// Nat by which something slow must beat a step or a drift to be taken in its place: odds of 150 to 1. Steps are what
 /// happens to robots, and what is slow has more courses than anybody lists.
 inline constexpr double kSlowInstead = 5;
-/// The same to put it in doubt.
-inline constexpr double kSlowDoubted = 0;
+/// Share of its strength, in nat, by which a step must beat something slow to be beyond doubt, less kStepChance: any
+/// smooth course leaves more of a step than that, and of something slow a step leaves more.
+inline constexpr double kStepShare = 0.04;
+/// Nat that chance takes off: a step of strength 75 or less need not win, but must not lose.
+inline constexpr double kStepChance = 3;
 /// How many named causes together may beat one anonymous function.
 inline constexpr int kNamedPath = 3;
 /// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and a map of a joint an

@@ -219,7 +219,8 @@ Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_
   one.naming_frequency = naming.frequency;
   one.could_also_be = std::move(naming.could_also_be);
   const auto slow = slow_rival(standing, seen, place);
-  if (slow && slow->gap > thresholds::kSlowDoubted) one.could_also_be.push_back(unknown_cause(one.cause.joint));
+  const double ahead = std::max(0.0, thresholds::kStepShare * one.best.strength - thresholds::kStepChance);
+  if (slow && slow->gap > -ahead) one.could_also_be.push_back(unknown_cause(one.cause.joint));
   return one;
 }
 
