@@ -12,6 +12,7 @@
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/more_than_noise.h"
+#include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/sessions.h"
 
@@ -141,9 +142,11 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   diagnosis.batch = as_recorded(prepared->surrogates, found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, *prepared, diagnosis);
-  tell_findings(explained, *prepared, diagnosis.batch, diagnosis);
+  tell_findings(explained, *prepared, diagnosis.batch, leaves_more_than_noise(explained.after, prepared->repeats),
+                diagnosis);
   tell_since(batch.rows(), diagnosis);
   tell_noise(explained, *prepared, diagnosis);
+  tell_row_mistakes(explained, prepared->sorted ? batch.rows() : MeasurementBatch(), diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
   tell_held_out(explained, *prepared, diagnosis);
 

@@ -70,7 +70,8 @@ struct Finding {
   double p_value = 1;                 ///< chance that the best of all candidates scores as much with nothing to find
   double naming_frequency = 1;        ///< share of bootstrap repetitions that name this cause
   std::vector<Cause> could_also_be = {};  ///< explain it as well; empty: named
-  std::string action = {};                ///< for the shop floor
+  bool whole = true;  ///< false: the best known shape of it, and `unknown` among could_also_be: more than noise is left
+  std::string action = {};  ///< for the shop floor
 };
 
 enum class Verdict { kNamed, kAmbiguous, kUnknown, kNothing };

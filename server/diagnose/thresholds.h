@@ -24,6 +24,14 @@ inline constexpr double kBeyondFolds = 6;
 inline constexpr double kFoldContender = 0.3;
 /// Nat by which an anonymous function must beat the best named cause: odds of 7 to 1.
 inline constexpr double kUnnamedMargin = 2;
+/// Nat by which something slow must beat a step or a drift to be taken in its place: odds of 150 to 1. Steps are what
+/// happens to robots, and what is slow has more courses than anybody lists.
+inline constexpr double kSlowInstead = 5;
+/// Share of its strength, in nat, by which a step must beat something slow to be beyond doubt, less kStepChance: any
+/// smooth course leaves more of a step than that, and of something slow a step leaves more.
+inline constexpr double kStepShare = 0.04;
+/// Nat that chance takes off: a step of strength 75 or less need not win, but must not lose.
+inline constexpr double kStepChance = 3;
 /// How many named causes together may beat one anonymous function.
 inline constexpr int kNamedPath = 3;
 /// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and a map of a joint an
@@ -34,6 +42,9 @@ inline constexpr double kSameOrder = 0.5;
 /// Share of the poses that may be out, in a diagnosis and in triage. With more of them it is not single poses that are
 /// wrong.
 inline constexpr double kMostOutliers = 0.1;
+/// Share of the evidence of the pose that is farthest out that makes another one out as well. What one bad pose draws
+/// the others by is far less: its share in the fit, squared.
+inline constexpr double kOutAsWell = 0.25;
 /// rad: a joint that moves less shows no function of its angle. Two degrees.
 inline constexpr double kSmallestSpan = 0.035;
 /// K between the coldest and the warmest pose: less is one temperature, and nothing grows.
@@ -84,6 +95,10 @@ inline constexpr double kDwarfed = 0.25;
 inline constexpr double kOthersSpeak = 5;
 /// Orders of one joint's gear that are believed beside each other. More are an error that has no single order.
 inline constexpr std::ptrdiff_t kMostOrders = 2;
+/// Times its prior beyond which an off-centre encoder (1 mrad) is larger than robots have it.
+inline constexpr double kUnlikelyEccentricity = 2;
+/// The same of the centre of gravity of a payload (100 mm).
+inline constexpr double kUnlikelyPayload = 5;
 /// Standard deviations below zero at which the play of a joint has the wrong sign: 95 %, one side.
 inline constexpr double kWrongSign = 1.645;
 /// The same of the play at one pose, of which there are many: 98 %, one side.
@@ -93,14 +108,27 @@ inline constexpr double kPosesOfWrongSign = 0.25;
 /// Chance that any of the held-out poses that fit is called one that fits neither model.
 inline constexpr double kMisjudgedHeldOut = 0.01;
 
+// Rows that say what was done wrong with them.
+
+/// Standard deviations of an axis within which a pose that fits nothing fits as another tool, payload or row: of three
+/// axes chance leaves more in 1 of 30 000 poses.
+inline constexpr double kFitsOtherwise = 5;
+/// Share of its distance as it stands to which that must come down.
+inline constexpr double kFitsBetter = 0.3;
+/// Standard deviations that play must make at a pose for the pose to show which side it came from.
+inline constexpr double kShowsItsSide = 4;
+/// Nat by which the other side must be the likelier: odds of 160 000 to 1, for there are many poses.
+inline constexpr double kSureOfSide = 12;
+
 // What is left, against what is stated for one measurement.
 
-/// Times the stated standard deviation, which is known to a tenth: worth a note.
-inline constexpr double kLargerNoise = 1.1;
-/// Times the stated standard deviation: something is there that is not the measurement.
-inline constexpr double kMoreThanNoise = 1.3;
-/// Standard deviations that chance exceeds in 1 of 100 batches.
-inline constexpr double kOneInHundred = 2.326;
+/// Standard uncertainty of the stated standard deviation, as a share of it.
+inline constexpr double kSigmaKnownTo = 0.1;
+/// Standard uncertainties, of sigma and of chance together, beyond which what is left is not the measurement; of chance
+/// alone, beyond which it is worth a note.
+inline constexpr double kNoiseDeviations = 2;
+/// Times the stated standard deviation, beyond which nobody calls it noise: exp(2 * 0.104), of 200 poses.
+inline constexpr double kMoreThanNoise = 1.23;
 
 // What these poses could not have shown, and what they cannot tell apart.
 

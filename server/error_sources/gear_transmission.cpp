@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kAmplitudePrior = 1e-4;  // rad
 constexpr double kLowestOrder = 2;        // below lie eccentricity and geometry
-constexpr double kHighestOrder = 200;     // cycles a joint turn
+constexpr double kHighestOrder = 400;     // cycles a joint turn: two waves a motor turn at a ratio of 200
 
 /// Teeth that mesh unevenly: the joint oscillates `order` times a turn of its own, delta q = s sin(order q) + c
 /// cos(order q). The order need not be whole. Several orders of one joint are several triples.

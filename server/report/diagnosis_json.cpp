@@ -63,6 +63,7 @@ ordered_json finding_json(const Finding& finding) {
   json["p_value"] = finding.p_value;
   json["naming_frequency"] = finding.naming_frequency;
   json["could_also_be"] = causes_json(finding.could_also_be);
+  json["whole"] = finding.whole;
   json["action"] = finding.action;
   return json;
 }

@@ -73,8 +73,13 @@ std::string beginning_of(const Finding& finding) {
                      place(places.front()), place(places.back()));
 }
 
+/// What else it could be, for people.
+std::string others_of(const Finding& finding) {
+  return finding.whole ? causes_in_words(finding.could_also_be) : "more than this: the best known shape, not the whole";
+}
+
 HtmlRow finding_row(const Finding& finding) {
-  const std::string others = causes_in_words(finding.could_also_be);
+  const std::string others = others_of(finding);
   return {
       .cells = {"<b>" + html_text(kind_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
                 estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
@@ -84,12 +89,14 @@ HtmlRow finding_row(const Finding& finding) {
       .kind = "found"};
 }
 
-/// What to do about it, below its figures.
+/// What to do about it, below its figures. How often repetitions name it says something only where nothing else is in
+/// question.
 HtmlRow action_row(const Finding& finding) {
-  return {.cells = {"", "",
-                    fmt::format("{} Named by {:.0f}\u00a0% of the repetitions.",
-                                html_text(as_sentence(finding.action) + beginning_of(finding)),
-                                100 * finding.naming_frequency)},
+  const std::string named =
+      finding.could_also_be.empty()
+          ? fmt::format(" Named by {:.0f}\u00a0% of the simulated repetitions.", 100 * finding.naming_frequency)
+          : "";
+  return {.cells = {"", "", html_text(as_sentence(finding.action) + beginning_of(finding)) + named},
           .kind = "action",
           .last_spans = 6};
 }

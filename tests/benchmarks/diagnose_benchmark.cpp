@@ -62,6 +62,7 @@ class Plan {
     decidable();
     nulls();
     for (const std::string& kind : hidden::unknown_kinds()) add("unknown", kind, 120, settings_.trials);
+    for (const std::string& kind : hidden::slow_kinds()) add("slow", kind, 120, settings_.trials);
     for (const std::string& kind : hidden::undecidable_kinds()) add("undecidable", kind, 120, settings_.trials);
     add("three", "mixture3", 60, settings_.trials);
     add("two", "mixture2", 60, settings_.trials);
@@ -286,6 +287,15 @@ void print_abstaining(const Results& results) {
         share(unknown, [](const TrialResult& r) { return r.judgement.unknown_rightly; }), ">= 90");
   print("unknown effects: a false name",
         share(unknown, [](const TrialResult& r) { return r.judgement.wrong + r.judgement.open > 0; }), "<= 3");
+  Results slow = of_rows(results, {"slow"});
+  print("something slow: unknown of what it depends on, or left open",
+        share(slow, [](const TrialResult& r) { return r.judgement.detected && r.judgement.wrong == 0; }), ">= 90");
+  const auto walks = [](const TrialResult& r) { return r.trial.spec.kind == "slow_walk"; };
+  Results walk;
+  std::copy_if(slow.begin(), slow.end(), std::back_inserter(walk), walks);
+  std::erase_if(slow, walks);
+  print("something slow and smooth: a sure wrong name", share(slow, is_wrong), "<= 3");
+  print("a zero that wanders at random: a sure wrong name", share(walk, is_wrong), "<= 3");
   const Results undecidable = of_rows(results, {"undecidable"});
   print("undecidable: the set holds the truth",
         share(undecidable, [](const TrialResult& r) { return r.judgement.set_holds_truth; }), ">= 98");

@@ -68,19 +68,21 @@ TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
   EXPECT_GT((change.array().abs() > 1e-3).count(), 20);
 }
 
-TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRows) {
+TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRowsHoweverManyTeethMesh) {
   const Calibrated calibrated(120);
   const LinearProblem problem = calibrated.problem();
   const FamilyPtr gear = make_order_family(problem, {"gear_transmission", 2});
   ASSERT_NE(gear, nullptr);
-  Best planted = gear->typical();
-  planted.order = 37.3;
   const Background background(problem.nuisance());
-  const VectorXd effect = gear->columns(planted) * Eigen::Vector2d(0.03, -0.04);
-  const Best found = gear->scan({background}, background.project(problem.residual() + effect)).front();
-  EXPECT_NEAR(found.order, 37.3, 0.1);
-  const double strength = effect.dot(background.project(effect).col(0));
-  EXPECT_NEAR(found.strength, strength, 5 * std::sqrt(strength));
+  for (const double order : {2.7, 37.3, 202.0, 320.0}) {  // two waves a motor turn at ratios of 101 and of 160
+    Best planted = gear->typical();
+    planted.order = order;
+    const VectorXd effect = gear->columns(planted) * Eigen::Vector2d(0.03, -0.04);
+    const Best found = gear->scan({background}, background.project(problem.residual() + effect)).front();
+    EXPECT_NEAR(found.order, order, 0.1);
+    const double strength = effect.dot(background.project(effect).col(0));
+    EXPECT_NEAR(found.strength, strength, 5 * std::sqrt(strength)) << order;
+  }
 }
 
 TEST(Refine, LeavesACalibratedModelWhereItIs) {

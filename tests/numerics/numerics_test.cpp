@@ -140,6 +140,22 @@ TEST_P(EveryBuild, MultipliesATransposeByAMatrix) {
   }
 }
 
+TEST(Triangles, AreMultipliedAndInvertedAsEigenDoes) {
+  for (const Index n : {1, 5, 32, 70, 131}) {
+    const MatrixXd a = random_joints(n + 40, 55, static_cast<int>(n));
+    const MatrixXd expected = a.transpose() * a;
+    EXPECT_LT((gram(a) - expected).cwiseAbs().maxCoeff(), 1e-11 * static_cast<double>(n));
+    const MatrixXd m = expected + MatrixXd::Identity(n, n);
+    const auto inverse = inverse_factor(m);
+    ASSERT_TRUE(inverse);
+    EXPECT_LT((*inverse * m * inverse->transpose() - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_EQ(MatrixXd(inverse->triangularView<Eigen::StrictlyUpper>()).cwiseAbs().maxCoeff(), 0);
+    const MatrixXd product = a * inverse->transpose();
+    EXPECT_LT((times_lower_transposed(a, *inverse) - product).cwiseAbs().maxCoeff(), 1e-11 * static_cast<double>(n));
+  }
+  EXPECT_FALSE(inverse_factor(-MatrixXd::Identity(3, 3)));
+}
+
 TEST_P(EveryBuild, MultipliesTheLowerTriangleAlone) {
   const MatrixXd a = random_joints(72, 50, 60);
   MatrixXd c = MatrixXd::Zero(72, 72);

@@ -147,6 +147,7 @@ TEST_F(DiagnosisPage, DoesNotCallUnseenWhatWasLookedForByTheOrderOfThePoses) {
 }
 
 TEST_F(DiagnosisPage, CallsNoNoiseWhatIsBeyondTheInstrument) {
+  diagnosis_.instrument = 11e-6;
   EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>noise of one measurement</span>"));
   diagnosis_.instrument = 2e-6;
   EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>what stays unexplained of a pose</span>"));

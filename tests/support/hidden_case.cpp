@@ -91,6 +91,9 @@ void understand(Draft& draft) {
   } else if (contains(unknown_kinds(), kind)) {
     draft.truth.question = Question::kUnknown;
     draft.names = {"unknown"};
+  } else if (contains(slow_kinds(), kind)) {
+    draft.truth.question = Question::kUnknown;
+    draft.names = {kind};
   } else if (contains(undecidable_kinds(), kind)) {
     draft.truth.question = Question::kAbstain;
     draft.names = {kind};
@@ -122,7 +125,7 @@ void arrange(Draft& draft) {
   if (has("payload")) draft.plan.loads = 2;
   if (whole(draft.random, 0, 1) == 1) draft.plan.approach = Approach::kBothSides;
   if (has("backlash_one_side")) draft.plan.approach = Approach::kFromBelow;
-  if (has("constant_warmth")) draft.plan.constant_temperature = true;
+  if (has("constant_warmth") || has("slow_growth")) draft.plan.constant_temperature = true;
   if (has("replica_ripple_1dim")) draft.plan.ranges = "1dim";
   if (has("replica_ripple_6dim") || has("replica_tool")) draft.plan.ranges = "6dim-l";
   if (has("replica_p28")) world.orientation = false;
@@ -234,6 +237,7 @@ Effect draw_named(const std::string& name, const Draft& draft, const Scene& scen
         pair ? std::vector<std::string>{"q2", "q3"} : std::vector<std::string>{"q4"};
     return draw_effect({"unknown", 0, "", -1, joints}, scene, random);
   }
+  if (contains(slow_kinds(), name)) return draw_slow_effect(name, scene, random);
   if (name == "backlash_one_side") return draw_effect(draw_cause("backlash", scene, random), scene, random);
   if (name == "payload_alone") return one_parameter({"payload", 0, "", -1, {}}, 0, 8, scene, random);
   if (name == "constant_warmth") return draw_effect({"thermal_growth", 0, "", -1, {}}, scene, random);
@@ -359,13 +363,35 @@ void permute(const Frames& still, Frames& moved, Random& random) {
   moved = permuted;
 }
 
-void add_noise(const World& world, Frames& frames, Random& random) {
+/// Of Student's distribution of four degrees of freedom, brought to unit variance.
+double heavy_factor(Random& random) {
+  double square = 0;
+  for (int k = 0; k < 4; ++k) square += std::pow(normal(random), 2);
+  return std::sqrt(2 / square);
+}
+
+void add_noise(const World& world, const std::string& noise, Frames& frames, Random& random) {
+  constexpr double kLasting = 0.6;  // of one measurement's error is left in the next
+  Vector3d shift_before = Vector3d::Zero();
+  Vector3d turn_before = Vector3d::Zero();
   for (Matrix4d& frame : frames) {
     Vector3d turn;
+    Vector3d shift;
     for (int axis = 0; axis < 3; ++axis) {
-      frame(axis, 3) += world.sigma_mm * normal(random);
+      shift(axis) = world.sigma_mm * normal(random);
       turn(axis) = world.sigma_rad * normal(random);
     }
+    if (noise == "heavy") {
+      const double factor = heavy_factor(random);
+      shift *= factor;
+      turn *= factor;
+    } else if (noise == "lasting" && &frame != &frames.front()) {
+      shift = kLasting * shift_before + std::sqrt(1 - kLasting * kLasting) * shift;
+      turn = kLasting * turn_before + std::sqrt(1 - kLasting * kLasting) * turn;
+    }
+    shift_before = shift;
+    turn_before = turn;
+    frame.block<3, 1>(0, 3) += shift;
     frame.block<3, 3>(0, 0) = turn_of(turn) * frame.block<3, 3>(0, 0);
   }
 }
@@ -385,7 +411,7 @@ HiddenCase hide(const HiddenSpec& spec) {
   }
   Frames frames = frames_at(draft.world, draft.world.poses, draft.world.effects);
   if (draft.permuted) permute(still, frames, draft.random);
-  add_noise(draft.world, frames, draft.random);
+  add_noise(draft.world, spec.noise, frames, draft.random);
   if (draft.truth.question == Question::kNothing) draft.truth.causes.clear();
   draft.truth.untraceable = contains(draft.names, "backlash") && contains(spec.withheld, "dir") &&
                             draft.plan.approach == Approach::kBothSides;
@@ -408,6 +434,11 @@ const std::vector<std::string>& null_kinds() {
 
 const std::vector<std::string>& unknown_kinds() {
   static const std::vector<std::string> kinds = {"unknown_q4", "unknown_q2q3"};
+  return kinds;
+}
+
+const std::vector<std::string>& slow_kinds() {
+  static const std::vector<std::string> kinds = {"slow_zero", "slow_stand", "slow_growth", "slow_walk"};
   return kinds;
 }
 

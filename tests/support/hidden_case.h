@@ -20,7 +20,8 @@ enum class Question {
 
 struct HiddenSpec {
   /// A cause (`backlash`), several (`backlash+outlier`, `mixture2`, `mixture3`), a null (`null_white`,
-  /// `null_structured`, `null_permuted`), an unknown (`unknown_q4`, `unknown_q2q3`), what cannot be decided
+  /// `null_structured`, `null_permuted`), an unknown (`unknown_q4`, `unknown_q2q3`), something slow that no cause is
+  /// (`slow_zero`, `slow_stand`, `slow_growth`, `slow_walk`), what cannot be decided
   /// (`backlash_one_side`, `payload_alone`, `tool_or_link`, `tool_absorbed`, `joint1_or_tracker`, `joint6_or_tool`,
   /// `constant_warmth`) or a replica of the source's studies (`replica_ripple_1dim`, `replica_ripple_6dim`,
   /// `replica_tool`, `replica_p28`).
@@ -36,6 +37,9 @@ struct HiddenSpec {
   double validation_share = 0;
   /// Columns of the batch that nobody recorded, by how their names begin: `dir`, `time_s`.
   std::vector<std::string> withheld = {};
+  /// `white`, `heavy` (Student's, of four degrees of freedom) or `lasting` (an error is left in the next one), all of
+  /// the tracker's size.
+  std::string noise = "white";
 };
 
 struct HiddenTruth {
@@ -65,6 +69,7 @@ struct HiddenCase {
 [[nodiscard]] const std::vector<std::string>& decidable_kinds();
 [[nodiscard]] const std::vector<std::string>& null_kinds();
 [[nodiscard]] const std::vector<std::string>& unknown_kinds();
+[[nodiscard]] const std::vector<std::string>& slow_kinds();
 [[nodiscard]] const std::vector<std::string>& undecidable_kinds();
 [[nodiscard]] const std::vector<std::string>& replica_kinds();
 

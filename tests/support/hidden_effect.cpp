@@ -255,6 +255,66 @@ Effect outlier(const HiddenCause& cause, const Scene&, Random& random) {
                 });
 }
 
+/// How far something slow has come, 0 to 1 at most, by the share of the batch's time: it warms up and settles, or goes
+/// with the day and comes back.
+std::function<double(double)> draw_course(Random& random) {
+  if (whole(random, 0, 1) == 1) {
+    const double lag = uniform(random, 0.15, 0.6);
+    return [lag](double share) { return 1 - std::exp(-share / lag); };
+  }
+  const double turns = uniform(random, 0.5, 1.1);
+  const double phase = uniform(random, 0, kTurn);
+  return [turns, phase](double share) { return 0.5 + 0.5 * std::sin(kTurn * turns * share + phase); };
+}
+
+std::function<double(const MeasuringPose&)> draw_course(const Scene& scene, Random& random) {
+  const double start = scene.poses->front().time_s;
+  const double whole_time = scene.poses->back().time_s - start;
+  return [course = draw_course(random), start, whole_time](const MeasuringPose& p) {
+    return course((p.time_s - start) / whole_time);
+  };
+}
+
+/// The zero of a joint follows the heat of its gearbox, which nobody measures.
+Effect slow_zero(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const Index j = cause.depends_on.front().at(1) - '1';
+  return effect(cause, {"size"}, one(some(random, 1e-4)),
+                [j, course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) += v(0) * course(p);
+                });
+}
+
+/// The zero of a joint wanders: as much again at every pose, to either side.
+Effect slow_walk(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const Index j = cause.depends_on.front().at(1) - '1';
+  std::vector<double> way = {0};
+  while (way.size() < scene.poses->size()) way.push_back(way.back() + normal(random));
+  const double size = 1 / std::sqrt(static_cast<double>(way.size()));
+  return effect(cause, {"size"}, one(some(random, 1e-4)),
+                [j, way, size](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) += v(0) * size * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
+                });
+}
+
+/// The links grow with a heat that the thermometer, which is stuck, does not see.
+Effect slow_growth(const HiddenCause& cause, const Scene& scene, Random& random) {
+  return effect(cause, {"size"}, one(uniform(random, 3e-5, 1e-4)),
+                [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  for (Link& link : m.arm.links) {
+                    link.a *= 1 + v(0) * course(p);
+                    link.d *= 1 + v(0) * course(p);
+                  }
+                });
+}
+
+/// The stand of the tracker settles, or the floor under it gives way with the sun.
+Effect slow_stand(const HiddenCause& cause, const Scene& scene, Random& random) {
+  return effect(cause, kMotionNames, draw_motion(random, 0.08, 2e-5),
+                [course = draw_course(scene, random)](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.seen = stand_moved(v * course(p)) * m.seen;
+                });
+}
+
 /// A smooth random function of some joints, in three axes of the base: waves of random direction and phase.
 Effect unknown(const HiddenCause& cause, const Scene&, Random& random) {
   constexpr int kWaves = 40;
@@ -349,6 +409,14 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
     cause.first = whole(random, 0, count - 1);
   }
   return cause;
+}
+
+Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random) {
+  if (kind == "slow_stand") return slow_stand({"unknown", 0, "", -1, {"time"}}, scene, random);
+  if (kind == "slow_growth") return slow_growth({"unknown", 0, "", -1, {"time"}}, scene, random);
+  const int joint = whole(random, 2, 5);
+  const HiddenCause zero{"unknown", 0, "", -1, {"q" + std::to_string(joint), "time"}};
+  return kind == "slow_walk" ? slow_walk(zero, scene, random) : slow_zero(zero, scene, random);
 }
 
 Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random) {

@@ -51,5 +51,8 @@ struct Scene {
 [[nodiscard]] HiddenCause draw_cause(const std::string& cause, const Scene& scene, Random& random);
 /// `cause` with its numbers and shape drawn, of a size as robots show it.
 [[nodiscard]] Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random);
+/// What moves slowly with time: the zero of a joint (`slow_zero`; `slow_walk`: at random), the stand of the tracker
+/// (`slow_stand`) or the lengths of all links (`slow_growth`).
+[[nodiscard]] Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random);
 
 }  // namespace trammel::hidden

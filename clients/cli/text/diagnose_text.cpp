@@ -80,7 +80,9 @@ std::string finding_lines(const ordered_json& finding, std::size_t width) {
   if (finding.contains("may_begin_at") && finding.at("may_begin_at").at("pose_ids").size() > 1) {
     text += beginning_line(finding.at("may_begin_at"));
   }
-  if (!finding.at("could_also_be").empty()) {
+  if (!finding.value("whole", true)) {
+    text += "      the best known shape of it, not the whole: more than noise is left\n";
+  } else if (!finding.at("could_also_be").empty()) {
     text += fmt::format("      could also be: {}\n", causes_text(finding.at("could_also_be")));
   }
   if (const auto action = finding.at("action").get<std::string>(); !action.empty()) {

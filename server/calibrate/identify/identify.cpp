@@ -30,6 +30,15 @@ Information decomposed(const Eigen::MatrixXd& information) {
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
+/// m: how far the positions are off but for the tenth that is farthest: single wrong rows make no batch wrong, and are
+/// suspects.
+double rms_of_most(const Eigen::Matrix3Xd& residuals) {
+  Eigen::VectorXd square = residuals.colwise().squaredNorm();
+  std::sort(square.begin(), square.end());
+  const Eigen::Index most = square.size() - square.size() / 10;
+  return std::sqrt(square.head(most).mean());
+}
+
 /// Refuses joints and positions that are not of one robot: `rms` (m), what identification leaves, is then a good part
 /// of the way that the tool went.
 Status check_belongs(const MeasurementBatch& batch, double rms) {
@@ -180,7 +189,7 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.message = found->minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;
-  if (const Status belongs = check_belongs(problem.batch, result.rms); !belongs)
+  if (const Status belongs = check_belongs(problem.batch, rms_of_most(r.position)); !belongs)
     return tl::make_unexpected(belongs.error());
   add_posterior(found->minimum.information, s, problem.batch.measurements.size(), result);
   return result;

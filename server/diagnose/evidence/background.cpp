@@ -1,35 +1,44 @@
 #include "server/diagnose/evidence/background.h"
 
+#include <optional>
 #include <utility>
 
 #include "server/numerics/product.h"
 
 namespace trammel::cause_search {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 
 namespace {
 
 MatrixXd information_of(const MatrixXd& columns) {
-  MatrixXd information = transposed_product(columns, columns);
+  MatrixXd information = gram(columns);
   information.diagonal().array() += 1;
   return information;
 }
 
 }  // namespace
 
+MatrixXd inverse_factor_of(const MatrixXd& information) {
+  if (std::optional<MatrixXd> inverse = inverse_factor(information)) return std::move(*inverse);
+  const Index n = information.rows();  // to rounding
+  return information.llt().matrixL().solve(MatrixXd::Identity(n, n));
+}
+
 Background::Background(MatrixXd columns) : Background(columns, information_of(columns)) {}
 
 Background::Background(MatrixXd columns, const MatrixXd& information)
-    : columns_(std::move(columns)), factor_(information) {
-  const MatrixXd inverse = factor_.matrixU().solve(MatrixXd::Identity(columns_.cols(), columns_.cols()));
-  root_ = transposed_product(columns_.transpose(), inverse);
-}
+    : columns_(std::move(columns)),
+      inverse_(inverse_factor_of(information)),
+      root_(times_lower_transposed(columns_, inverse_)) {}
 
 MatrixXd Background::project(const MatrixXd& y) const { return y - root_ * transposed_product(root_, y); }
 
-MatrixXd Background::estimate(const MatrixXd& y) const { return factor_.solve(transposed_product(columns_, y)); }
+MatrixXd Background::estimate(const MatrixXd& y) const {
+  return inverse_.transpose() * (inverse_ * transposed_product(columns_, y));
+}
 
-MatrixXd Background::covariance() const { return factor_.solve(MatrixXd::Identity(columns_.cols(), columns_.cols())); }
+MatrixXd Background::covariance() const { return gram(inverse_); }
 
 }  // namespace trammel::cause_search

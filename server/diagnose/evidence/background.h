@@ -4,6 +4,9 @@
 
 namespace trammel::cause_search {
 
+/// L⁻¹ of an information matrix L Lᵀ.
+[[nodiscard]] Eigen::MatrixXd inverse_factor_of(const Eigen::MatrixXd& information);
+
 /// What is expected in whitened rows when no candidate acts: white noise of unit variance, and `columns` Z times
 /// unknown numbers of unit variance. The columns are the model's own parameters, in units of their priors, and the
 /// anonymous functions found before. The covariance of the rows is S = 1 + Z Zᵀ. By the matrix inversion lemma S⁻¹ = 1
@@ -27,7 +30,7 @@ class Background {
 
  private:
   Eigen::MatrixXd columns_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::MatrixXd inverse_;  // L⁻¹
   Eigen::MatrixXd root_;
 };
 

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "server/base/check.h"
+#include "server/diagnose/evidence/background.h"
 #include "server/numerics/product.h"
 
 namespace trammel::cause_search {
@@ -65,6 +66,14 @@ Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
   return first;
 }
 
+/// What was measured less `X_WT`: 3 numbers (m), or 6 with the rotation (rad).
+VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
+  VectorXd distance(m.R_WT ? 6 : 3);
+  distance.head<3>() = m.p_W - X_WT.translation();
+  if (m.R_WT) distance.tail<3>() = rotation_log(*m.R_WT * X_WT.linear().transpose());
+  return distance;
+}
+
 /// What is left of `residual` (SI) beside the model's own parameters, and the share of freedom that they leave.
 struct Leftover {
   VectorXd residual;
@@ -74,14 +83,13 @@ struct Leftover {
 Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance, const VectorXd& scales,
                      const VectorXd& sigma) {
   const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
-  MatrixXd information = transposed_product(scaled, scaled);
-  const Index P = scales.size();
+  MatrixXd information = gram(scaled);
   information.diagonal().array() += 1;
-  const Eigen::LLT<MatrixXd> factor(information);
+  const MatrixXd inverse = inverse_factor_of(information);
   // The trace of the fit's hat matrix, priors included.
-  const double taken = static_cast<double>(P) - factor.solve(MatrixXd::Identity(P, P)).trace();
+  const double taken = static_cast<double>(scales.size()) - inverse.squaredNorm();
   const VectorXd right = scaled.transpose() * residual.cwiseQuotient(sigma);
-  return {residual - sigma.asDiagonal() * (scaled * factor.solve(right)),
+  return {residual - sigma.asDiagonal() * (scaled * (inverse.transpose() * (inverse * right))),
           std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size()))};
 }
 
@@ -158,16 +166,23 @@ void LinearProblem::differentiate(const Extended& extended) {
   }
 }
 
-/// How far `pose` was measured from `X_WT`, and the standard deviations that its measurement is said to have.
+/// How far `pose` is measured from `X_WT`, and the standard deviations that its measurement is said to have.
 void LinearProblem::measure(Index pose, const Pose& X_WT) {
   const Measurement& m = batch_->measurements[static_cast<std::size_t>(pose)];
   const Tracker& tracker = model_.cell->tracker;
   const Index row = first_row(pose);
-  residual_.segment<3>(row) = m.p_W - X_WT.translation();
+  residual_.segment(row, row_count(pose)) = distance_of(m, X_WT);
   sigma_.segment<3>(row).setConstant(m.sigma.value_or(tracker.sigma));
-  if (!m.R_WT) return;
-  residual_.segment<3>(row + 3) = rotation_log(*m.R_WT * X_WT.linear().transpose());
-  sigma_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
+  if (m.R_WT) sigma_.segment<3>(row + 3).setConstant(tracker.sigma_rotation);
+}
+
+VectorXd LinearProblem::residual_of(const PhysicalModel& model) const {
+  VectorXd residual(rows());
+  for (Index i = 0; i < poses(); ++i) {
+    const Measurement& m = batch_->measurements[static_cast<std::size_t>(i)];
+    residual.segment(first_row(i), row_count(i)) = distance_of(m, model.pose_W(m.context));
+  }
+  return residual.cwiseProduct(weight_);
 }
 
 /// From what was measured to rows of unit variance: adds to every standard deviation what is left beyond it, and

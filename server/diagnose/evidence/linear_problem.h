@@ -34,6 +34,8 @@ class LinearProblem {
   [[nodiscard]] const MeasurementBatch& batch() const { return *batch_; }
   /// R: measured - model, whitened.
   [[nodiscard]] const Eigen::VectorXd& residual() const { return residual_; }
+  /// R: measured - `model`, by the same weights.
+  [[nodiscard]] Eigen::VectorXd residual_of(const PhysicalModel& model) const;
   /// R x P: what the model's own parameters do, whitened, a column per prior scale.
   [[nodiscard]] const Eigen::MatrixXd& nuisance() const { return nuisance_; }
   [[nodiscard]] const std::vector<Parameter>& nuisance_parameters() const { return priors_; }

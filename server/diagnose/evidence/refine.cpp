@@ -1,8 +1,10 @@
 #include "server/diagnose/evidence/refine.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
+#include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/effect.h"
 #include "server/numerics/product.h"
 
@@ -14,7 +16,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostSteps = 5;      // of Gauss and Newton; three settle what is nearly linear
+constexpr int kMostSteps = 5;      // of Gauss and Newton; one and a chord settle what is nearly linear
+constexpr int kMostChords = 4;     // steps by one derivative
+constexpr double kStraight = 1;    // standard deviations, of all rows together: what a derivative may mistake
 constexpr double kSettled = 0.05;  // standard deviations, of all parameters together: a step that changes no result
 
 /// How far each parameter stands from its prior, in units of it.
@@ -30,6 +34,7 @@ VectorXd from_prior(const PriorModel& at) {
 /// A normal equation: information * step = right. The model's parameters come first.
 struct NormalEquation {
   MatrixXd information;
+  MatrixXd inverse_factor;  // L⁻¹ of the information L Lᵀ
   VectorXd right;
 };
 
@@ -65,7 +70,7 @@ VectorXd room_of(const PriorModel& at) {
 /// there, and everything else is solved for anew: a step that is cut off afterwards leaves the others where they made
 /// up for what was cut.
 VectorXd bounded_step(const PriorModel& at, const NormalEquation& equation) {
-  VectorXd step = equation.information.llt().solve(equation.right);
+  VectorXd step = equation.inverse_factor.transpose() * (equation.inverse_factor * equation.right);
   const VectorXd room = room_of(at);
   std::vector<bool> held(static_cast<std::size_t>(room.size()), false);
   while (true) {
@@ -79,17 +84,33 @@ VectorXd bounded_step(const PriorModel& at, const NormalEquation& equation) {
   }
 }
 
-/// About where the model stands. `columns`: of the whole background; the priors pull by `distance` from them.
-NormalEquation normal_equation(const LinearProblem& problem, const MatrixXd& columns, const VectorXd& distance) {
-  NormalEquation equation{transposed_product(columns, columns), columns.transpose() * problem.residual()};
-  equation.right.head(distance.size()) -= distance;
-  equation.information.diagonal().array() += 1;
-  return equation;
+/// `columns`: of the whole background.
+NormalEquation normal_equation(const MatrixXd& columns) {
+  MatrixXd information = gram(columns);
+  information.diagonal().array() += 1;
+  MatrixXd inverse = inverse_factor_of(information);
+  return {std::move(information), std::move(inverse), {}};
+}
+
+/// What pulls where the model stands: `left` (R, whitened) of the data and, of the model's own parameters, their
+/// priors. The anonymous functions stand at `functions` times their columns.
+VectorXd pull(const MatrixXd& columns, const VectorXd& left, const PriorModel& at, const VectorXd& functions) {
+  const Index P = at.model.values.size();
+  VectorXd right = columns.transpose() * (left - columns.rightCols(functions.size()) * functions);
+  right.head(P) -= from_prior(at);
+  right.tail(functions.size()) -= functions;
+  return right;
+}
+
+/// Whether the model's own `step` changes no result.
+bool is_settled(const NormalEquation& equation, const VectorXd& step) {
+  const Index P = step.size();
+  return step.dot(equation.information.topLeftCorner(P, P) * step) < kSettled * kSettled;
 }
 
 /// Moves the model by `step`, in units of priors.
 void move(PriorModel& at, const VectorXd& step) {
-  for (Index i = 0; i < at.model.values.size(); ++i) {
+  for (Index i = 0; i < step.size(); ++i) {
     const Parameter& prior = at.priors[static_cast<std::size_t>(i)];
     double& value = at.model.values(i);
     value = std::max(value + prior.prior_scale * step(i), prior.lower);  // rounding
@@ -127,21 +148,25 @@ void remove_from(PriorModel& prior_model, const std::string& source) {
   prior_model.model = without_source(prior_model.model, source);
 }
 
-double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed) {
-  double left = 0;
+void refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed) {
+  const Index P = prior_model.model.values.size();
   for (int k = 0; k < kMostSteps; ++k) {
     const LinearProblem problem(prior_model.model, batch, prior_model.priors, {});
-    const VectorXd distance = from_prior(prior_model);
-    const NormalEquation equation = normal_equation(problem, background_columns(problem, unnamed), distance);
-    const VectorXd step = bounded_step(prior_model, equation);
-    left = problem.residual().squaredNorm() + distance.squaredNorm();
-    left -= 2 * equation.right.dot(step) - step.dot(equation.information * step);
-    move(prior_model, step);
-    const Index P = distance.size();
-    const VectorXd own = step.head(P);
-    if (own.dot(equation.information.topLeftCorner(P, P) * own) < kSettled * kSettled) break;
+    const MatrixXd columns = background_columns(problem, unnamed);
+    NormalEquation equation = normal_equation(columns);
+    VectorXd functions = VectorXd::Zero(columns.cols() - P);
+    VectorXd left = problem.residual();
+    for (int chord = 0; chord < kMostChords; ++chord) {
+      equation.right = pull(columns, left, prior_model, functions);
+      const VectorXd step = bounded_step(prior_model, equation);
+      move(prior_model, step.head(P));
+      functions += step.tail(functions.size());
+      if (is_settled(equation, step.head(P))) return;
+      const VectorXd expected = left - columns.leftCols(P) * step.head(P);
+      left = problem.residual_of(prior_model.model);
+      if ((left - expected).norm() > kStraight) break;
+    }
   }
-  return left;
 }
 
 }  // namespace trammel::cause_search

@@ -12,6 +12,7 @@ struct Unnamed {
   Eigen::MatrixXd columns;              ///< R x m over the poses that are not out, SI, of the fitted size
   double score = 0;                     ///< nat
   double p_value = 1;
+  std::string wanderer = {};  ///< what moves slowly, for people, where it says no more than that
 };
 
 /// All columns of a background, whitened, R x p: the model's own parameters, then the anonymous functions.
@@ -29,7 +30,7 @@ struct PriorModel {
 void remove_from(PriorModel& prior_model, const std::string& source);
 
 /// Identifies all parameters anew, from where they stand, beside the anonymous functions: Gauss-Newton on the whitened
-/// rows, maximum a posteriori. Returns the sum of squares that is left, that of the priors included.
-double refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed);
+/// rows, maximum a posteriori.
+void refine(PriorModel& prior_model, const MeasurementBatch& batch, const std::vector<Unnamed>& unnamed);
 
 }  // namespace trammel::cause_search

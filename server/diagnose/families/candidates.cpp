@@ -9,12 +9,17 @@ namespace trammel::cause_search {
 
 namespace {
 
+constexpr double kPriorOfZero = 1e-3;  // rad
+constexpr double kPriorOfSize = 1e-4;  // of the arm
+
 using causes::Lasting;
 using causes::Numbers;
 using causes::Part;
 using causes::Scope;
 using causes::SearchFamily;
 using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 bool any(const MeasurementBatch& batch, const std::function<bool(const PoseContext&)>& has) {
   return std::any_of(batch.measurements.begin(), batch.measurements.end(),
@@ -119,6 +124,18 @@ double surprise_of(const CauseRecord& record, const LinearProblem& problem) {
   return surprise;
 }
 
+/// R: what the whole arm growing by kPriorOfSize does, whitened: everything moves away from the base.
+VectorXd size_of_arm(const LinearProblem& problem) {
+  VectorXd column = VectorXd::Zero(problem.rows());
+  for (Index i = 0; i < problem.poses(); ++i) {
+    const PoseContext& context = problem.batch().measurements[static_cast<std::size_t>(i)].context;
+    const ArmState state = problem.model().state(context);
+    const Index row = problem.first_row(i);
+    column.segment<3>(row) = kPriorOfSize * (problem.model().pose_W(context).translation() - state.X_WB.translation());
+  }
+  return column.cwiseProduct(problem.weight());
+}
+
 std::vector<Index> all_columns(const Effect& effect) {
   std::vector<Index> all(effect.parameters.size());
   std::iota(all.begin(), all.end(), Index{0});
@@ -154,6 +171,12 @@ class Families {
       case SearchFamily::kPose:
         return add(make_pose_family(problem_, cause));
     }
+  }
+  /// A zero may move slowly where it may be lost at once.
+  void add_slow(const CauseRecord& record, int joint) {
+    if (record.search != SearchFamily::kZeroStep) return;
+    const MatrixXd columns = kPriorOfZero * problem_.by_joint().col(joint);
+    add(make_slow_family(problem_, columns, fmt::format("the zero of joint {}", joint + 1), joint));
   }
   std::vector<FamilyPtr> take() { return std::move(all_); }
 
@@ -203,10 +226,23 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
   return sources;
 }
 
+bool is_path_without_times(const MeasurementBatch& batch) {
+  for (std::size_t i = 1; i < batch.measurements.size(); ++i) {
+    const JointVector step = batch.measurements[i].context.q - batch.measurements[i - 1].context.q;
+    if (step.cwiseAbs().maxCoeff() > thresholds::kPathStep) return false;
+  }
+  return !any(batch, [](const PoseContext& c) { return c.velocity.has_value(); });
+}
+
 std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
   const Chain& robot = problem.model().cell->robot;
   Families families(problem);
   for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add(record, joint); });
+  // Along such a path a lag goes on as smoothly.
+  if (!is_path_without_times(problem.batch())) {
+    for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
+    families.add(make_slow_family(problem, size_of_arm(problem), "the size of the arm", -1));
+  }
   families.add(make_anonymous_family(problem, {}));
   for (int joint = 0; joint < robot.size(); ++joint) {
     families.add(make_anonymous_family(problem, {joint}));

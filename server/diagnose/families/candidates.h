@@ -12,8 +12,11 @@ namespace trammel::cause_search {
 [[nodiscard]] std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBatch& batch,
                                                          std::vector<Unseen>* unseen);
 
+/// Whether its poses follow one another closely, as on a path measured in motion, and nobody recorded when.
+[[nodiscard]] bool is_path_without_times(const MeasurementBatch& batch);
+
 /// Every cause that may be lacking, and its anonymous rivals: a smooth function of each joint, of each pair of joints
-/// and of time. `problem` was made with candidate_sources() and outlives them.
+/// and of time, and what moves slowly. `problem` was made with candidate_sources() and outlives them.
 [[nodiscard]] std::vector<FamilyPtr> make_families(const LinearProblem& problem);
 
 /// The cause that a source in a model's list stands for.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,20 +25,25 @@ struct Best {
   double size = 1;               ///< of a smooth function: its standard deviation, SI
 };
 
-/// What a scan sees of the rows.
-struct View {
-  const Background& background;           ///< with zeros in the rows that are left out
-  const Eigen::VectorXd* keep = nullptr;  ///< R: 1 for a row that is scanned, 0 for one that is left out; null: all
-};
-
 /// A scan summed up pose by pose, for columns g(row) f(pose) of which only the function f of the pose differs.
 struct Shares {
   Eigen::MatrixXd along;   ///< N x k: g's rows of each pose times those of the projected data
   Eigen::MatrixXd root;    ///< N x p: the same with the background's root
   Eigen::VectorXd square;  ///< N: g's own
 };
-[[nodiscard]] Shares shares_of(const LinearProblem& problem, const View& view, const Eigen::VectorXd& g,
-                               const Eigen::MatrixXd& projected);
+/// Those of the columns g that several families have, by what they are called.
+using KnownShares = std::map<std::string, Shares>;
+
+/// What one scan sees of the rows, with one set of data.
+struct View {
+  const Background& background;           ///< with zeros in the rows that are left out
+  const Eigen::VectorXd* keep = nullptr;  ///< R: 1 for a row that is scanned, 0 for one that is left out; null: all
+  std::shared_ptr<KnownShares> known = std::make_shared<KnownShares>();
+};
+
+/// `name`: what `g` is called; the same is summed up once a view.
+[[nodiscard]] const Shares& shares_of(const LinearProblem& problem, const View& view, const std::string& name,
+                                      const Eigen::VectorXd& g, const Eigen::MatrixXd& projected);
 
 /// nat: of `freedom` numbers of equal prior variance, chosen by the data, that explain `strength`.
 [[nodiscard]] double log_evidence(double strength, double freedom);
@@ -58,6 +64,8 @@ class Family {
   [[nodiscard]] virtual bool named() const { return true; }
   /// What an anonymous one depends on: `q4`, `time`.
   [[nodiscard]] virtual std::vector<std::string> depends_on() const { return {}; }
+  /// What moves slowly, for people, where it says no more than that: `the zero of joint 3`; else empty.
+  [[nodiscard]] virtual std::string wanderer() const { return {}; }
   /// False where it says nothing of other poses.
   [[nodiscard]] virtual bool predicts() const { return true; }
   /// What it is called among the others: the same on every background.
@@ -89,6 +97,12 @@ using FamilyPtr = std::unique_ptr<Family>;
 /// A displacement of the tool, any in three axes, by a smooth function of the joints (one or two) or, where `joints` is
 /// empty, of the order in time.
 [[nodiscard]] FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints);
+
+/// Something that moves slowly in the course of the batch, and may come back: a smooth function of the time for every
+/// column of `columns` (R x m, whitened, per prior). It is the rival of what moves at once, or steadily. `wanderer`:
+/// what that is, for people. `joint`: 0-based; -1: of no single one. Null where no time goes by.
+[[nodiscard]] FamilyPtr make_slow_family(const LinearProblem& problem, const Eigen::MatrixXd& columns,
+                                         std::string wanderer, int joint);
 
 /// The lambda of every order of a joint and the orders, for its periodogram.
 [[nodiscard]] Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background);

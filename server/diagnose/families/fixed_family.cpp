@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "server/diagnose/families/family.h"
+#include "server/numerics/product.h"
 
 namespace trammel::cause_search {
 
@@ -26,23 +27,35 @@ double strength_for(double evidence, double freedom) {
 std::string Family::label() const {
   std::string text = to_string(cause(typical()));
   for (const std::string& on : depends_on()) text += " " + on;
-  return text;
+  return text + wanderer();
 }
 
-Shares shares_of(const LinearProblem& problem, const View& view, const VectorXd& g, const MatrixXd& projected) {
-  const Index N = problem.poses();
-  const MatrixXd& U = view.background.root();
-  Shares shares{MatrixXd::Zero(N, projected.cols()), MatrixXd::Zero(N, U.cols()), VectorXd::Zero(N)};
-  for (Index i = 0; i < N; ++i) {
-    const Index row = problem.first_row(i);
-    const Index count = problem.row_count(i);
-    if (view.keep && (*view.keep)(row) == 0) continue;
-    const auto own = g.segment(row, count).transpose();
-    shares.along.row(i).noalias() = own * projected.middleRows(row, count);
-    shares.root.row(i).noalias() = own * U.middleRows(row, count);
-    shares.square(i) = own.squaredNorm();
+namespace {
+
+/// N x k: the rows of each pose, times g's, summed up. Column by column, as they lie in memory.
+MatrixXd summed_up(const LinearProblem& problem, const VectorXd& g, const MatrixXd& rows) {
+  MatrixXd sums(problem.poses(), rows.cols());
+  for (Index k = 0; k < rows.cols(); ++k) {
+    const auto column = rows.col(k);
+    for (Index i = 0; i < problem.poses(); ++i) {
+      double sum = 0;
+      for (Index row = problem.first_row(i); row < problem.first_row(i + 1); ++row) sum += g(row) * column(row);
+      sums(i, k) = sum;
+    }
   }
-  return shares;
+  return sums;
+}
+
+}  // namespace
+
+const Shares& shares_of(const LinearProblem& problem, const View& view, const std::string& name, const VectorXd& g,
+                        const MatrixXd& projected) {
+  const auto known = view.known->find(name);
+  if (known != view.known->end()) return known->second;
+  const VectorXd kept = view.keep ? VectorXd(view.keep->cwiseProduct(g)) : g;
+  Shares shares{summed_up(problem, kept, projected), summed_up(problem, kept, view.background.root()),
+                summed_up(problem, kept, kept)};
+  return view.known->insert_or_assign(name, std::move(shares)).first->second;
 }
 
 namespace {
@@ -60,7 +73,7 @@ class FixedFamily final : public Family {
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
     const MatrixXd C = view.keep ? MatrixXd(view.keep->asDiagonal() * columns_) : columns_;
-    const MatrixXd shared = view.background.root().transpose() * C;
+    const MatrixXd shared = transposed_product(view.background.root(), C);
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C.transpose() * C - shared.transpose() * shared);
     // Directions that at their prior's size change less than the noise cannot be told from none.
     Index hidden = 0;

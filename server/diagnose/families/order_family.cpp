@@ -10,17 +10,21 @@ namespace trammel::cause_search {
 
 namespace {
 
-using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kAmplitude = 1e-3;    // rad, prior: wide, the data choose
-constexpr double kLowestOrder = 2;     // below lie eccentricity and geometry
-constexpr double kHighestOrder = 200;  // cycles a joint turn
+constexpr double kAmplitude = 1e-3;                            // rad, prior: wide, the data choose
+constexpr double kPriorShare = 1 / (kAmplitude * kAmplitude);  // of the information, per rad^2
+constexpr double kLowestOrder = 2;                             // below lie eccentricity and geometry
+constexpr double kHighestOrder = 400;  // cycles a joint turn: two waves a motor turn at a ratio of 200
 constexpr double kStep = 0.2;          // of what two orders differ by that the joint's range just tells apart
 constexpr double kFineSteps = 5;       // to a coarse one, about the best
-constexpr double kTypicalOrder = 50;   // cycles a joint turn: to speak of a gear where none was found
+constexpr Index kFineOrders = 11;      // a coarse step to either side
+constexpr double kOrdersOfMaps = 60;   // cycles a joint turn: a map of 48 harmonics takes over what is below
+constexpr double kMostAbsorbed = 0.75;
+constexpr double kSameStep = 1e-6;    // of a step: rounding
+constexpr double kTypicalOrder = 50;  // cycles a joint turn: to speak of a gear where none was found
 constexpr Index kOrdersAtATime = 96;
 
 class OrderFamily final : public Family {
@@ -32,6 +36,7 @@ class OrderFamily final : public Family {
       q_(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint_);
     const double span = q_.maxCoeff() - q_.minCoeff();
     step_ = kStep * 2 * kPi / std::max(span, thresholds::kSmallestSpan);
+    turn_ = {(step_ * q_).array().sin(), (step_ * q_).array().cos()};
     orders_ = 1 + static_cast<Index>((kHighestOrder - kLowestOrder) / step_);
   }
 
@@ -59,70 +64,120 @@ class OrderFamily final : public Family {
   }
 
   std::vector<Best> scan(const View& view, const MatrixXd& projected) const override {
-    const Shares shares = shares_of(problem_, view, kAmplitude * problem_.by_joint().col(joint_), projected);
+    const Shares& shares = shares_in(view, projected);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
-    for (Index first = 0; first < orders_; first += kOrdersAtATime) {
-      scan_orders(shares, kLowestOrder + step_ * static_cast<double>(first), step_,
-                  std::min(kOrdersAtATime, orders_ - first), best);
-    }
+    const bool one = projected.cols() == 1;
+    scan_orders(shares, one ? promising_orders(shares) : all_orders(), best);
     // Once more about the best of the data itself, which stands in the first column.
-    if (projected.cols() == 1) {
+    if (one) {
       const double fine = step_ / kFineSteps;
       const double from = std::max(kLowestOrder, best[0].order - step_);
-      scan_orders(shares, from, fine, static_cast<Index>(2 * kFineSteps) + 1, best);
+      scan_orders(shares, VectorXd::LinSpaced(kFineOrders, from, from + fine * (kFineOrders - 1)), best);
     }
-    for (Best& one : best) one.evidence = log_evidence(one.strength, one.freedom);
+    for (Best& of_data : best) of_data.evidence = log_evidence(of_data.strength, of_data.freedom);
     return best;
   }
 
-  Periodogram all_orders(const Background& background) const {
+  Periodogram periodogram_of(const Background& background) const {
     const MatrixXd projected = background.project(problem_.residual());
-    const Shares shares = shares_of(problem_, {background}, kAmplitude * problem_.by_joint().col(joint_), projected);
-    Periodogram periodogram{joint_, VectorXd(orders_), VectorXd(orders_), 0};
+    const View view{background};
+    const Shares& shares = shares_in(view, projected);
+    Periodogram periodogram{joint_, all_orders(), VectorXd(orders_), 0};
     for (Index k = 0; k < orders_; ++k) {
       std::vector<Best> best(1);
-      periodogram.order(k) = kLowestOrder + step_ * static_cast<double>(k);
-      scan_orders(shares, periodogram.order(k), step_, 1, best);
+      scan_orders(shares, periodogram.order.segment<1>(k), best);
       periodogram.strength(k) = best[0].strength;
     }
     return periodogram;
   }
 
  private:
-  /// `count` orders from `from`, `step` apart; improves `best` where one is stronger.
-  void scan_orders(const Shares& shares, double from, double step, Index count, std::vector<Best>& best) const {
-    MatrixXd sine(q_.size(), count), cosine(q_.size(), count);
-    const ArrayXd turn_sine = (step * q_.array()).sin();
-    const ArrayXd turn_cosine = (step * q_.array()).cos();
-    ArrayXd s = (from * q_.array()).sin();
-    ArrayXd c = (from * q_.array()).cos();
-    for (Index k = 0; k < count; ++k) {
-      sine.col(k) = s;
-      cosine.col(k) = c;
-      const ArrayXd next = s * turn_cosine + c * turn_sine;
-      c = c * turn_cosine - s * turn_sine;
-      s = next;
+  const Shares& shares_in(const View& view, const MatrixXd& projected) const {
+    return shares_of(problem_, view, fmt::format("joint {}", joint_), problem_.by_joint().col(joint_), projected);
+  }
+  VectorXd all_orders() const {
+    return kLowestOrder + step_ * VectorXd::LinSpaced(orders_, 0, static_cast<double>(orders_ - 1)).array();
+  }
+
+  /// A sine and a cosine of every pose's angle, N x orders each.
+  struct Waves {
+    MatrixXd sine, cosine;
+  };
+  /// Of orders a step apart each comes from the one before, by turning it.
+  Waves waves_of(const VectorXd& orders) const {
+    Waves waves{MatrixXd(q_.size(), orders.size()), MatrixXd(q_.size(), orders.size())};
+    for (Index k = 0; k < orders.size(); ++k) {
+      if (k > 0 && std::abs(orders(k) - orders(k - 1) - step_) < kSameStep * step_) {
+        const auto s = waves.sine.col(k - 1).array();
+        const auto c = waves.cosine.col(k - 1).array();
+        waves.sine.col(k) = s * turn_.cosine.array() + c * turn_.sine.array();
+        waves.cosine.col(k) = c * turn_.cosine.array() - s * turn_.sine.array();
+      } else {
+        waves.sine.col(k) = (orders(k) * q_).array().sin();
+        waves.cosine.col(k) = (orders(k) * q_).array().cos();
+      }
     }
-    const MatrixXd sine_along = transposed_product(shares.along, sine);
-    const MatrixXd cosine_along = transposed_product(shares.along, cosine);
-    const MatrixXd sine_root = transposed_product(shares.root, sine);
-    const MatrixXd cosine_root = transposed_product(shares.root, cosine);
-    for (Index k = 0; k < count; ++k) {
-      // 1: the prior's share.
-      const double ss = 1 + sine.col(k).cwiseAbs2().dot(shares.square) - sine_root.col(k).squaredNorm();
-      const double cc = 1 + cosine.col(k).cwiseAbs2().dot(shares.square) - cosine_root.col(k).squaredNorm();
-      const double sc =
-          sine.col(k).cwiseProduct(cosine.col(k)).dot(shares.square) - sine_root.col(k).dot(cosine_root.col(k));
-      const double determinant = ss * cc - sc * sc;
-      if (!(determinant > 0)) continue;
-      const auto a = sine_along.col(k).array();
-      const auto b = cosine_along.col(k).array();
-      const ArrayXd strength = (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant;
-      for (Index d = 0; d < strength.size(); ++d) {
+    return waves;
+  }
+
+  /// What a wave says of itself, 2 x 2: the prior's share and its own square.
+  struct Information {
+    double ss = kPriorShare, cc = kPriorShare, sc = 0;
+    [[nodiscard]] double determinant() const { return ss * cc - sc * sc; }
+    [[nodiscard]] double strength(double a, double b) const {
+      return (cc * a * a - 2 * sc * a * b + ss * b * b) / determinant();
+    }
+  };
+  static Information own_information(const Waves& waves, Index k, const VectorXd& square) {
+    const auto sine = waves.sine.col(k);
+    const auto cosine = waves.cosine.col(k);
+    return {kPriorShare + sine.cwiseAbs2().dot(square), kPriorShare + cosine.cwiseAbs2().dot(square),
+            sine.cwiseProduct(cosine).dot(square)};
+  }
+
+  /// The orders among which the strongest is. What an order would explain if nothing of it were in the background is
+  /// soon computed, and explains no more than it does. Beyond what maps of the joint take over, the background makes
+  /// kMostAbsorbed of a wave at most: what is weaker even so is not the strongest.
+  VectorXd promising_orders(const Shares& shares) const {
+    const VectorXd orders = all_orders();
+    VectorXd least(orders_);
+    for (Index first = 0; first < orders_; first += kOrdersAtATime) {
+      const Index count = std::min(kOrdersAtATime, orders_ - first);
+      const Waves waves = waves_of(orders.segment(first, count));
+      const VectorXd a = waves.sine.transpose() * shares.along.col(0);
+      const VectorXd b = waves.cosine.transpose() * shares.along.col(0);
+      for (Index k = 0; k < count; ++k)
+        least(first + k) = own_information(waves, k, shares.square).strength(a(k), b(k));
+    }
+    const double strongest = least.maxCoeff();
+    std::vector<double> promising;
+    for (Index k = 0; k < orders_; ++k) {
+      if (orders(k) < kOrdersOfMaps || least(k) >= (1 - kMostAbsorbed) * strongest) promising.push_back(orders(k));
+    }
+    return Eigen::Map<const VectorXd>(promising.data(), static_cast<Index>(promising.size()));
+  }
+
+  /// Improves `best` where one of the `orders` is stronger.
+  void scan_orders(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
+    for (Index first = 0; first < orders.size(); first += kOrdersAtATime)
+      scan_some(shares, orders.segment(first, std::min(kOrdersAtATime, orders.size() - first)), best);
+  }
+  void scan_some(const Shares& shares, const VectorXd& orders, std::vector<Best>& best) const {
+    const Waves waves = waves_of(orders);
+    const MatrixXd sine_along = transposed_product(shares.along, waves.sine);
+    const MatrixXd cosine_along = transposed_product(shares.along, waves.cosine);
+    const MatrixXd sine_root = transposed_product(shares.root, waves.sine);
+    const MatrixXd cosine_root = transposed_product(shares.root, waves.cosine);
+    for (Index k = 0; k < orders.size(); ++k) {
+      Information left = own_information(waves, k, shares.square);
+      left.ss -= sine_root.col(k).squaredNorm();
+      left.cc -= cosine_root.col(k).squaredNorm();
+      left.sc -= sine_root.col(k).dot(cosine_root.col(k));
+      if (!(left.determinant() > 0)) continue;
+      for (Index d = 0; d < shares.along.cols(); ++d) {
         Best& one = best[static_cast<std::size_t>(d)];
-        if (strength(d) > one.strength) {
-          one = {.strength = strength(d), .freedom = 2, .order = from + step * static_cast<double>(k)};
-        }
+        const double strength = left.strength(sine_along(d, k), cosine_along(d, k));
+        if (strength > one.strength) one = {.strength = strength, .freedom = 2, .order = orders(k)};
       }
     }
   }
@@ -132,6 +187,7 @@ class OrderFamily final : public Family {
   const int joint_;
   VectorXd q_;
   double step_ = 0;
+  Waves turn_;  // by one step
   Index orders_ = 0;
 };
 
@@ -146,7 +202,7 @@ FamilyPtr make_order_family(const LinearProblem& problem, Cause cause) {
 Periodogram periodogram(const LinearProblem& problem, int joint, const Background& background) {
   Cause of_joint;
   of_joint.joint = joint;
-  return OrderFamily(problem, of_joint).all_orders(background);
+  return OrderFamily(problem, of_joint).periodogram_of(background);
 }
 
 }  // namespace trammel::cause_search

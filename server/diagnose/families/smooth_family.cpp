@@ -17,6 +17,8 @@ using Eigen::VectorXd;
 constexpr double kBox = 1.2;  // half width of the box that the basis lives in; data lie in [-1, 1]
 constexpr Index kFunctionsOfOne = 16;
 constexpr Index kFunctionsOfEach = 7;                      // of two
+constexpr Index kSlowFunctions = 8;                        // of the time: what is faster is not slow
+constexpr double kLeastTime = 1e-6;                        // s
 constexpr Index kHarmonics[] = {4, 6, 9, 14, 21, 32, 48};  // of a joint's turn, all of one size
 constexpr double kTelling = 1e-4;                  // of the largest deviation: what a function may have and be left out
 constexpr int kSizes = 17;                         // a quarter of a decade apart
@@ -71,14 +73,22 @@ class SmoothFamily : public Family {
     MatrixXd root(count, view.background.root().cols());
     for (std::size_t s = 0; s < g_.size(); ++s) {
       const Index first = static_cast<Index>(s) * each;
-      const Shares shares = shares_of(problem_, view, g_[s], projected);
+      if (!pose_by_pose_) {
+        const VectorXd g = view.keep ? VectorXd(view.keep->cwiseProduct(g_[s])) : g_[s];
+        const MatrixXd whole = times_functions(g, functions);
+        along.middleRows(first, each) = transposed_product(whole, projected);
+        root.middleRows(first, each) = transposed_product(whole, view.background.root());
+        information.block(first, first, each, each) = gram(whole);
+        continue;
+      }
+      const Shares& shares = shares_of(problem_, view, g_names_[s], g_[s], projected);
       along.middleRows(first, each) = transposed_product(functions, shares.along);
       root.middleRows(first, each) = transposed_product(functions, shares.root);
       information.block(first, first, each, each).noalias() =
           functions.transpose() * shares.square.asDiagonal() * functions;
     }
     const MatrixXd across = root.transpose();
-    information -= transposed_product(across, across);
+    information -= gram(across);
     std::vector<Best> best(static_cast<std::size_t>(projected.cols()));
     for (std::size_t scale = 0; scale < scales; ++scale) choose(information, along, scale, best);
     return best;
@@ -87,15 +97,10 @@ class SmoothFamily : public Family {
   MatrixXd columns(const Best& best) const final {
     const VectorXd& deviation = deviations_[best.length_scale];
     const Index each = deviation.size();
+    const MatrixXd functions = best.size * functions_.leftCols(each) * deviation.asDiagonal();
     MatrixXd all(problem_.rows(), static_cast<Index>(g_.size()) * each);
-    for (Index i = 0; i < problem_.poses(); ++i) {
-      const Index row = problem_.first_row(i);
-      for (std::size_t s = 0; s < g_.size(); ++s) {
-        all.block(row, static_cast<Index>(s) * each, problem_.row_count(i), each) =
-            best.size * g_[s].segment(row, problem_.row_count(i)) *
-            functions_.row(i).head(each).cwiseProduct(deviation.transpose());
-      }
-    }
+    for (std::size_t s = 0; s < g_.size(); ++s)
+      all.middleCols(static_cast<Index>(s) * each, each) = times_functions(g_[s], functions);
     return all;
   }
   Best typical() const final { return {.freedom = 1, .length_scale = deviations_.size() - 1, .size = typical_}; }
@@ -103,13 +108,25 @@ class SmoothFamily : public Family {
  protected:
   const LinearProblem& problem_;
   std::vector<VectorXd> g_;           // R each
+  std::vector<std::string> g_names_;  // what each is called among the families
   MatrixXd functions_;                // N x k
   std::size_t looked_for_ = 0;        // how many of the length scales; 0: all
   std::vector<VectorXd> deviations_;  // one for every length scale, of the functions that it takes: the first ones
   double smallest_ = 1e-6;
   double typical_ = 1e-4;
+  bool pose_by_pose_ = true;  // g is shared with other families, or there are many functions
 
  private:
+  /// R x functions: g(row) f(pose).
+  MatrixXd times_functions(const VectorXd& g, const MatrixXd& functions) const {
+    MatrixXd all(problem_.rows(), functions.cols());
+    for (Index i = 0; i < problem_.poses(); ++i) {
+      const Index row = problem_.first_row(i);
+      const Index count = problem_.row_count(i);
+      all.middleRows(row, count).noalias() = g.segment(row, count) * functions.row(i);
+    }
+    return all;
+  }
   void choose(const MatrixXd& information, const MatrixXd& along, std::size_t scale, std::vector<Best>& best) const {
     std::vector<Index> telling;
     for (Index k = 0; k < deviations_[scale].size(); ++k) {
@@ -155,6 +172,7 @@ class JointMapFamily final : public SmoothFamily {
       : SmoothFamily(problem), cause_(std::move(cause)) {
     const Index most = std::end(kHarmonics)[-1];
     g_.emplace_back(problem.by_joint().col(cause_.joint));
+    g_names_.push_back(fmt::format("joint {}", cause_.joint));
     functions_ = MatrixXd(q.size(), 2 * most);
     for (Index h = 1; h <= most; ++h) {
       functions_.col(2 * h - 2) = (static_cast<double>(h) * q.array()).sin();
@@ -197,6 +215,7 @@ class AnonymousFamily final : public SmoothFamily {
         g(row) = problem.weight()(row);
       }
       g_.push_back(std::move(g));
+      g_names_.push_back(fmt::format("axis {}", axis));
     }
   }
   bool named() const override { return false; }
@@ -214,7 +233,50 @@ class AnonymousFamily final : public SmoothFamily {
   std::vector<std::string> on_;
 };
 
+class SlowFamily final : public SmoothFamily {
+ public:
+  SlowFamily(const LinearProblem& problem, const MatrixXd& columns, std::string wanderer, int joint,
+             const VectorXd& time)
+      : SmoothFamily(problem), wanderer_(std::move(wanderer)), joint_(joint) {
+    functions_ = sines(time, kSlowFunctions);
+    // Where it stands on average is another cause: a zero, a base.
+    functions_.rowwise() -= Eigen::RowVectorXd(functions_.colwise().mean());
+    for (const double length_scale : {0.3, 0.6, 1.2}) deviations_.push_back(deviations(kSlowFunctions, length_scale));
+    for (Index k = 0; k < columns.cols(); ++k) g_.emplace_back(columns.col(k));
+    pose_by_pose_ = false;
+    smallest_ = 1e-3;
+    typical_ = 1e-2;
+  }
+  bool named() const override { return false; }
+  Cause cause(const Best&) const override { return unknown_cause(joint_); }
+  std::string wanderer() const override { return wanderer_; }
+  std::vector<std::string> depends_on() const override {
+    if (joint_ < 0) return {"time"};
+    return {fmt::format("q{}", joint_ + 1), "time"};
+  }
+
+ private:
+  std::string wanderer_;
+  int joint_;
+};
+
+/// [-1, 1] over the poses; by the row where not every pose has its time. Empty where no time goes by.
+VectorXd times_of(const LinearProblem& problem) {
+  VectorXd time = VectorXd::LinSpaced(problem.poses(), 0, static_cast<double>(problem.poses() - 1));
+  const auto& poses = problem.batch().measurements;
+  if (std::all_of(poses.begin(), poses.end(), [](const Measurement& m) { return m.context.time.has_value(); })) {
+    for (Index i = 0; i < time.size(); ++i) time(i) = *poses[static_cast<std::size_t>(i)].context.time;
+  }
+  return spread(time, kLeastTime);
+}
+
 }  // namespace
+
+FamilyPtr make_slow_family(const LinearProblem& problem, const MatrixXd& columns, std::string wanderer, int joint) {
+  const VectorXd time = times_of(problem);
+  if (time.size() == 0) return nullptr;
+  return std::make_unique<SlowFamily>(problem, columns, std::move(wanderer), joint, time);
+}
 
 FamilyPtr make_joint_map_family(const LinearProblem& problem, Cause cause) {
   const VectorXd q = angles(problem, cause.joint);

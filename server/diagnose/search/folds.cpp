@@ -35,7 +35,7 @@ Folds::Folds(const LinearProblem& problem, MatrixXd columns) : columns_(std::mov
   total_ = MatrixXd::Identity(columns_.cols(), columns_.cols());
   for (const std::vector<Index>& rows : held_) {
     const MatrixXd Z = columns_(rows, Eigen::all);
-    information_.push_back(transposed_product(Z, Z));
+    information_.push_back(gram(Z));
     total_ += information_.back();
   }
 }
@@ -51,7 +51,9 @@ VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>
   for (std::size_t fold = 0; fold < held_.size(); ++fold) {
     const MatrixXd Z = columns_(held_[fold], Eigen::all);
     const VectorXd known = right - Z.transpose() * data(held_[fold]);
-    const VectorXd numbers = information_without(fold)(places, places).llt().solve(VectorXd(known(places)));
+    const MatrixXd information = information_without(fold);
+    const MatrixXd inverse = inverse_factor_of(chosen.empty() ? information : MatrixXd(information(places, places)));
+    const VectorXd numbers = inverse.transpose() * (inverse * VectorXd(known(places)));
     left(held_[fold]) -= Z(Eigen::all, places) * numbers;
   }
   return left;

@@ -95,12 +95,12 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
 
 namespace {
 
-void choose_form_again(SearchResult& result, const std::string& form, const std::vector<std::string>& own_sources) {
+bool choose_form_again(SearchResult& result, const std::string& form, const std::vector<std::string>& own_sources) {
   const std::string cause(cause_spelled(form).spelling);
   const bool own_is_open = std::find(own_sources.begin(), own_sources.end(), cause) != own_sources.end();
   const auto finding = std::find_if(result.accepted.begin(), result.accepted.end(),
                                     [&](const Accepted& one) { return one.in_model == form; });
-  if (finding == result.accepted.end() && !own_is_open) return;
+  if (finding == result.accepted.end() && !own_is_open) return false;
   const VectorXd weight = weight_of(result.after, result.batch);
   const PriorModel now = result.after;
   double least = held_out_square(now, result, weight);
@@ -115,18 +115,23 @@ void choose_form_again(SearchResult& result, const std::string& form, const std:
     chosen = other;
     result.after = std::move(*changed);
   }
-  if (chosen == form) return;
+  if (chosen == form) return false;
   if (finding != result.accepted.end()) {
     finding->in_model = chosen;
   } else {
     note(result.reformed, form, chosen);
   }
+  return true;
 }
 
 }  // namespace
 
-void choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources) {
-  for (const std::string& form : forms_in(result.after.model)) choose_form_again(result, form, own_sources);
+bool choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources) {
+  bool changed = false;
+  for (const std::string& form : forms_in(result.after.model)) {
+    if (choose_form_again(result, form, own_sources)) changed = true;
+  }
+  return changed;
 }
 
 }  // namespace trammel::cause_search

@@ -14,7 +14,7 @@ namespace trammel::cause_search {
 
 /// Chooses the form of each cause in the model that has several, anew beside all that was found since. Chosen while
 /// much was missing it may be another one, and what a wrong form leaves over would be given other names. A cause of the
-/// cell's own list is changed only where that list (`own_sources`) leaves its form open.
-void choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources);
+/// cell's own list is changed only where that list (`own_sources`) leaves its form open. False where none is changed.
+[[nodiscard]] bool choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources);
 
 }  // namespace trammel::cause_search

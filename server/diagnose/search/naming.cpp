@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/diagnose/families/candidates.h"
 #include "server/diagnose/thresholds.h"
 
 namespace trammel::cause_search {
@@ -75,19 +76,6 @@ bool is_doubtful_case(const Cause& general, const Cause& special) {
   return has_rival(general, special, {Likeness::kDoubtfulCase}, false);
 }
 
-namespace {
-
-/// Poses that follow one another closely: measured in motion, as it seems.
-bool is_path(const MeasurementBatch& batch) {
-  for (std::size_t i = 1; i < batch.measurements.size(); ++i) {
-    const JointVector step = batch.measurements[i].context.q - batch.measurements[i - 1].context.q;
-    if (step.cwiseAbs().maxCoeff() > thresholds::kPathStep) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch) {
   const auto recorded = [&](auto has) {
     return std::all_of(batch.measurements.begin(), batch.measurements.end(),
@@ -105,10 +93,7 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
       rivals.push_back(cause_at(*other));
   }
   // Along a path a lag goes on smoothly: it looks like what a joint does, and like what began on the way.
-  const bool in_motion =
-      is_path(batch) && std::none_of(batch.measurements.begin(), batch.measurements.end(),
-                                     [](const Measurement& m) { return m.context.velocity.has_value(); });
-  if (!in_motion || own.search == causes::SearchFamily::kPose) return rivals;
+  if (!is_path_without_times(batch) || own.search == causes::SearchFamily::kPose) return rivals;
   for (const CauseRecord* other : all_causes()) {
     if (other->needs.velocity) rivals.push_back(cause_at(*other));
   }

@@ -7,6 +7,7 @@
 #include "server/diagnose/search/forms.h"
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/search/pruning.h"
+#include "server/diagnose/search/slow_rival.h"
 #include "server/diagnose/search/standing.h"
 #include "server/diagnose/thresholds.h"
 
@@ -46,7 +47,10 @@ class Search {
   [[nodiscard]] Result<bool> step();
   /// Drops one that does not pass any more beside all the rest; false where all pass.
   [[nodiscard]] bool prune();
-  void choose_forms_again() { cause_search::choose_forms_again(result_, own_sources_); }
+  /// Chooses the form of each cause in the model anew; false where all stay what they are.
+  [[nodiscard]] bool choose_forms_again() { return cause_search::choose_forms_again(result_, own_sources_); }
+  /// Whether so much was found since the forms were chosen that they may be others.
+  [[nodiscard]] bool is_time_for_forms();
   /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
   /// more like it.
   [[nodiscard]] Status reconsider();
@@ -65,8 +69,12 @@ class Search {
   [[nodiscard]] bool holds_in_folds(const Standing& standing, const Choice& choice, std::size_t place) const;
   [[nodiscard]] Accepted accepted(const Standing& standing, const Scan& seen, std::size_t place) const;
 
-  void take_function(const Standing& standing, const Scan& seen, std::size_t place);
+  /// `columns`: R x k, whitened, of the fitted size.
+  void take_function(const LinearProblem& problem, const MatrixXd& columns, const std::vector<std::string>& depends_on,
+                     const std::string& wanderer, double score);
   [[nodiscard]] Status take_named(const Standing& standing, const Choice& choice, std::size_t place);
+  [[nodiscard]] std::vector<Accepted> all_out(const Standing& standing, const Scan& seen, std::size_t place) const;
+  void take_outliers(const LinearProblem& problem, std::vector<Accepted> out);
   void take_outlier(const LinearProblem& problem, Accepted one);
   [[nodiscard]] Status take_cause(Accepted one);
   [[nodiscard]] Result<bool> name_again(Accepted& one);
@@ -82,6 +90,7 @@ class Search {
   Chance chance_;
   std::vector<std::string> own_sources_;  // as the cell lists them
   std::size_t renewed_for_ = 0;           // how much had been found when chance_ was drawn
+  std::size_t formed_for_ = 0;            // the same when the forms were chosen last
   std::vector<Cause> closed_;             // were tried and did not hold
 };
 
@@ -102,7 +111,9 @@ Result<bool> Search::step() {
   if (!best || choice.seen.score[*best] < chance_.limit) return false;
   const auto named = best_named(standing.families, choice);
   if (is_function(standing, choice, *best, named)) {
-    take_function(standing, choice.seen, *best);
+    const Family& family = *standing.families[*best];
+    take_function(standing.problem, family.columns(choice.seen.best[*best]), family.depends_on(), family.wanderer(),
+                  choice.seen.score[*best]);
     return true;
   }
   if (const Status taken = take_named(standing, choice, *named); !taken) return tl::make_unexpected(taken.error());
@@ -150,21 +161,29 @@ bool Search::is_function(const Standing& standing, const Choice& choice, std::si
   if (standing.families[best]->named()) return false;
   if (!named) return true;
   const std::vector<double>& score = choice.seen.score;
-  return score[best] > score[*named] + thresholds::kUnnamedMargin &&
+  const bool is_slow = !standing.families[best]->wanderer().empty();
+  return score[best] > score[*named] + (is_slow ? thresholds::kSlowInstead : thresholds::kUnnamedMargin) &&
          named_path_score(standing, choice.open) < score[best];
 }
 
 /// nat: what the best few named causes, taken one after the other, explain together.
 double Search::named_path_score(const Standing& standing, const Admitted& open) const {
   MatrixXd columns = standing.columns;
+  std::vector<std::size_t> steps;  // taken already
   double total = 0;
   for (int k = 0; k < thresholds::kNamedPath; ++k) {
     const Background background(columns);
+    // A second step of one cause makes a better ramp of the first, and says no more.
+    const auto is_new = [&](std::size_t f) {
+      const Cause cause = standing.families[f]->cause(standing.families[f]->typical());
+      return cause.pose_id.empty() || std::find(steps.begin(), steps.end(), f) == steps.end();
+    };
     const Scan seen = scan(standing.families, {background}, standing.problem.residual(), chance_,
-                           [&](std::size_t f) { return standing.families[f]->named() && open(f); });
+                           [&](std::size_t f) { return standing.families[f]->named() && open(f) && is_new(f); });
     const auto best = seen.strongest([](std::size_t) { return true; });
     if (!best || seen.score[*best] < chance_.limit) break;
     total += seen.score[*best];
+    steps.push_back(*best);
     const MatrixXd chosen = standing.families[*best]->columns(seen.best[*best]);
     columns.conservativeResize(Eigen::NoChange, columns.cols() + chosen.cols());
     columns.rightCols(chosen.cols()) = chosen;
@@ -199,19 +218,20 @@ Accepted Search::accepted(const Standing& standing, const Scan& seen, std::size_
                                 options_.seed + kNamingDraw);
   one.naming_frequency = naming.frequency;
   one.could_also_be = std::move(naming.could_also_be);
+  const auto slow = slow_rival(standing, seen, place);
+  const double ahead = std::max(0.0, thresholds::kStepShare * one.best.strength - thresholds::kStepChance);
+  if (slow && slow->gap > -ahead) one.could_also_be.push_back(unknown_cause(one.cause.joint));
   return one;
 }
 
-void Search::take_function(const Standing& standing, const Scan& seen, std::size_t place) {
-  const Family& family = *standing.families[place];
-  const MatrixXd all = family.columns(seen.best[place]);
+void Search::take_function(const LinearProblem& problem, const MatrixXd& columns,
+                           const std::vector<std::string>& depends_on, const std::string& wanderer, double score) {
   std::vector<Index> telling;
-  for (Index k = 0; k < all.cols(); ++k) {
-    if (all.col(k).norm() > kTellingColumn) telling.push_back(k);
+  for (Index k = 0; k < columns.cols(); ++k) {
+    if (columns.col(k).norm() > kTellingColumn) telling.push_back(k);
   }
-  result_.unnamed.push_back({family.depends_on(),
-                             standing.problem.weight().cwiseInverse().asDiagonal() * all(Eigen::all, telling),
-                             seen.score[place], chance_.p_value(seen.score[place])});
+  result_.unnamed.push_back({depends_on, problem.weight().cwiseInverse().asDiagonal() * columns(Eigen::all, telling),
+                             score, chance_.p_value(score), wanderer});
   refine_all();
 }
 
@@ -220,10 +240,41 @@ Status Search::take_named(const Standing& standing, const Choice& choice, std::s
     closed_.push_back(standing.families[place]->cause(choice.seen.best[place]));
     return {};
   }
-  Accepted one = accepted(standing, choice.seen, place);
-  if (standing.families[place]->predicts()) return take_cause(std::move(one));
-  take_outlier(standing.problem, std::move(one));
+  const auto slow = slow_rival(standing, choice.seen, place);
+  if (slow && slow->gap > thresholds::kSlowInstead) {
+    take_function(standing.problem, slow->columns, slow->depends_on, slow->wanderer,
+                  choice.seen.score[place] + slow->gap);
+    return {};
+  }
+  if (standing.families[place]->predicts()) return take_cause(accepted(standing, choice.seen, place));
+  take_outliers(standing.problem, all_out(standing, choice.seen, place));
   return {};
+}
+
+/// The pose at `place` of the scan, and those that are out nearly as far: they need no look of their own.
+std::vector<Accepted> Search::all_out(const Standing& standing, const Scan& seen, std::size_t place) const {
+  const Family& family = *standing.families[place];
+  const VectorXd projected = standing.background.project(standing.problem.residual());
+  const double enough = std::max(thresholds::kOutAsWell * seen.best[place].evidence,
+                                 chance_.penalty_of(family) + thresholds::kBeyondFolds * chance_.limit);
+  std::vector<Accepted> out;
+  VectorXd keep = VectorXd::Ones(standing.problem.rows());
+  Scan next = seen;
+  do {
+    out.push_back(accepted(standing, next, place));
+    const Index pose = next.best[place].pose;
+    keep.segment(standing.problem.first_row(pose), standing.problem.row_count(pose)).setZero();
+    next.best[place] = family.scan({standing.background, &keep}, projected).front();
+    next.score[place] = next.best[place].evidence - chance_.penalty_of(family);
+  } while (next.best[place].evidence >= enough);
+  return out;
+}
+
+void Search::take_outliers(const LinearProblem& problem, std::vector<Accepted> out) {
+  // The last first: the places of the others stay what they are.
+  std::sort(out.begin(), out.end(), [](const Accepted& a, const Accepted& b) { return a.best.pose > b.best.pose; });
+  for (Accepted& one : out) take_outlier(problem, std::move(one));
+  refine_all();
 }
 
 void Search::take_outlier(const LinearProblem& problem, Accepted one) {
@@ -246,7 +297,6 @@ void Search::take_outlier(const LinearProblem& problem, Accepted one) {
     drop_rows(function.columns, problem.first_row(pose), problem.row_count(pose));
   }
   result_.accepted.push_back(std::move(one));
-  refine_all();
 }
 
 /// Puts the cause into the model. A second map of a joint is more of the first, and takes its place.
@@ -273,6 +323,14 @@ std::vector<Accepted>::iterator Search::known_map(const Cause& cause) {
   return std::find_if(result_.accepted.begin(), result_.accepted.end(), [&](const Accepted& one) {
     return is_map && one.cause.cause == cause.cause && one.cause.joint == cause.joint;
   });
+}
+
+/// The more there is, the less one more changes: half as much again.
+bool Search::is_time_for_forms() {
+  const std::size_t found = result_.accepted.size() + result_.unnamed.size();
+  if (2 * found <= 3 * formed_for_ && found >= formed_for_) return false;
+  formed_for_ = found;
+  return true;
 }
 
 bool Search::prune() {
@@ -389,7 +447,7 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
     const Result<bool> more = search.step();
     if (!more) return tl::make_unexpected(more.error());
     changed = *more || search.prune();
-    if (changed) search.choose_forms_again();
+    if (!changed || search.is_time_for_forms()) changed = search.choose_forms_again() || changed;
   }
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
   search.open_negative_play();

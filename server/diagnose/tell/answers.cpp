@@ -48,6 +48,18 @@ std::vector<const CauseRecord*> examples() {
   return all;
 }
 
+/// For people; empty where nothing does.
+std::string what_moves_slowly(const std::vector<Unnamed>& unnamed) {
+  std::vector<std::string> wanderers;
+  for (const Unnamed& one : unnamed) {
+    if (!one.wanderer.empty() && std::find(wanderers.begin(), wanderers.end(), one.wanderer) == wanderers.end())
+      wanderers.push_back(one.wanderer);
+  }
+  if (wanderers.empty()) return "";
+  return fmt::format("{} moved slowly in the course of the batch, as it does with the temperature; {}",
+                     fmt::join(wanderers, " and "), what_slow_changes_need());
+}
+
 Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all) {
   if (found.unnamed.empty()) return {};
   const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
@@ -64,6 +76,8 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
                                     [](const Accepted& one) { return is_play(one.cause); });
     unexplained.hint = what_negative_play_may_be(found.negative_play, every);
   }
+  const std::string slow = what_moves_slowly(found.unnamed);
+  unexplained.hint += (unexplained.hint.empty() || slow.empty() ? "" : ". ") + slow;
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
   const Index count = numbers.size() - P;
@@ -110,12 +124,13 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
 }
 
 /// Which number of a cause it is may stay open: the cause as a whole is identified anyway. And a more general
-/// description does the same to the poses.
+/// description does the same to the poses, as does the best known shape of something.
 bool is_sure(const Finding& finding) {
-  return std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
-    return (other.cause == finding.cause.cause && other.joint == finding.cause.joint) ||
-           is_description_of(other, finding.cause);
-  });
+  return !finding.whole ||
+         std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
+           return (other.cause == finding.cause.cause && other.joint == finding.cause.joint) ||
+                  is_description_of(other, finding.cause);
+         });
 }
 
 }  // namespace
@@ -151,10 +166,12 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
 }
 
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   Diagnosis& diagnosis) {
+                   bool more_than_noise, Diagnosis& diagnosis) {
   const SearchResult& found = explained.found;
   diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
-  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded);
+  // Beside something unexplained, what is left is that as well: how large a finding is beside it says how sure it is.
+  const bool more = found.unnamed.empty() && more_than_noise;
+  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded, more);
   diagnosis.verdict = verdict_of(diagnosis);
   for (const Accepted& one : found.accepted) {
     if (one.is_outlier()) diagnosis.suspects.push_back(one.pose);

@@ -33,9 +33,10 @@ struct Explained {
 
 /// Noise, errors before and after, the waterfall from the one to the other.
 void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
-/// Findings, what stays unexplained, verdict, suspects. `recorded`: the batch without surrogates.
+/// Findings, what stays unexplained, verdict, suspects. `recorded`: the batch without surrogates. `more_than_noise`: is
+/// left.
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   Diagnosis& diagnosis);
+                   bool more_than_noise, Diagnosis& diagnosis);
 /// The sources before and those that the model could be extended to: what was found and is beyond doubt.
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis);
 /// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects among them.

@@ -1,6 +1,7 @@
 #include "server/diagnose/tell/doubts.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/tell/wording.h"
@@ -9,6 +10,8 @@
 namespace trammel::cause_search {
 
 namespace {
+
+constexpr Eigen::Index kNumbersOfPayload = 4;  // its mass, then its centre of gravity
 
 bool contains(const std::vector<Cause>& causes, const Cause& cause) {
   return std::find(causes.begin(), causes.end(), cause) != causes.end();
@@ -38,6 +41,14 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
+/// Whether the cause begins at more than one pose.
+bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
+  return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose &&
+         std::count_if(found.begin(), found.end(), [&](const Cause& other) {
+           return other.cause == cause.cause && other.joint == cause.joint;
+         }) > 1;
+}
+
 /// Adds what is told by the time alone.
 void add_going_with_time(std::vector<Cause>& rivals) {
   for (const CauseRecord* record : all_causes()) {
@@ -53,6 +64,14 @@ void add_rivals_of_surrogate(const Cause& cause, std::vector<Cause>& rivals) {
   if (rivals.empty()) rivals.push_back(unknown_cause());
 }
 
+/// What pulls at the joints as a payload does.
+void add_what_weighs(std::vector<Cause>& rivals) {
+  for (const CauseRecord* record : all_causes()) {
+    if (record->acts.on == causes::ActsOn::kLoad && record->search == causes::SearchFamily::kNone)
+      add(rivals, cause_at(*record));
+  }
+}
+
 std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
   if (record_of(cause).needs.direction)
     return "needs the approach direction of each pose (dir columns): it was taken from the order of the rows";
@@ -66,7 +85,20 @@ std::string what_to_record(const Cause& cause, const Surrogates& surrogates) {
 
 }  // namespace
 
-Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside) {
+bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size) {
+  const CauseRecord& record = record_of(cause);
+  if (record.lasting != causes::Lasting::kAlways || size.size() == 0) return false;
+  if (record.summary == causes::Summary::kAmplitude) return size.norm() > thresholds::kUnlikelyEccentricity;
+  if (record.part != causes::Part::kPayload) return false;
+  double farthest = 0;  // of a centre of gravity; a mass may be anything
+  for (Eigen::Index k = 0; k < size.size(); ++k) {
+    if (k % kNumbersOfPayload != 0) farthest = std::max(farthest, std::abs(size(k)));
+  }
+  return farthest > thresholds::kUnlikelyPayload;
+}
+
+Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside,
+                bool in_both_halves, bool unlikely) {
   const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
   const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
   std::vector<Cause> many = descriptions_of_many(cause, beside.found);
@@ -77,16 +109,30 @@ Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>&
   if (by_surrogate) add_rivals_of_surrogate(cause, could_also_be);
   if (dwarfed) could_also_be.push_back(unknown_cause());
   could_also_be.insert(could_also_be.end(), many.begin(), many.end());
+  const bool again = begins_again(cause, beside.found);
+  if (again) add(could_also_be, unknown_cause(cause.joint));
+  if (unlikely) add_what_weighs(could_also_be);
+  const bool by_half = beside.more_than_noise && !in_both_halves;
+  if (by_half) add(could_also_be, unknown_cause(cause.joint));
+  const bool whole = !beside.more_than_noise || !could_also_be.empty();
+  if (!whole) could_also_be.push_back(unknown_cause(cause.joint));
 
   const auto action = [&]() -> std::string {
     if (!many.empty())
       return fmt::format("measure more poses over the range of joint {}: its error has no single order",
                          cause.joint + 1);
     if (dwarfed) return "find first what is unknown here: it is several times larger";
+    if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
+    if (unlikely)
+      return "it is larger than robots have it: measure with another known payload, which the arm's own weight does "
+             "not "
+             "follow";
+    if (by_half)
+      return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
     if (by_surrogate) return what_to_record(cause, beside.surrogates);
     return action_for(cause, rivals);
   };
-  return {std::move(could_also_be), action()};
+  return {std::move(could_also_be), whole, action()};
 }
 
 }  // namespace trammel::cause_search

@@ -12,6 +12,7 @@
 #include "server/diagnose/tell/doubts.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
+#include "server/numerics/product.h"
 
 namespace trammel::cause_search {
 
@@ -21,6 +22,8 @@ using causes::Summary;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+constexpr Index kBlocksOfHalves = 16;  // of poses one after the other, taken by turns: each half has all of the day
 
 /// The joint estimate of everything, about the model's values, in units of priors.
 struct Estimated {
@@ -134,7 +137,7 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
 class Findings {
  public:
   Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-           const Surrogates& surrogates, const MeasurementBatch& recorded);
+           const Surrogates& surrogates, const MeasurementBatch& recorded, bool more_than_noise);
 
   [[nodiscard]] Finding of(const Accepted& one) const { return one.is_outlier() ? outlier(one) : cause(one); }
 
@@ -146,12 +149,17 @@ class Findings {
   /// The poses at which `one` may have begun, given its `effect` and everything else that is free (`rest`).
   [[nodiscard]] std::vector<PossibleBeginning> beginnings(const Accepted& one, const VectorXd& effect,
                                                           const Background& rest) const;
+  /// Whether the poses of every second block, and the others, show `one` by themselves. `effect`: what it does, with
+  /// the columns `others` free.
+  [[nodiscard]] bool is_in_both_halves(const Accepted& one, const VectorXd& effect,
+                                       const std::vector<Index>& others) const;
   /// The family of `one`; null where it does not begin at a pose.
   [[nodiscard]] const Family* step_family(const Accepted& one) const;
 
   const LinearProblem& problem_;
   const Surrogates& surrogates_;
   std::vector<Cause> causes_;
+  double limit_;  // nat: the line of a finding
   Beside beside_;
   MatrixXd columns_;
   Estimated estimated_;
@@ -174,11 +182,12 @@ Estimated estimated_beside(const MatrixXd& columns, const VectorXd& data) {
 bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_id.empty(); }
 
 Findings::Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-                   const Surrogates& surrogates, const MeasurementBatch& recorded)
+                   const Surrogates& surrogates, const MeasurementBatch& recorded, bool more_than_noise)
     : problem_(problem),
       surrogates_(surrogates),
       causes_(causes_of(found.accepted)),
-      beside_{causes_, unexplained, surrogates, recorded},
+      limit_(found.chance.limit),
+      beside_{causes_, unexplained, surrogates, recorded, more_than_noise},
       columns_(background_columns(problem, found.unnamed)),
       estimated_(estimated_beside(columns_, problem.residual())),
       folds_(problem, columns_),
@@ -216,7 +225,10 @@ Finding Findings::cause(const Accepted& one) const {
   const VectorXd without = folds_.held_out_residual(problem_.residual() + effect, others);
   const ErrorFigures before = figures_of(problem_.positions(without));
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
-  Judgement judgement = judge(one.cause, effect_rms, one.could_also_be, beside_);
+  const bool in_both_halves = !beside_.more_than_noise || is_in_both_halves(one, effect, others);
+  const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
+  Judgement judgement =
+      judge(one.cause, effect_rms, one.could_also_be, beside_, in_both_halves, is_unlikely(one.cause, own.size));
   return {.cause = cause,
           .source = one.source,
           .parameters = std::move(parameters),
@@ -225,11 +237,33 @@ Finding Findings::cause(const Accepted& one) const {
           .held_out_before = before,
           .held_out_after = after,
           .held_out_gain = before.rms - after.rms,
-          .strength = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance).strength(),
+          .strength = own.strength(),
           .p_value = one.p_value,
           .naming_frequency = one.naming_frequency,
           .could_also_be = std::move(judgement.could_also_be),
+          .whole = judgement.whole,
           .action = std::move(judgement.action)};
+}
+
+bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect, const std::vector<Index>& others) const {
+  const std::vector<Index> own = places_of_source(problem_.model(), one.in_model);
+  const VectorXd data = problem_.residual() + effect;
+  const Index block = std::max<Index>(1, problem_.poses() / kBlocksOfHalves);
+  for (const Index half : {0, 1}) {
+    std::vector<Index> rows;
+    for (Index i = 0; i < problem_.poses(); ++i) {
+      if ((i / block) % 2 != half) continue;
+      for (Index row = problem_.first_row(i); row < problem_.first_row(i + 1); ++row) rows.push_back(row);
+    }
+    const Background rest(columns_(rows, others));
+    const MatrixXd C = columns_(rows, own);
+    MatrixXd information = transposed_product(C, rest.project(C));
+    information.diagonal().array() += 1;
+    const VectorXd along = inverse_factor_of(information) * (C.transpose() * rest.project(data(rows)));
+    const double freedom = std::min<double>(one.best.freedom, static_cast<double>(own.size()));
+    if (log_evidence(along.squaredNorm(), freedom) - one.penalty < limit_) return false;
+  }
+  return true;
 }
 
 const Family* Findings::step_family(const Accepted& one) const {
@@ -262,8 +296,8 @@ std::vector<PossibleBeginning> Findings::beginnings(const Accepted& one, const V
 
 std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
                                  const Unexplained& unexplained, const Surrogates& surrogates,
-                                 const MeasurementBatch& recorded) {
-  const Findings findings(found, problem, unexplained, surrogates, recorded);
+                                 const MeasurementBatch& recorded, bool more_than_noise) {
+  const Findings findings(found, problem, unexplained, surrogates, recorded, more_than_noise);
   std::vector<Finding> all;
   for (const Accepted& one : found.accepted) all.push_back(findings.of(one));
   return all;

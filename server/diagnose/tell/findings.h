@@ -7,10 +7,10 @@ namespace trammel::cause_search {
 
 /// The findings of a search, each built once: its numbers beside everything else that was found (parameters by
 /// generalised least squares, effects, strengths, what it gains on poses held out), and how sure its name is.
-/// `problem`: about the extended model. `recorded`: the batch without surrogates.
+/// `problem`: about the extended model. `recorded`: the batch without surrogates. `more_than_noise`: is left.
 [[nodiscard]] std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
                                                const Unexplained& unexplained, const Surrogates& surrogates,
-                                               const MeasurementBatch& recorded);
+                                               const MeasurementBatch& recorded, bool more_than_noise);
 
 /// Errors of poses held out, fold by fold, before and after.
 struct HeldOut {

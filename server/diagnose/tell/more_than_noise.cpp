@@ -12,9 +12,12 @@ namespace {
 
 double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / left.stated : 1; }
 
-/// What chance exceeds in 1 of 100 batches, of noise `times` as large as stated.
-double by_chance(const LeftOver& left, double times) {
-  return times * (1 + thresholds::kOneInHundred / std::sqrt(2 * left.freedom));
+/// Standard deviation of the logarithm of what is left over what is stated, by chance alone.
+double by_chance(const LeftOver& left) { return 1 / std::sqrt(2 * left.freedom); }
+
+/// How many standard uncertainties, of sigma and of chance, what is left is beyond what is stated.
+double deviations(const LeftOver& left) {
+  return std::log(ratio_of(left)) / std::hypot(thresholds::kSigmaKnownTo, by_chance(left));
 }
 
 LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
@@ -52,21 +55,21 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
 }  // namespace
 
 NoiseVerdict judge_noise(const LeftOver& left) {
-  const double ratio = ratio_of(left);
-  if (left.freedom <= 0 || ratio <= std::max(thresholds::kLargerNoise, by_chance(left, 1)))
+  if (left.freedom <= 0 || std::log(ratio_of(left)) <= thresholds::kNoiseDeviations * by_chance(left))
     return NoiseVerdict::kAsStated;
-  return ratio > std::max(thresholds::kMoreThanNoise, by_chance(left, thresholds::kLargerNoise))
-             ? NoiseVerdict::kMoreThanNoise
-             : NoiseVerdict::kLarger;
+  return deviations(left) > thresholds::kNoiseDeviations ? NoiseVerdict::kMoreThanNoise : NoiseVerdict::kLarger;
 }
 
 double chance_of_noise(const LeftOver& left) {
   if (left.freedom <= 0) return 1;
-  // Wilson and Hilferty: the cube root of chi-square over its degrees of freedom is nearly normal.
-  const double square = std::pow(ratio_of(left) / thresholds::kLargerNoise, 2);
-  const double spread = 2 / (9 * left.freedom);
-  const double z = (std::cbrt(square) - (1 - spread)) / std::sqrt(spread);
-  return std::max(kLeastPValue, 0.5 * std::erfc(z / std::sqrt(2.0)));
+  return std::max(kLeastPValue, 0.5 * std::erfc(deviations(left) / std::sqrt(2.0)));
+}
+
+bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& repeats) {
+  const LeftOver position = left_of(after.position_spread());
+  const bool measured = repeats.degrees_of_freedom > 0 && repeats.sigma > thresholds::kMoreThanNoise * position.stated;
+  return !measured &&
+         std::max(judge_noise(position), judge_noise(left_of(after.rotation_spread()))) == NoiseVerdict::kMoreThanNoise;
 }
 
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {

@@ -6,19 +6,24 @@
 
 /// Whether what is left after all that was found is still the noise that is stated for a measurement.
 ///
-/// With sigma known to a tenth, the sum of squares left is (1.1 sigma)^2 times a chi-square of as many degrees of
-/// freedom as the fit has left, at the most. More than 1.3 times the stated sigma is more than noise, if chance makes
-/// it in less than 1 of 100 batches: something is there that the poses do not say anything else of.
+/// sigma is known to a tenth (one standard uncertainty), and the sum of squares left over sigma^2 is a chi-square of as
+/// many degrees of freedom as the fit has left. So the logarithm of what is left over what is stated has a standard
+/// deviation of hypot(0.1, 1/sqrt(2 degrees of freedom)); beyond two of them something is there that the poses do not
+/// say anything else of.
 namespace trammel::cause_search {
 
 enum class NoiseVerdict {
   kAsStated,
-  kLarger,         ///< than stated, by more than a tenth: worth a note
-  kMoreThanNoise,  ///< larger by more than three tenths, and not by chance
+  kLarger,         ///< than stated, and not by chance, but sigma may be that: worth a note
+  kMoreThanNoise,  ///< larger than chance and the uncertainty of sigma allow: 1.23 times of many poses
 };
 [[nodiscard]] NoiseVerdict judge_noise(const LeftOver& left);
-/// Chance of as much or more, were sigma a tenth larger than stated; not below 1e-6.
+/// Chance of as much or more; not below 1e-6.
 [[nodiscard]] double chance_of_noise(const LeftOver& left);
+
+/// Whether what the extended model leaves is more than noise, and not that of the measurement: poses measured
+/// repeatedly do not scatter as much.
+[[nodiscard]] bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& repeats);
 
 /// Fills `left_position` and `left_rotation`; where either is more than noise, what is left is unexplained and depends
 /// on nothing known; where it is larger than stated, `limits` says so. Verdict as the findings say, else `unknown`.

@@ -7,6 +7,7 @@
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
+#include "server/numerics/product.h"
 
 namespace trammel::cause_search {
 
@@ -20,16 +21,20 @@ constexpr Index kMostSingles = 8;  // parameters of a cause that are asked about
 
 /// A family's effect, on average over the sizes that its priors allow.
 struct Average {
-  MatrixXd columns;      // R x m, whitened, per prior
-  MatrixXd information;  // m x m, beside the background
-  double strength = 0;   // what stands out of it
-  double share = 0;      // of its length
-  double rms = 0;        // m
+  MatrixXd columns;     // R x m, whitened, per prior
+  MatrixXd projected;   // R x m: what the background leaves of them
+  MatrixXd inverse;     // m x m: L⁻¹ of their information beside the background, priors included
+  double strength = 0;  // what stands out of it
+  double share = 0;     // of its length
+  double rms = 0;       // m
 };
 
 Average average_of(const LinearProblem& problem, const MatrixXd& columns, const Background& background) {
-  Average average{columns, columns.transpose() * background.project(columns), 0, 0, 0};
-  average.strength = std::max(0.0, average.information.trace());
+  Average average{columns, background.project(columns), {}, 0, 0, 0};
+  MatrixXd information = transposed_product(average.columns, average.projected);
+  average.strength = std::max(0.0, information.trace());
+  information.diagonal().array() += 1;
+  average.inverse = inverse_factor_of(information);
   average.share = std::sqrt(average.strength / std::max(1e-300, columns.squaredNorm()));
   for (Index k = 0; k < columns.cols(); ++k)
     average.rms = std::hypot(average.rms, problem.position_rms(columns.col(k)));
@@ -37,11 +42,9 @@ Average average_of(const LinearProblem& problem, const MatrixXd& columns, const 
 }
 
 /// How much of one family's effect, on average, another makes as well: a correlation.
-double imitation(const Average& own, const Average& other, const Background& background) {
-  const MatrixXd shared = other.columns.transpose() * background.project(own.columns);
-  const MatrixXd information =
-      other.information + MatrixXd::Identity(other.information.rows(), other.information.cols());
-  return std::sqrt(std::clamp((shared.transpose() * information.llt().solve(shared)).trace() / own.strength, 0.0, 1.0));
+double imitation(const Average& own, const Average& other) {
+  const MatrixXd shared = transposed_product(other.columns, own.projected);
+  return std::sqrt(std::clamp((other.inverse * shared).squaredNorm() / own.strength, 0.0, 1.0));
 }
 
 /// The model's own parameter that an effect is most like, if any.
@@ -123,7 +126,7 @@ Blindness blindness(const LinearProblem& problem, const std::vector<FamilyPtr>& 
     for (std::size_t j = 0; j < places.size(); ++j) {
       const Cause other = families[places[j]]->cause(families[places[j]]->typical());
       if (i == j || averages[j].strength < 1 || is_description_of(other, cause)) continue;
-      const double correlation = imitation(own, averages[j], background);
+      const double correlation = imitation(own, averages[j]);
       imitated = std::max(imitated, correlation);
       if (correlation > thresholds::kSameEffect) add_pair(result.inseparable, cause, other, correlation);
     }

@@ -43,6 +43,7 @@ std::string said(const Finding& finding) {
   std::vector<std::string> names = {in_words(finding.cause) + beginning_said(finding)};
   if (finding.cause.order) names.front() += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
   names.front() += fmt::format(" ({:.0f} um rms)", to_mm(finding.effect_rms) * 1e3);
+  if (!finding.whole) return names.front();
   for (const Cause& other : finding.could_also_be) names.push_back(in_words(other));
   return fmt::format("{}", fmt::join(names, ", or "));
 }
@@ -58,6 +59,10 @@ std::string what_it_needs(const Cause& cause) { return std::string(record_of(cau
 
 bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
   return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
+}
+
+std::string what_slow_changes_need() {
+  return "measure some reference poses again and again over the day, with time_s and temperature_c";
 }
 
 std::string noise_name(double noise, double instrument) {
@@ -77,13 +82,14 @@ namespace {
 
 /// The findings as clauses, by how sure they are.
 struct Said {
-  std::vector<std::string> sure, doubtful, bad_poses;
+  std::vector<std::string> sure, parts, doubtful, bad_poses;
 };
 
 Said said(const std::vector<Finding>& findings) {
   Said all;
   for (const Finding& finding : findings) {
     (is_single_pose(finding)         ? all.bad_poses
+     : !finding.whole                ? all.parts
      : finding.could_also_be.empty() ? all.sure
                                      : all.doubtful)
         .push_back(said(finding));
@@ -121,6 +127,9 @@ std::string sentence_for(const Diagnosis& d) {
     if (!sentence.empty()) text += (text.empty() ? "" : " ") + as_sentence(sentence);
   };
   if (!all.sure.empty()) add("Missing from the simulation: " + listed_clauses(all.sure));
+  if (!all.parts.empty())
+    add("Missing from the simulation, in the best known shape, which is not the whole of it: " +
+        listed_clauses(all.parts));
   if (!all.doubtful.empty()) add("Missing, but these poses do not tell which it is: " + listed_clauses(all.doubtful));
   if (!all.bad_poses.empty()) add(bad_poses_said(all.bad_poses));
   if (left.present && !left.depends_on.empty()) {
@@ -129,7 +138,7 @@ std::string sentence_for(const Diagnosis& d) {
   }
   add(left.hint);
   add(held_out_said(d.suspects));
-  if (all.sure.empty() && all.doubtful.empty() && !left.present) {
+  if (all.sure.empty() && all.parts.empty() && all.doubtful.empty() && !left.present) {
     add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", all.bad_poses.empty() ? "was" : "else was",
                     d.poses, 1e6 * d.after.rms));
   }

@@ -13,6 +13,8 @@ namespace trammel {
 /// Whether a cause that could not have been seen was looked for all the same, by the order of the poses: it would have
 /// been found, but never named for certain. `recorded`: the batch without surrogates.
 [[nodiscard]] bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded);
+/// What would tell a slow change from a sudden one.
+[[nodiscard]] std::string what_slow_changes_need();
 /// What `noise` is of, m per axis: one measurement, or more than what is stated for the `instrument`.
 [[nodiscard]] std::string noise_name(double noise, double instrument);
 /// Why no poses are suggested to measure next, after no others than `findings`.
