@@ -4,6 +4,10 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS trammeld trammel RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY config models DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/shell/man1/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+install(FILES ${PROJECT_BINARY_DIR}/shell/trammel DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${PROJECT_BINARY_DIR}/shell/_trammel DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+install(FILES ${PROJECT_BINARY_DIR}/shell/trammel.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel)
 install(FILES deploy/trammeld.service DESTINATION lib/systemd/system)
 
