@@ -4,7 +4,11 @@
 #include <sstream>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/command_tree.h"
+#include "clients/cli/terminal/defaults.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/terminal/usage.h"
+#include "clients/cli/text/help_topics.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cli {
@@ -38,64 +42,92 @@ int exit_code(ErrorCode code) {
 namespace {
 
 /// Where a command was asked to write its result for programs; empty where it was not.
-std::string json_path_of(const CLI::App& command) {
-  const CLI::Option* option = command.get_option_no_throw("--json");
-  return option == nullptr || option->empty() ? std::string() : option->as<std::string>();
+std::string json_path_in(const std::vector<std::string>& words) {
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    if (words[k].starts_with("--json=")) return words[k].substr(7);
+    if (words[k] == "--json" && k + 1 < words.size()) return words[k + 1];
+  }
+  return "";
 }
 
-/// Prints help or what is wrong with the arguments, and returns the parser's own exit code.
-int told(const CLI::App& app, const CLI::ParseError& error) {
+/// One line for each error, on standard error; as JSON, too, where that was asked for on standard output.
+int tell_errors(const Error& error, const std::string& command, const std::vector<std::string>& words) {
+  const std::string name = command.empty() ? "trammel" : "trammel " + command;
+  for (const Error& one : apart(error)) fmt::print(stderr, "{}: {}\n", emphasised(name), sentence(one));
+  tell_refusal(error, json_path_in(words));
+  return exit_code(error.code);
+}
+
+/// Prints help or the version.
+int tell_help(const CLI::App& app, const CLI::ParseError& asked) {
   std::ostringstream out, err;
-  const int code = app.exit(error, out, err);
+  app.exit(asked, out, err);
   fmt::print("{}", shown_lines(out.str()));
-  fmt::print(stderr, "{}", shown_lines(err.str()));
-  return code;
+  return 0;
 }
 
-}  // namespace
-
-int run_command_line(int argc, const char* const* argv) {
-  CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
-  app.set_version_flag("--version", TRAMMEL_VERSION);
-  app.require_subcommand(0, 1);
-  app.footer(
-      "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of what they belong to.\n"
-      "An output file named '-' is standard output. Errors go to standard error and name file, row, value and limit.\n"
-      "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong usage;\n"
-      "3 refused data; 4 service unreachable or busy.");
-  Action chosen;
-  add_backup_command(app, chosen);
+void add_commands(CLI::App& app, Action& chosen) {
   add_plan_command(app, chosen);
   add_pose_commands(app, chosen);
   add_measurement_commands(app, chosen);
-  add_structure_commands(app, chosen);
   add_model_commands(app, chosen);
   add_apply_commands(app, chosen);
   add_check_command(app, chosen);
-  add_fleet_command(app, chosen);
   add_diagnose_command(app, chosen);
+  add_backup_command(app, chosen);
+  add_robot_command(app, chosen);
+  add_structure_commands(app, chosen);
+  add_fleet_command(app, chosen);
   add_study_command(app, chosen);
   add_service_commands(app, chosen);
   add_audit_command(app, chosen);
   add_store_backup_command(app, chosen);
   add_history_command(app, chosen);
+  add_doctor_command(app, chosen);
+  add_help_commands(app, chosen);
+}
+
+}  // namespace
+
+void make_command_line(CLI::App& app, Action& chosen) {
+  app.name("trammel");
+  app.set_version_flag("--version", TRAMMEL_VERSION);
+  app.require_subcommand(0, 1);
+  app.footer(std::string(common_footer()));
+  add_commands(app, chosen);
+  for (CLI::App* command : app.get_subcommands([](CLI::App* one) { return !one->get_name().empty(); })) {
+    const std::string examples(examples_of(command->get_name()));
+    command->footer((examples.empty() ? "" : "Examples:\n" + examples + "\n\n") + std::string(common_footer()));
+  }
+  set_help_format(app);
+}
+
+int run_command_line(int argc, const char* const* argv) {
+  CLI::App app("Makes an industrial robot land where it was told to: measure, calibrate, learn, correct.", "trammel");
+  Action chosen;
+  make_command_line(app, chosen);
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  const std::string name = words.empty() || words[0].starts_with('-') ? "" : words[0];
+  if (const auto unknown = unknown_word(app, words)) {
+    const bool no_command = unknown->field == "command";
+    return tell_errors(*unknown, no_command ? "" : name, words);
+  }
+  const Result<std::vector<std::string>> all = with_defaults(app, words, defaults_path());
+  if (!all) return tell_errors(all.error(), name, words);
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(all->rbegin(), all->rend()));  // the parser takes them from the end
   } catch (const CLI::ParseError& error) {
-    return told(app, error) == 0 ? 0 : kWrongUsage;
+    if (error.get_exit_code() == 0) return tell_help(app, error);
+    return tell_errors(usage_error(error, name), name, words);
   }
   if (!chosen) {
     fmt::print(stderr, "A command is required\n{}", app.help());
     return kWrongUsage;
   }
-  const CLI::App& command = *app.get_subcommands().front();
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  for (const Error& one : apart(done.error())) {
-    fmt::print(stderr, "trammel {}: {}\n", command.get_name(), sentence(one));
-  }
-  tell_refusal(done.error(), json_path_of(command));
-  return exit_code(done.error().code);
+  const CLI::App& command = *app.get_subcommands().front();
+  return tell_errors(advised(done.error(), command), command.get_name(), words);
 }
 
 }  // namespace trammel::cli

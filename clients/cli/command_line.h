@@ -2,7 +2,16 @@
 
 #include "server/base/result.h"
 
+namespace CLI {
+class App;
+}
+
 namespace trammel::cli {
+
+class Action;
+
+/// All commands with their help, for `app`; what they do is put into `chosen`. Both outlive the parsing.
+void make_command_line(CLI::App& app, Action& chosen);
 
 /// The program `trammel`: reads the command line, does what it says, writes errors to standard error. Returns the exit
 /// code: 0, 2 wrong usage, 3 refused data, 4 unreachable or busy service.

@@ -80,7 +80,7 @@ struct Session::Participant {
   /// For error messages: how long it looked, on which ports, in which domain.
   [[nodiscard]] std::string where_it_looked() const {
     std::string ports;
-    for (const std::uint16_t port : options.server_ports) ports += fmt::format(" 127.0.0.1:{}", port);
+    for (const std::uint16_t port : options.server_ports) ports += fmt::format(" {}:{}", options.address, port);
     return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), ports, options.domain);
   }
 
@@ -212,7 +212,8 @@ struct Session::Participant {
 Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
   auto inside = std::make_unique<Participant>();
   inside->options = options;
-  auto participant = wire::make_participant({"trammel client", options.domain, "127.0.0.1", 0, options.server_ports});
+  auto participant =
+      wire::make_participant({"trammel client", options.domain, options.address, 0, options.server_ports});
   if (!participant) return tl::make_unexpected(participant.error());
   inside->participant = std::move(*participant);
 

@@ -38,6 +38,7 @@ Result<std::string> read_up_to(const std::string& path, std::size_t limit_bytes)
 
 Result<std::string> read_text_file(const std::string& path, std::size_t limit_bytes) {
   std::error_code error;
+  if (fs::is_directory(path, error)) return refused("a folder, expected a file").in(path).next("name a file in it");
   if (!fs::is_regular_file(path, error) && !fs::is_fifo(path, error) && !fs::is_character_file(path, error)) {
     return refused("no such file").in(path);
   }

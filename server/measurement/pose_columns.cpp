@@ -19,8 +19,10 @@ struct JointColumn {
   JointType type = JointType::kRevolute;
 };
 
-/// `q12_deg` -> 12, revolute; nothing for any other name.
-std::optional<JointColumn> as_joint_column(std::string_view name) {
+/// `q12_deg`, `Q12_DEG` -> 12, revolute; nothing for any other name.
+std::optional<JointColumn> as_joint_column(std::string_view column_name) {
+  std::string name(column_name);
+  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   if (!name.starts_with('q')) return std::nullopt;
   JointColumn column;
   const auto [end, error] = std::from_chars(name.data() + 1, name.data() + name.size(), column.number);
@@ -54,9 +56,7 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   std::vector<std::string> direction_names;
   for (const auto& [number, column] : joints) {
     if (number != static_cast<int>(found.joints_.size()) + 1) {
-      return refused("missing column q{}_deg before {}", found.joints_.size() + 1, table.columns()[column.first])
-          .in(table.where())
-          .of(fmt::format("q{}_deg", found.joints_.size() + 1));
+      return tl::make_unexpected(table.require(fmt::format("q{}_deg", found.joints_.size() + 1)).error());
     }
     found.joints_.push_back(column.first);
     found.joint_types_.push_back(column.second);

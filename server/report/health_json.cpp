@@ -71,7 +71,7 @@ std::string health_text(const HealthCheck& check) {
   for (std::size_t i = 0; i < std::min(kShownSizes, check.smallest.size()); ++i) {
     const SmallestEffect& one = check.smallest[i];
     text +=
-        fmt::format("  {:28} {}\n", in_words(one.cause), one.rms ? fmt::format("{:.3f}", to_mm(*one.rms)) : "never");
+        fmt::format("  {:34} {}\n", in_words(one.cause), one.rms ? fmt::format("{:.3f}", to_mm(*one.rms)) : "never");
   }
   if (!check.due.empty() || !check.due_because.empty())
     text += fmt::format("next check: {}{}{}\n", check.due, check.due.empty() ? "" : "; ", check.due_because);

@@ -75,13 +75,13 @@ TEST(RoboDkCsv, ReadsTheExportsByPosition) {
   const auto poses = parse_robodk_csv("1,2,3,4,5,6,100,200,300,0.1,-0.2,2.5,7,8,9,0,0,0\n", "rdk.csv");
   ASSERT_TRUE(poses) << poses.error().message;
   EXPECT_LT((poses->measurements[0].R_WT.value_or(Matrix3::Zero()) - turned(0.1, -0.2, 2.5, "xyz")).norm(), 1e-12);
-  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200,300,10,-20,170,7,8,9,0,0,0\n"),
+  EXPECT_EQ(refusal("1,2,3,4,5,6,100,200.5,300,10,-20,170,7,8,9,0,0,0\n"),
             Refusal("rdk.csv", 1, "rx_rad").beyond(10, 6.28319));
 }
 
 TEST(RoboDkCsv, MakesAToolOfEachTcp) {
   const auto batch =
-      parse_robodk_csv("1,2,3,4,5,6,1,2,3,7,8,9\n1,2,3,4,5,7,1,2,3,-7,8,9\n1,2,3,4,5,8,1,2,3,7,8,9\n", "rdk.csv");
+      parse_robodk_csv("1,2,3,4,5,6,1,2,3.5,7,8,9\n1,2,3,4,5,7,1,2,3,-7,8,9\n1,2,3,4,5,8,1,2,3,7,8,9\n", "rdk.csv");
   ASSERT_TRUE(batch) << batch.error().message;
   EXPECT_EQ(batch->measurements[0].context.tool, "tcp-1");
   EXPECT_EQ(batch->measurements[1].context.tool, "tcp-2");

@@ -97,10 +97,13 @@ TEST(CsvTable, ReadsWholeNumbersWithinTheirLimits) {
   EXPECT_FALSE(table->integer(2, 0, 0, 7));
 }
 
-TEST(CsvTable, SaysThatSemicolonsAreNoSeparators) {
-  const auto table = CsvTable::parse("a;b\n1;2\n", "f.csv");
+TEST(CsvTable, NamesTheColumnThatWasMeant) {
+  const auto table = CsvTable::parse("q1_dge,x_m,Y_MM\n1,2,3\n", "f.csv");
   ASSERT_TRUE(table);
-  EXPECT_EQ(refusal_of(table->require("a")), Refusal("f.csv", {}, "a"));
+  EXPECT_EQ(refusal_of(table->require("q1_deg")), Refusal("f.csv", {}, "q1_deg"));
+  EXPECT_NE(table->require("q1_deg").error().next.find("q1_dge"), std::string::npos);
+  EXPECT_NE(table->require("x_mm").error().next.find("x_m"), std::string::npos);
+  EXPECT_EQ(table->require("y_mm").value(), 2u) << "upper and lower case are the same name";
 }
 
 }  // namespace

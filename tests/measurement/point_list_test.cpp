@@ -90,10 +90,10 @@ TEST(PointList, ReadsBothKindsOfFrameAnglesAsTheSameRotation) {
        Eigen::AngleAxisd(from_deg(10), Vector3::UnitX()))
           .toRotationMatrix();
   const auto rotation = [](const PointList& list) { return list.points.at(0).R_W.value_or(Matrix3::Zero()); };
-  EXPECT_LT((rotation(demand("f, 1, 2, 3, 10, -20, 30\n", behind(BehindCoordinates::kFixedXyz))) - R).norm(), 1e-12);
-  EXPECT_LT((rotation(demand("f, 1, 2, 3, 30, -20, 10\n", behind(BehindCoordinates::kEulerZyx))) - R).norm(), 1e-12);
-  EXPECT_LT((rotation(demand("// XYZ Fixed Angles\nf,1,2,3,10,-20,30,2021-10-12 08:15:23\n")) - R).norm(), 1e-12);
-  EXPECT_LT((rotation(demand("// ZYX Euler Angles\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
+  EXPECT_LT((rotation(demand("f, 1.0, 2, 3, 10, -20, 30\n", behind(BehindCoordinates::kFixedXyz))) - R).norm(), 1e-12);
+  EXPECT_LT((rotation(demand("f, 1.0, 2, 3, 30, -20, 10\n", behind(BehindCoordinates::kEulerZyx))) - R).norm(), 1e-12);
+  EXPECT_LT((rotation(demand("// XYZ Fixed Angles\nf,1.0,2,3,10,-20,30,2021-10-12 08:15:23\n")) - R).norm(), 1e-12);
+  EXPECT_LT((rotation(demand("// ZYX Euler Angles\nf,1.0,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_LT((rotation(demand("Frame Name,X,Y,Z,Rz,Ry,Rx\nf,1,2,3,30,-20,10\n")) - R).norm(), 1e-12);
   EXPECT_EQ(refusal("// ZYZ Euler Angles\nf,1,2,3,30,-20,10\n"), Refusal("sa.txt", 1, "angles"));
 }

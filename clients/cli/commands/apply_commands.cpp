@@ -189,6 +189,12 @@ Status check_usage(const CorrectArguments& arguments) {
     return failure(ErrorCode::kUsage, "--model is required").of("--model").next("it may be left out with --undo only");
   if (is_program(arguments.inputs, arguments.format)) return {};
   const std::string ending = std::filesystem::path(arguments.inputs[0]).extension().string();
+  if (arguments.format.empty() && (ending == ".xlsx" || ending == ".xls" || ending == ".ods")) {
+    return refused("not text but a spreadsheet ({})", ending)
+        .in(arguments.inputs[0])
+        .with_text(ending)
+        .next("export it as text: Save As, \"CSV UTF-8\", in Excel; \"Text CSV\" in LibreOffice");
+  }
   if (arguments.format.empty() && ending != ".csv") {
     return failure(ErrorCode::kUsage, "unknown kind of targets '{}'", ending)
         .in(arguments.inputs[0])
@@ -312,7 +318,7 @@ void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   command
       .add_option("--tolerance", arguments.tolerance_mm,
                   "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,

@@ -111,7 +111,7 @@ void add_check_command(CLI::App& app, Action& chosen) {
   command
       ->add_option("--tolerance", arguments->tolerance_mm,
                    "What the cell must hold, mm, instead of the cell file's tolerance_mm (0.1 where it says none)")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->add_flag("--new-tool", arguments->new_tool,
                     "The tool was changed or mounted anew: where it sits is found with the base, and is no change");
   add_json_option(*command, arguments->json);

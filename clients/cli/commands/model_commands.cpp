@@ -8,6 +8,7 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/world.h"
@@ -98,6 +99,13 @@ nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
 }
 
 Status train_model(const TrainArguments& arguments) {
+  if (arguments.bias) {
+    if (const Status spelled = check_bias_spelling(*arguments.bias); !spelled)
+      return Failure(spelled.error())
+          .as(ErrorCode::kUsage)
+          .of("--bias")
+          .next("trammel help levels tells about kernels");
+  }
   Result<Cell> cell = read_cell_to_train(
       arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
   if (!cell) return tl::make_unexpected(cell.error());

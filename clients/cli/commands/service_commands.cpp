@@ -283,7 +283,7 @@ void add_reason(CLI::App& command, ServiceArguments& arguments) {
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
   command.add_flag("--watch", arguments.watch, "Wait until the training is done, and say how it ended");
   command.add_option("--limit", arguments.limit_s, "Longest wait for the training, s")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
 }
 
@@ -357,14 +357,13 @@ void add_service_commands(CLI::App& app, Action& chosen) {
       });
   commands.add("status", "Show the servers that answer, the models in force, jobs, and batches in quarantine", status,
                [](CLI::App&, ServiceArguments&) {});
-  commands.add("watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
-               [](CLI::App& command, ServiceArguments& arguments) {
-                 command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
-                     ->required();
-                 command.add_option("--limit", arguments.limit_s, "Longest wait, s")
-                     ->check(CLI::PositiveNumber)
-                     ->capture_default_str();
-               });
+  commands.add(
+      "watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
+            ->required();
+        command.add_option("--limit", arguments.limit_s, "Longest wait, s")->check(above_zero())->capture_default_str();
+      });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
   commands.add(
       "show", "Tell what a stored version of a cell's model is, and how large its errors were", show_model,

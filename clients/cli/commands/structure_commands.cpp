@@ -61,7 +61,7 @@ void add_cpa(CLI::App& app, Action& chosen) {
   command
       ->add_option("--sigma-mm", arguments->sigma_mm,
                    "Standard deviation of one coordinate of a point, mm; left out: from how well the arcs fit")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->add_option("-o,--output", arguments->output, "Table of parameters to write (CSV: mm, deg)");
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return cpa(*arguments); }; });
@@ -79,7 +79,7 @@ void add_deflection(CLI::App& app, Action& chosen) {
   command
       ->add_option("--sigma-mm", arguments->sigma_mm,
                    "Standard deviation of one coordinate where the file has none, mm")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command->add_flag("--chained", arguments->chained,
                     "Deflections were measured against the ground, so they contain those of the elements before");

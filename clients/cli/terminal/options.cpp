@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "server/robot/cell.h"
 
@@ -14,6 +15,11 @@ constexpr double kLongestTimeout = 3600;  // s
 
 void add_service_options(CLI::App& command, ServiceOptions& options, const std::string& help) {
   command.add_flag("--service", options.service, help)->group("Service");
+  command
+      .add_option("--host", options.host,
+                  "IPv4 address that the service listens on, one of this host's (its key address; 127.0.0.1 is usual)")
+      ->capture_default_str()
+      ->group("Service");
   command.add_option("--port", options.ports, "UDP port of the service on this host; once for each replica")
       ->allow_extra_args(false)
       ->capture_default_str()
@@ -40,10 +46,23 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options) 
 
 Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
   client::SessionOptions session;
+  session.address = options.host;
   session.domain = options.domain;
   session.server_ports = options.ports;
   session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
   return client::Session::open(session);
+}
+
+CLI::Validator above_zero() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const char* end = text.data() + text.size();
+        const auto [stop, error] = std::from_chars(text.data(), end, value);
+        const bool fine = error == std::errc() && stop == end && value > 0 && std::isfinite(value);
+        return fine ? std::string() : "'" + text + "', expected a number above 0, without a unit";
+      },
+      "above 0");
 }
 
 void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {

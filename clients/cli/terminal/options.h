@@ -11,6 +11,7 @@
 namespace CLI {
 class App;
 class Option;
+class Validator;
 }  // namespace CLI
 
 /// Options that several commands have.
@@ -19,6 +20,7 @@ namespace trammel::cli {
 /// Whether to ask a service, and which.
 struct ServiceOptions {
   bool service = false;
+  std::string host = "127.0.0.1";
   std::uint32_t domain = 0;
   std::vector<std::uint16_t> ports = {17500};
   double timeout_s = 5;
@@ -29,6 +31,8 @@ void add_service_options(CLI::App& command, ServiceOptions& options);
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 
+/// A number above 0.
+[[nodiscard]] CLI::Validator above_zero();
 /// `--seed`: a whole number from 0.
 void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
 void add_json_option(CLI::App& command, std::string& path);

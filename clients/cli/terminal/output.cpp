@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
@@ -124,6 +125,23 @@ Status Outputs::write() const {
   return {};
 }
 
+std::string emphasised(const std::string& text) {
+  const char* terminal = std::getenv("TERM");
+  const char* plain = std::getenv("NO_COLOR");
+  const bool colours = ::isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::strcmp(terminal, "dumb") != 0 &&
+                       (plain == nullptr || *plain == '\0');
+  return colours ? "\033[1;31m" + text + "\033[0m" : text;
+}
+
+std::string time_left(double elapsed_s, double share) {
+  if (elapsed_s < 2 || share < 0.02 || share >= 1) return "";
+  const double left = elapsed_s * (1 - share) / share;
+  if (left < 1) return "";
+  if (left < 90) return fmt::format(", about {:.0f} s left", left);
+  if (left < 90 * 60) return fmt::format(", about {:.0f} min left", left / 60);
+  return fmt::format(", about {:.1f} h left", left / 3600);
+}
+
 ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 ProgressLine::~ProgressLine() {
@@ -132,7 +150,11 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::show(const std::string& what, double share) {
   if (!terminal_) return;
-  const std::string line = fmt::format("{} {:.0f} %", shown(what), 100 * std::clamp(share, 0.0, 1.0));
+  const auto now = std::chrono::steady_clock::now();
+  if (share < share_) began_ = now;  // the work begins again
+  share_ = share;
+  const std::string left = time_left(std::chrono::duration<double>(now - began_).count(), share);
+  const std::string line = fmt::format("{} {:.0f} %{}", shown(what), 100 * std::clamp(share, 0.0, 1.0), left);
   if (line == shown_) return;
   fmt::print(stderr, "\r\033[K{}", line);
   std::fflush(stderr);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -54,7 +55,15 @@ class Outputs {
   std::vector<Output> outputs_;
 };
 
-/// One line on standard error that is written over as work goes on. Silent where standard error is no terminal.
+/// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not set; else as it is.
+[[nodiscard]] std::string emphasised(const std::string& text);
+
+/// `, about 40 s left`, from how long a share of the work took; empty while that says little (under 2 s or 2 %) and at
+/// the end.
+[[nodiscard]] std::string time_left(double elapsed_s, double share);
+
+/// One line on standard error that is written over as work goes on, with the time that is left. Silent where standard
+/// error is no terminal.
 class ProgressLine {
  public:
   ProgressLine();
@@ -68,6 +77,8 @@ class ProgressLine {
  private:
   bool terminal_;
   std::string shown_;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+  double share_ = 0;
 };
 
 }  // namespace trammel::cli

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/text_file.h"
+#include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/point_list.h"
 #include "server/measurement/files/text_lines.h"
 
@@ -16,7 +17,8 @@ bool any_of(const std::vector<std::string>& fields, bool (*holds)(const std::str
 
 bool is_ours(const std::string& field) {
   const ColumnName column = column_name(field);
-  return field == "x_mm" || (column.name == "q1" && field.find('_') != std::string::npos);
+  return (column.name == "x" && column.unit == "mm" && field.find('_') != std::string::npos) ||
+         (column.name == "q1" && field.find('_') != std::string::npos);
 }
 
 bool is_first_joint(const std::string& field) {
@@ -40,9 +42,8 @@ BatchKind recognise_batch(const std::string& text) {
   const bool names_above = lines.size() > 1 && std::all_of(first.begin(), first.end(), is_text) && separator != ' ';
   if (names_above) {
     const std::vector<std::string> second = split_fields(lines[1].text, separator);
-    const bool numbers = std::all_of(second.begin(), second.end(), [&](std::string field) {
-      if (separator != ',') std::replace(field.begin(), field.end(), ',', '.');
-      return is_number(field);
+    const bool numbers = std::all_of(second.begin(), second.end(), [&](const std::string& field) {
+      return is_number(separator == ',' ? field : with_decimal_point(field));
     });
     if (numbers && second.size() == first.size() && (first.size() == 12 || first.size() == 18)) {
       return BatchKind::kRoboDk;

@@ -8,7 +8,8 @@
 namespace trammel {
 
 /// Reads the measurements of a RoboDK calibration or validation project, exported as CSV. Fields are separated by `;`,
-/// tab or `,`, by the first of these that is in the first line; with `;` or tab a number may have a decimal comma. `#`
+/// tab or `,`, by the first of these that is in the first line; with `;` or tab a number may have a decimal comma.
+/// Commas between values without names and without any decimal point are refused: they may stand in numbers, too. `#`
 /// and `//` start comments. Two layouts:
 ///
 /// Named, where the first line names `J1` ... `Jn` (or `Joint 1` ..., `A1` ..., `q1` ...; n to 12), in any order,

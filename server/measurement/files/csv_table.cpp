@@ -8,7 +8,9 @@
 #include <set>
 
 #include "server/base/name_check.h"
+#include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
+#include "server/measurement/files/csv_dialect.h"
 
 namespace trammel {
 
@@ -23,6 +25,15 @@ std::string_view trimmed(std::string_view text) {
 }
 
 constexpr std::size_t kMostValueBytes = 65'536;  // of one value
+constexpr const char* kSaveAsUtf8 = "save it as UTF-8: \"CSV UTF-8\" in Excel";
+constexpr const char* kTwoCommas =
+    "write decimal points, or separate values by ';' or tabs: a comma that does both may be read in two ways";
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return lower;
+}
 
 /// Whether the values of a row may stand in a table.
 Status check_values(const CsvTable::Row& row, const std::string& where) {
@@ -37,7 +48,7 @@ Status check_values(const CsvTable::Row& row, const std::string& where) {
           .in(where)
           .at_row(row.line)
           .beyond(field.size(), kMostValueBytes);
-    if (!is_utf8(field)) return refused("not UTF-8 text").in(where).at_row(row.line);
+    if (!is_utf8(field)) return refused("not UTF-8 text").in(where).at_row(row.line).next(kSaveAsUtf8);
     if (!is_plain_lines(field))
       return refused("'{}' has control characters", shown_short(field)).in(where).at_row(row.line);
   }
@@ -47,9 +58,12 @@ Status check_values(const CsvTable::Row& row, const std::string& where) {
 /// Reads the text record by record.
 class Scanner {
  public:
-  Scanner(std::string_view text, const std::string& where) : text_(text), where_(where) {
-    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
-  }
+  Scanner(std::string_view text, const CsvStart& start, const std::string& where)
+      : text_(text.substr(start.skipped_bytes)),
+        where_(where),
+        separator_(start.separator),
+        ends_{start.separator, '\n'},
+        line_(start.line) {}
 
   /// The next record that is neither empty nor a comment; no fields at the end of the text.
   Result<CsvTable::Row> next() {
@@ -86,12 +100,12 @@ class Scanner {
   }
 
   [[nodiscard]] char trimmed_start() const {
-    const auto at = text_.find_first_not_of(" \t");
+    const auto at = text_.find_first_not_of(separator_ == '\t' ? " " : " \t");
     return at == std::string_view::npos ? '\n' : text_[at];
   }
 
   Result<std::string> plain() {
-    const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
+    const std::size_t end = std::min(text_.find_first_of(ends_), text_.size());
     std::string field(trimmed(text_.substr(0, end)));
     text_.remove_prefix(end);
     return field;
@@ -109,13 +123,16 @@ class Scanner {
       if (c == '\n') ++line_;
       field += c;
     }
-    return refused("a quote is not closed").in(where_).at_row(first_line);
+    return refused("a quote is not closed").in(where_).at_row(first_line).next("close it in the same value");
   }
 
   Result<std::string> rest_after_quote(int first_line, std::string field) {
-    const std::size_t end = std::min(text_.find_first_of(",\n"), text_.size());
+    const std::size_t end = std::min(text_.find_first_of(ends_), text_.size());
     if (const std::string_view rest = trimmed(text_.substr(0, end)); !rest.empty()) {
-      return refused("'{}' after a closing quote, expected ','", shown_short(rest)).in(where_).at_row(first_line);
+      return refused("'{}' after a closing quote, expected '{}'", shown_short(rest), shown_short({&separator_, 1}))
+          .in(where_)
+          .at_row(first_line)
+          .next("a quote inside a value is written twice");
     }
     text_.remove_prefix(end);
     return field;
@@ -123,8 +140,15 @@ class Scanner {
 
   std::string_view text_;
   const std::string& where_;
-  int line_ = 1;
+  char separator_;
+  std::string ends_;  // of a value that is not quoted
+  int line_;
 };
+
+bool says_nothing(const CsvTable::Row& row) {
+  return row.fields.size() > 1 &&
+         std::all_of(row.fields.begin(), row.fields.end(), [](const std::string& field) { return field.empty(); });
+}
 
 }  // namespace
 
@@ -135,11 +159,16 @@ Status CsvTable::set_columns(Row header) {
       return refused("column {} has no name", seen.size() + 1)
           .in(where_)
           .at_row(header.line)
-          .with_value(seen.size() + 1);
+          .with_value(seen.size() + 1)
+          .next("name it, or delete it where it is empty");
     if (const Status plain = check_name(name, "column name"); !plain)
       return Failure(plain.error()).in(where_).at_row(header.line);
     if (!seen.insert(name).second) {
-      return refused("column {} appears twice", shown_short(name)).in(where_).at_row(header.line).of(shown_short(name));
+      return refused("column {} appears twice", shown_short(name))
+          .in(where_)
+          .at_row(header.line)
+          .of(shown_short(name))
+          .next("rename one of them");
     }
   }
   columns_ = std::move(header.fields);
@@ -148,10 +177,14 @@ Status CsvTable::set_columns(Row header) {
 
 Status CsvTable::add_row(Row row) {
   if (row.fields.size() != columns_.size()) {
+    const bool pointless = std::all_of(row.fields.begin(), row.fields.end(),
+                                       [](const std::string& field) { return field.find('.') == std::string::npos; });
+    const bool commas = separator_ == ',' && row.fields.size() > columns_.size() && pointless;
     return refused("{} values, the header has {} columns", row.fields.size(), columns_.size())
         .in(where_)
         .beyond(row.fields.size(), columns_.size())
-        .at_row(row.line);
+        .at_row(row.line)
+        .next(commas ? kTwoCommas : "a value that is not known stays empty between its separators");
   }
   if (rows_.size() == most_rows_)
     return failure(ErrorCode::kTooLarge, "more than {} rows", most_rows_)
@@ -171,45 +204,124 @@ Result<CsvTable> CsvTable::parse(std::string_view text, std::string where, std::
   CsvTable table;
   table.where_ = std::move(where);
   table.most_rows_ = most_rows;
-  Scanner scanner(text, table.where_);
+  if (const Status readable = check_is_text(text, table.where_); !readable)
+    return tl::make_unexpected(readable.error());
+  const Result<CsvStart> start = start_of_csv(text, table.where_);
+  if (!start) return tl::make_unexpected(start.error());
+  table.separator_ = start->separator;
+  Scanner scanner(text, *start, table.where_);
   Result<Row> header = scanner.next();
   if (!header) return tl::make_unexpected(header.error());
   if (header->fields.empty())
-    return refused("empty file, expected a header line with column names").in(table.where_).beyond(0, 1);
+    return refused("empty file, expected a header line with column names")
+        .in(table.where_)
+        .beyond(0, 1)
+        .next("trammel help formats says which columns");
   if (const Status set = table.set_columns(std::move(*header)); !set) return tl::make_unexpected(set.error());
   while (true) {
     Result<Row> record = scanner.next();
     if (!record) return tl::make_unexpected(record.error());
-    if (record->fields.empty()) return table;
+    if (record->fields.empty()) break;
+    if (says_nothing(*record)) continue;
     if (const Status added = table.add_row(std::move(*record)); !added) return tl::make_unexpected(added.error());
   }
+  if (const Status settled = table.settle_decimals(); !settled) return tl::make_unexpected(settled.error());
+  return table;
 }
 
-Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const std::vector<Row>& rows) {
+Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const std::vector<Row>& rows,
+                                     char separator) {
   CsvTable table;
   table.where_ = std::move(where);
+  table.separator_ = separator;
   if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
   for (const Row& row : rows) {
     if (const Status fine = check_values(row, table.where_); !fine) return tl::make_unexpected(fine.error());
+    if (says_nothing(row)) continue;
     if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
   }
+  if (const Status settled = table.settle_decimals(); !settled) return tl::make_unexpected(settled.error());
   return table;
+}
+
+Status CsvTable::settle_decimals() {
+  struct Met {
+    const std::string* field = nullptr;
+    std::size_t row = 0, column = 0;
+  };
+  Met comma, point;
+  for (std::size_t column = 0; column < columns_.size(); ++column) {
+    if (!holds_quantities(columns_[column])) continue;
+    for (std::size_t row = 0; row < rows_.size(); ++row) {
+      const auto sign = decimal_sign(rows_[row].fields[column]);
+      Met& met = sign == ',' ? comma : point;
+      if (sign && met.field == nullptr) met = {&rows_[row].fields[column], row, column};
+    }
+  }
+  points_ = point.field != nullptr;
+  if (comma.field == nullptr) return {};
+  if (separator_ == ',') {
+    return refuse(comma.row, "{} is '{}', with a comma where values are separated by commas", columns_[comma.column],
+                  shown_short(*comma.field))
+        .of(columns_[comma.column])
+        .with_text(shown_short(*comma.field))
+        .next(kTwoCommas);
+  }
+  if (points_) {
+    const Met& later = comma.row < point.row ? point : comma;
+    const Met& earlier = comma.row < point.row ? comma : point;
+    return refuse(later.row, "{} is '{}', and row {} has '{}': a point and a comma before decimals",
+                  columns_[later.column], shown_short(*later.field), line(earlier.row), shown_short(*earlier.field))
+        .of(columns_[later.column])
+        .with_text(shown_short(*later.field))
+        .next("write all numbers of the file with the same one, and none for thousands");
+  }
+  for (std::size_t column = 0; column < columns_.size(); ++column) {
+    if (!holds_quantities(columns_[column])) continue;
+    for (Row& row : rows_) row.fields[column] = with_decimal_point(row.fields[column]);
+  }
+  return {};
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view column) const {
   const auto at = std::find(columns_.begin(), columns_.end(), column);
-  if (at == columns_.end()) return std::nullopt;
-  return static_cast<std::size_t>(at - columns_.begin());
+  if (at != columns_.end()) return static_cast<std::size_t>(at - columns_.begin());
+  const auto alike = [wanted = lower_case(column)](const std::string& name) { return lower_case(name) == wanted; };
+  const auto other = std::find_if(columns_.begin(), columns_.end(), alike);
+  if (other == columns_.end() || std::find_if(other + 1, columns_.end(), alike) != columns_.end()) return std::nullopt;
+  return static_cast<std::size_t>(other - columns_.begin());
 }
+
+namespace {
+
+/// A column that was meant, by its spelling or by what stands before its unit; empty where none looks like it.
+std::string meant_by(const std::string& column, const std::vector<std::string>& columns) {
+  std::vector<std::string> names;
+  for (const std::string& name : columns) names.push_back(lower_case(name));
+  const auto spelled = [&](const std::string& name) -> const std::string& {
+    return columns[static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin())];
+  };
+  const auto stem = [](const std::string& name) { return name.substr(0, name.find_first_of("_ ([")); };
+  for (const std::string& name : names) {
+    if (stem(name) == stem(column) && column.find('_') != std::string::npos) return spelled(name);
+  }
+  const std::string near = near_miss(column, names);
+  return near.empty() ? "" : spelled(near);
+}
+
+}  // namespace
 
 Result<std::size_t> CsvTable::require(std::string_view column) const {
   if (const auto at = find(column)) return *at;
+  const std::string wanted(column);
+  const std::string meant = meant_by(wanted, columns_);
   const std::string names = shown_short(fmt::format("{}", fmt::join(columns_, ",")));
-  const bool semicolons = columns_.size() == 1 && columns_[0].find(';') != std::string::npos;
-  return refused("missing column {}", column)
+  return refused("missing column {}", wanted)
       .in(where_)
-      .of(std::string(column))
-      .next(fmt::format("the header has: {}{}", names, semicolons ? " (columns must be separated by ',')" : ""));
+      .of(wanted)
+      .next(meant.empty() ? fmt::format("the header has: {}; trammel help formats tells them all", names)
+                          : fmt::format("is it column {}? then call it {}, with its values in that unit",
+                                        shown_short(meant), wanted));
 }
 
 Result<std::vector<std::size_t>> CsvTable::all_or_none(const std::vector<std::string>& columns) const {
@@ -237,8 +349,14 @@ Result<std::string> CsvTable::name(std::size_t row, std::size_t column) const {
 }
 
 Result<double> CsvTable::number(std::size_t row, std::size_t column, double limit) const {
-  std::string_view text = field(row, column);
-  if (text.empty()) return refuse(row, "{} is empty, expected a number", columns_[column]).of(columns_[column]);
+  const std::string written =
+      separator_ == ',' || points_ ? field(row, column) : with_decimal_point(field(row, column));
+  std::string_view text = written;
+  if (text.empty()) {
+    return refuse(row, "{} is empty, expected a number", columns_[column])
+        .of(columns_[column])
+        .next("measure or fill it in, or delete the row");
+  }
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -249,9 +367,11 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
         .beyond(std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1), limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
+    const bool comma = text.find(',') != std::string_view::npos;
     return refuse(row, "{} is '{}', expected a number", columns_[column], shown_short(field(row, column)))
         .of(columns_[column])
-        .with_text(shown_short(field(row, column)));
+        .with_text(shown_short(field(row, column)))
+        .next(comma ? kTwoCommas : "write it with digits alone: the unit stands in the column's name");
   }
   if (!std::isfinite(value)) {
     return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column))
@@ -297,7 +417,7 @@ Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<st
 
 std::string csv_field(std::string_view text) {
   const bool bare =
-      text.find_first_of(",\"\n\r") == std::string_view::npos && trimmed(text) == text && !text.starts_with('#');
+      text.find_first_of(",;\t\"\n\r") == std::string_view::npos && trimmed(text) == text && !text.starts_with('#');
   if (bare) return std::string(text);
   std::string quoted = "\"";
   for (const char c : text) {

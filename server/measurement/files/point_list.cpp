@@ -19,6 +19,12 @@ constexpr double kUncertaintyLimit = 1;  // m
 constexpr double kAngleLimit = 360;      // deg
 constexpr double kInch = 0.0254;         // m
 
+/// `p1` of `Collection::Group::p1`, as SpatialAnalyzer writes the whole name of a point.
+std::string last_component(const std::string& name) {
+  const auto at = name.rfind("::");
+  return at == std::string::npos ? name : name.substr(at + 2);
+}
+
 /// Reads rows of a table whose columns have our names.
 class PointReader {
  public:
@@ -49,7 +55,7 @@ class PointReader {
     point.row = table_.line(row);
     Result<std::string> name = table_.name(row, name_);
     if (!name) return tl::make_unexpected(name.error());
-    point.name = std::move(*name);
+    point.name = last_component(*name);
     if (point.name.empty()) return table_.refuse(row, "name is empty").of("name");
     if (positional_ && is_number(point.name) && point.name.find('.') != std::string::npos) {
       return table_.refuse(row, "name is '{}', which looks like a coordinate", point.name)
@@ -172,7 +178,8 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
     if (!is_new) {
       return parts->table.refuse(row, "name '{}' is already that of row {}", point->name, earlier->second)
           .of("name")
-          .with_text(point->name);
+          .with_text(point->name)
+          .next("names count without their collection and group: export one group, or rename the point");
     }
     list.points.push_back(std::move(*point));
   }
@@ -186,7 +193,7 @@ Result<PointList> read_points(const std::string& path, const PointFileOptions& o
 Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded) {
   std::map<std::string, const CommandedPose*> pose_of_id;
   for (const CommandedPose& pose : commanded.poses) {
-    const auto [earlier, is_new] = pose_of_id.emplace(pose.pose_id, &pose);
+    const auto [earlier, is_new] = pose_of_id.emplace(last_component(pose.pose_id), &pose);
     if (is_new) continue;
     return refused("pose_id '{}' is already that of row {}", pose.pose_id, earlier->second->row)
         .in(commanded.where)
@@ -206,10 +213,11 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
           .in(points.where)
           .at_row(point.row)
           .of("name")
-          .with_text(point.name);
+          .with_text(point.name)
+          .next("measure under the names of the plan, or name the plan that was measured");
     }
     Measurement measurement;
-    measurement.pose_id = point.name;
+    measurement.pose_id = pose->second->pose_id;
     measurement.context = pose->second->context;
     measurement.context.index = static_cast<int>(batch.measurements.size());
     measurement.p_W = point.p_W;

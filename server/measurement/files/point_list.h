@@ -29,7 +29,10 @@ struct PointList {
 ///
 /// Lines: one point each; empty lines are passed over, `//` and `#` start comments. Fields are separated by `;`, tab,
 /// `,` or blanks, by the first of these that is in the first line of data; a name with a separator in it stands in
-/// double quotes. Time stamps at the end of a line (fields with `/` or `:`, AM, PM, an ISO date) are passed over.
+/// double quotes, and of a name with its collection and group, `Collection::Group::p1`, the last component counts.
+/// Between `;`, tabs or blanks a number may have a decimal comma; where commas separate values without a header and no
+/// number has a decimal point, the file is refused. Time stamps at the end of a line (fields with `/` or `:`, AM, PM,
+/// an ISO date) are passed over.
 ///
 /// Layouts without a header line, told by the number of fields, the same in every line:
 ///
@@ -61,7 +64,8 @@ struct PointList {
                                              const PointFileOptions& options = {});
 [[nodiscard]] Result<PointList> read_points(const std::string& path, const PointFileOptions& options = {});
 
-/// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the name of the point.
+/// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the name of the point
+/// (of both the last component counts).
 /// The batch has the order of the points, which is the order in time. Poses without a point are left out. Refuses a
 /// point without a pose, a pose_id twice, and lists without a point.
 [[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded);

@@ -6,6 +6,7 @@
 #include <regex>
 #include <vector>
 
+#include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/text_lines.h"
 
 namespace trammel {
@@ -212,6 +213,20 @@ Result<std::vector<std::string>> positional_columns(const CsvTable::Row& row, co
   return columns;
 }
 
+/// Refuses positions without any decimal point between commas: they may be fewer numbers with decimal commas.
+Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& where) {
+  for (const CsvTable::Row& row : rows) {
+    const auto name = std::find_if_not(row.fields.rbegin(), row.fields.rend(), is_number);
+    const bool no_more_than_needed = row.fields.size() <= kLeastFields || name - row.fields.rbegin() <= 3;
+    const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
+    if (no_more_than_needed || std::any_of(row.fields.rbegin(), name, pointed)) return {};
+  }
+  return refused("commas between all values and no decimal point: they may stand in numbers, too")
+      .in(where)
+      .at_row(rows.front().line)
+      .next("name the columns in a first line (name,x,y,z), or separate values by ';'");
+}
+
 Status check_comments(const std::vector<TextLine>& lines, const std::string& where) {
   const auto comments = static_cast<std::size_t>(
       std::count_if(lines.begin(), lines.end(), [](const TextLine& line) { return line.comment; }));
@@ -275,6 +290,9 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
           .at_row(row.line)
           .beyond(row.fields.size(), columns->size());
     }
+    if (separator == ',') {
+      if (const Status sure = check_commas(rows, where); !sure) return tl::make_unexpected(sure.error());
+    }
     header.columns = std::move(*columns);
     header_line = rows.front().line;
   } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
@@ -282,7 +300,7 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
   }
   const Status coordinates = state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates");
   if (!coordinates) return tl::make_unexpected(coordinates.error());
-  Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows);
+  Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows, separator);
   if (!table) return tl::make_unexpected(table.error());
   parts.table = std::move(*table);
   return parts;

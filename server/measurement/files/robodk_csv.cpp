@@ -9,6 +9,7 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
+#include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/text_lines.h"
 
@@ -20,7 +21,8 @@ constexpr double kPositionLimit = 1e3;  // m
 constexpr double kTurnsLimit = 10;      // of a joint
 constexpr std::size_t kMostJoints = 12;
 constexpr std::size_t kPositionalJoints = 6;
-constexpr double kInch = 0.0254;  // m
+constexpr std::size_t kFewestColumns = 9;  // of a layout by position
+constexpr double kInch = 0.0254;           // m
 
 enum class Orientation { kNone, kAbc, kWpr, kRxRyRz, kQuaternion };
 
@@ -222,12 +224,17 @@ std::vector<std::string> positional_names(std::size_t count) {
   return names.size() == count ? names : std::vector<std::string>{};
 }
 
-/// Turns a decimal comma into a point.
-void write_with_point(std::string& field) {
-  if (field.find(',') == std::string::npos) return;
-  std::string pointed = field;
-  std::replace(pointed.begin(), pointed.end(), ',', '.');
-  if (is_number(pointed)) field = std::move(pointed);
+/// Refuses numbers without any decimal point between commas: of half as many numbers with decimal commas they cannot be
+/// told.
+Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& where) {
+  for (const CsvTable::Row& row : rows) {
+    const auto pointed = [](const std::string& field) { return decimal_sign(field) == '.'; };
+    if (row.fields.size() <= kFewestColumns || std::any_of(row.fields.begin(), row.fields.end(), pointed)) return {};
+  }
+  return refused("commas between all values and no decimal point: they may stand in numbers, too")
+      .in(where)
+      .at_row(rows.front().line)
+      .next("name the columns in a first line (J1 ... X Y Z), or separate values by ';'");
 }
 
 /// The file as a table; by position, with the names above.
@@ -245,13 +252,10 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
   });
   if (!read) return tl::make_unexpected(read.error());
   std::vector<CsvTable::Row>& rows = *read;
-  if (separator != ',') {
-    for (CsvTable::Row& row : rows) {
-      for (std::string& field : row.fields) write_with_point(field);
-    }
-  }
   CsvTable::Row header = rows.front();
-  const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), is_number);
+  const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), [&](const std::string& field) {
+    return is_number(separator == ',' ? field : with_decimal_point(field));
+  });
   if (has_header) rows.erase(rows.begin());
   if (rows.empty()) return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
   const bool named = std::any_of(header.fields.begin(), header.fields.end(),
@@ -265,8 +269,11 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
           .with_value(rows.front().fields.size())
           .at_row(header.line);
     }
+    if (separator == ',' && !has_header) {
+      if (const Status sure = check_commas(rows, where); !sure) return tl::make_unexpected(sure.error());
+    }
   }
-  return CsvTable::from_rows(where, header, rows).map([&](CsvTable table) {
+  return CsvTable::from_rows(where, header, rows, separator).map([&](CsvTable table) {
     return RoboDkTable{std::move(table), !named};
   });
 }

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <optional>
 
+#include "server/measurement/files/csv_dialect.h"
+
 namespace trammel {
 
 namespace {
@@ -64,6 +66,7 @@ class LineReader {
 }  // namespace
 
 Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where, std::size_t longest) {
+  if (const Status readable = check_is_text(text, where); !readable) return tl::make_unexpected(readable.error());
   std::vector<TextLine> lines;
   std::size_t data = 0;
   for (LineReader reader(text); const auto line = reader.next();) {
@@ -145,8 +148,10 @@ ColumnName column_name(std::string_view field) {
   }
   std::string_view name = trimmed(field.substr(0, bracket));
   if (const auto underscore = name.rfind('_'); column.unit.empty() && underscore != std::string_view::npos) {
+    std::string last;
+    for (const char c : name.substr(underscore + 1)) last += lower(c);
     for (const std::string_view unit : {"mm", "m", "in", "deg", "rad", "s"}) {
-      if (name.substr(underscore + 1) == unit) column.unit = unit;
+      if (last == unit) column.unit = unit;
     }
     if (!column.unit.empty()) name = name.substr(0, underscore);
   }

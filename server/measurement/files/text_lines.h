@@ -18,8 +18,9 @@ struct TextLine {
   bool comment = false;  ///< starts with `//` or `#`; `text` is then what follows
 };
 
-/// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order mark. Refuses as
-/// kTooLarge more than a million lines, 100,000 lines of data, and a line longer than `longest` bytes.
+/// The lines that are not empty, without blanks around them; LF or CRLF, with or without byte order mark. Refuses
+/// what is no text; as kTooLarge more than a million lines, 100,000 lines of data, and a line longer than `longest`
+/// bytes.
 [[nodiscard]] Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where,
                                                        std::size_t longest = kLongestLine);
 /// The first lines of data, `count` at most, without comments.

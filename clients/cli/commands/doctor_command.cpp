@@ -1,0 +1,261 @@
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/statvfs.h>
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/command_tree.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/base/plain_text.h"
+#include "server/store/store_check.h"
+
+namespace trammel::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kRoomNeededMb = 200;              // of the store's disk
+constexpr std::int64_t kEarliest = 1'700'000'000;  // Unix time, s: no clock of today is before
+
+struct DoctorArguments {
+  std::string store, json;
+  ServiceOptions service;
+};
+
+enum class State { kGood, kNote, kBad };
+
+/// What one look found, and what to do about it.
+struct Found {
+  std::string check;
+  State state = State::kGood;
+  std::string what, next;
+};
+
+const char* name_of(State state) { return state == State::kGood ? "good" : state == State::kNote ? "note" : "bad"; }
+
+/// A UDP socket that is closed with its scope.
+class Udp {
+ public:
+  Udp() : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  ~Udp() {
+    if (socket_ >= 0) ::close(socket_);
+  }
+  Udp(const Udp&) = delete;
+  Udp& operator=(const Udp&) = delete;
+
+  /// 0, or why it cannot be bound.
+  [[nodiscard]] int bind(const std::string& host, std::uint16_t port) {
+    place_.sin_family = AF_INET;
+    place_.sin_port = htons(port);
+    if (::inet_pton(AF_INET, host.c_str(), &place_.sin_addr) != 1) return EINVAL;
+    return ::bind(socket_, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) == 0 ? 0 : errno;
+  }
+  /// Whether a datagram to itself comes back.
+  [[nodiscard]] bool hears_itself() {
+    socklen_t size = sizeof place_;
+    if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&place_), &size) != 0) return false;
+    const char out = 'x';
+    if (::sendto(socket_, &out, 1, 0, reinterpret_cast<const sockaddr*>(&place_), sizeof place_) != 1) return false;
+    pollfd readable{socket_, POLLIN, 0};
+    char in = 0;
+    return ::poll(&readable, 1, 1000) == 1 && ::recv(socket_, &in, 1, 0) == 1;
+  }
+
+ private:
+  int socket_;
+  sockaddr_in place_{};
+};
+
+Found network(const std::string& host) {
+  Udp udp;
+  const int why = udp.bind(host, 0);
+  if (why != 0) {
+    return {"network", State::kBad, fmt::format("{} cannot be used: {}", shown(host), std::strerror(why)),
+            "name an address of this host by --host; is the interface up? ip address"};
+  }
+  if (!udp.hears_itself())
+    return {"network", State::kBad, fmt::format("a datagram to {} does not arrive", host),
+            "does a firewall drop UDP on this interface? nft list ruleset"};
+  return {"network", State::kGood, fmt::format("datagrams arrive on {}", host), ""};
+}
+
+/// Whether a trammel server of this host holds the port: its name in the abstract namespace.
+bool held_by_server(const std::string& host, std::uint16_t port) {
+  std::ifstream sockets("/proc/net/unix");
+  const std::string wanted = fmt::format("@trammel-dds-{}-{}", host, port);
+  for (std::string line; std::getline(sockets, line);) {
+    if (line.ends_with(wanted)) return true;
+  }
+  return false;
+}
+
+Found port(const std::string& host, std::uint16_t number) {
+  const std::string check = fmt::format("port {}", number);
+  if (held_by_server(host, number)) return {check, State::kGood, "a trammel server holds it", ""};
+  Udp udp;
+  const int why = udp.bind(host, number);
+  if (why == 0)
+    return {check, State::kNote, "free: no server listens here",
+            "start one: trammeld --config SERVER.yaml; or name its port by --port"};
+  return {check, State::kBad, fmt::format("taken by another program: {}", std::strerror(why)),
+          fmt::format("who is it? ss -ulnp 'sport = :{}'; give the server another port (key port)", number)};
+}
+
+Found version_of(const client::ServerStatus& server) {
+  const std::string check = "server " + shown(server.server_id);
+  if (!server.trouble.empty())
+    return {check, State::kBad, shown(server.trouble), "trammel status tells more; its log says since when"};
+  if (server.version != TRAMMEL_VERSION) {
+    return {check, State::kNote,
+            fmt::format("version {}, this command line is {}", shown(server.version), TRAMMEL_VERSION),
+            "bring both to one version"};
+  }
+  return {check, State::kGood,
+          fmt::format("version {} as this command line, {} cells, up {:.0f} s", shown(server.version),
+                      server.cells.size(), server.uptime_s),
+          ""};
+}
+
+void look_at_servers(const ServiceOptions& options, std::vector<Found>& found) {
+  const bool any = std::any_of(options.ports.begin(), options.ports.end(),
+                               [&](std::uint16_t one) { return held_by_server(options.host, one); });
+  if (!any) return;  // the ports say so
+  const auto session = open_session(options);
+  const auto servers =
+      session ? (*session)->servers() : Result<std::vector<client::ServerStatus>>(tl::make_unexpected(session.error()));
+  if (!servers) {
+    found.push_back({"servers", State::kBad, servers.error().message,
+                     "its port is held, and it does not answer: is it of another --domain, or hung? read its log"});
+    return;
+  }
+  for (const client::ServerStatus& server : *servers) found.push_back(version_of(server));
+}
+
+Found clock() {
+  const auto now =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  if (now < kEarliest)
+    return {"clock", State::kBad, "it is years behind: models and audit trail would be dated wrong",
+            "set it: timedatectl set-time, or set-ntp true"};
+  timex about{};
+  if (::adjtimex(&about) == TIME_ERROR)
+    return {"clock", State::kNote, "not synchronised: times of tracker and controller may not fit each other",
+            "synchronise it: timedatectl set-ntp true"};
+  return {"clock", State::kGood, "synchronised", ""};
+}
+
+/// The process that a file of ours belongs to, `NAME.1234.part`; 0: it is none of ours.
+pid_t owner_of_part(const fs::path& file) {
+  if (file.extension() != ".part") return 0;
+  const std::string number = file.stem().extension().string();
+  const bool digits = number.size() > 1 && std::all_of(number.begin() + 1, number.end(),
+                                                       [](unsigned char c) { return c >= '0' && c <= '9'; });
+  return digits && number.size() < 9 ? static_cast<pid_t>(std::stol(number.substr(1))) : 0;
+}
+
+/// Half-written files of processes that are gone, in the folders that were named.
+Found leftovers(const std::vector<fs::path>& folders) {
+  std::vector<std::string> left;
+  for (const fs::path& folder : folders) {
+    std::error_code error;
+    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+      const pid_t owner = owner_of_part(it->path());
+      if (owner > 0 && ::kill(owner, 0) != 0 && errno == ESRCH) left.push_back(shown(it->path().string()));
+    }
+  }
+  std::sort(left.begin(), left.end());
+  if (left.empty()) return {"leftovers", State::kGood, "no half-written files of processes that are gone", ""};
+  return {"leftovers", State::kNote, fmt::format("half-written by processes that are gone: {}", fmt::join(left, ", ")),
+          fmt::format("delete them: rm {}", fmt::join(left, " "))};
+}
+
+void look_at_store(const std::string& path, std::vector<Found>& found) {
+  const Status usable = check_store(path);
+  const bool in_use = !usable && usable.error().code == ErrorCode::kConflict;
+  if (!usable && !in_use) {
+    found.push_back({"store", State::kBad, sentence(usable.error()),
+                     usable.error().next.empty() ? "name the key store of the server file; its folder must exist"
+                                                 : usable.error().next});
+    return;
+  }
+  found.push_back({"store", State::kGood, in_use ? "in use by a server" : "could be opened", ""});
+  struct statvfs disk {};
+  const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
+  if (::statvfs(folder.c_str(), &disk) != 0) return;
+  const double free_mb = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
+  const bool little = free_mb < kRoomNeededMb;
+  found.push_back(
+      {"disk", little ? State::kBad : State::kGood, fmt::format("{:.0f} MB free for the store", free_mb),
+       little ? fmt::format("make room in {}: {:.0f} MB at least", shown(folder.string()), kRoomNeededMb) : ""});
+}
+
+/// The text in lines beside `left`, which is as wide as they are indented.
+std::string beside(const std::string& left, const std::string& text) {
+  const std::string filled = std::string(left.size() - 1, '.') + " " + text;
+  return left + wrapped(filled, left.size()).substr(left.size()) + "\n";
+}
+
+std::string as_text(const std::vector<Found>& found) {
+  std::size_t width = 0;
+  for (const Found& one : found) width = std::max(width, one.check.size());
+  std::string text;
+  for (const Found& one : found) {
+    const std::string look = fmt::format("{:<6}{:<{}}  ", name_of(one.state), one.check, width);
+    text += beside(look, one.what);
+    if (!one.next.empty()) text += beside(std::string(look.size(), ' '), one.next);
+  }
+  return text;
+}
+
+Result<Extent> examine(const DoctorArguments& arguments) {
+  const ServiceOptions& service = arguments.service;
+  std::vector<Found> found = {{"version", State::kGood, TRAMMEL_VERSION, ""}, network(service.host)};
+  for (const std::uint16_t number : service.ports) found.push_back(port(service.host, number));
+  look_at_servers(service, found);
+  found.push_back(clock());
+  std::vector<fs::path> folders = {"."};
+  if (!arguments.store.empty()) {
+    look_at_store(arguments.store, found);
+    if (fs::path(arguments.store).has_parent_path()) folders.push_back(fs::path(arguments.store).parent_path());
+  }
+  found.push_back(leftovers(folders));
+  found.push_back({"certificates", State::kGood, "none are used: traffic stays on this host", ""});
+  tell(as_text(found), {arguments.json});
+  nlohmann::ordered_json checks = nlohmann::ordered_json::array();
+  for (const Found& one : found)
+    checks.push_back({{"check", one.check}, {"state", name_of(one.state)}, {"what", one.what}, {"next", one.next}});
+  const Status written = write_json(arguments.json, {{"version", TRAMMEL_VERSION}, {"checks", std::move(checks)}});
+  if (!written) return tl::make_unexpected(written.error());
+  const bool bad = std::any_of(found.begin(), found.end(), [](const Found& one) { return one.state == State::kBad; });
+  return bad ? Extent::kPart : Extent::kAll;
+}
+
+}  // namespace
+
+void add_doctor_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<DoctorArguments>();
+  arguments->service.timeout_s = 2;
+  CLI::App* command = app.add_subcommand(
+      "doctor", "Look at this machine for what keeps a service from working, and say what to do about it");
+  command->add_option("--store", arguments->store, "File of a server's store (its key store), to look at it, too")
+      ->type_name("FILE");
+  add_json_option(*command, arguments->json);
+  add_options_of_service_command(*command, arguments->service);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return examine(*arguments); }; });
+}
+
+}  // namespace trammel::cli

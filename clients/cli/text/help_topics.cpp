@@ -1,0 +1,176 @@
+#include "clients/cli/text/help_topics.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <utility>
+
+namespace trammel::cli {
+
+namespace {
+
+constexpr std::array kTopics = {
+    HelpTopic{"start", "from nothing to a corrected program, in five commands",
+              "Plan measuring poses, measure them, train a model, look at it, correct a program:\n"
+              "  trammel plan --cell cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
+              "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
+              "  trammel train --cell cell.yaml --batch batch.csv -o cell.model\n"
+              "  trammel report --model cell.model -o report.html\n"
+              "  trammel correct --model cell.model drill.mod -o drill-corrected.mod\n"
+              "\n"
+              "Without a robot at hand: trammel simulate measures a plan on a virtual one."},
+    HelpTopic{"formats", "the columns of every table that is read",
+              "All tables are text in columns with a header line: separated by ',', ';' or tabs, as the header is. "
+              "With ';' or tabs numbers may have decimal commas. Names of columns may be in capitals. Spreadsheets "
+              "(.xlsx) are exported first: Save As, \"CSV UTF-8\". What may be read in two ways is refused.\n"
+              "\n"
+              "Batch, what was measured (train, evaluate, diagnose, check, submit):\n"
+              "  q1_deg ... qn_deg     joints as commanded, deg; a rail has q7_mm\n"
+              "  x_mm, y_mm, z_mm      tool position as measured, mm\n"
+              "  qw, qx, qy, qz        optional: orientation, unit quaternion, w first\n"
+              "  pose_id, time_s, sigma_mm, temperature_c, tool_id, payload_id,\n"
+              "  dir1 ... dirn (-1, 0, 1), session_id, set (train, validation)\n"
+              "\n"
+              "Joints, what is to be commanded (plan, predict --joints, simulate --plan):\n"
+              "  q1_deg ... qn_deg, and any of pose_id, tool_id, payload_id, dir1 ...\n"
+              "\n"
+              "Targets (correct):\n"
+              "  x_mm, y_mm, z_mm, qw, qx, qy, qz   tool in the robot's base\n"
+              "  conf, or q1_deg ...                the branch, or joints near by\n"
+              "\n"
+              "Points of a tracker (convert, references):\n"
+              "  name, x_mm, y_mm, z_mm             or a SpatialAnalyzer ASCII export"},
+    HelpTopic{
+        "cell", "what a cell file says",
+        "YAML. The shortest one:\n"
+        "  version: 1\n"
+        "  cell: cell-7\n"
+        "  robot: ../models/abb_irb6640-205-275.yaml   # relative to this file\n"
+        "  base: null                        # unknown: found from the data\n"
+        "  gravity: [0, 0, -1]\n"
+        "  tools: {spindle: null}            # unknown: found from the data\n"
+        "  tracker: {sigma_mm: 0.013}\n"
+        "  model: {error_sources: [base, geometry, compliance], bias: se}\n"
+        "\n"
+        "Unknown keys are refused, all problems of a file are said in one run. trammeld --check looks at a server "
+        "file and at all of its cells."},
+    HelpTopic{
+        "units", "in which unit each number is",
+        "Joints are in deg, rails in mm, positions in mm, weights in kg, forces in N, times in s, temperatures in "
+        "degrees Celsius. The name of a column or key ends in its unit: q1_deg, x_mm, mass_kg. u95 is two standard "
+        "uncertainties; sigma_mm is one, per axis."},
+    HelpTopic{
+        "levels", "what a training identifies (--level, --bias)",
+        "M0 nothing, M1 base, M2 base and geometry, M3 base, geometry and compliance; a list, or a level and more:\n"
+        "  trammel train --cell c.yaml --batch b.csv --level M2,gear_transmission:3 -o m\n"
+        "\n"
+        "--bias spells the kernel of what is learned of the rest: se, matern32, matern52, none, auto, sums and "
+        "products of them. An \"rbf\" kernel of other programs is called se here."},
+    HelpTopic{
+        "service", "asking a daemon, and which one (--port, --host, --domain)",
+        "With --service, or for commands that only a daemon can do, trammel asks a running trammeld on this host:\n"
+        "  trammeld --config config/server.yaml --check\n"
+        "  deploy/supervise trammeld --config config/server.yaml\n"
+        "  trammel status\n"
+        "\n"
+        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each replica. trammel doctor says "
+        "what is in the way where nothing answers."},
+    HelpTopic{
+        "defaults", "one file for what you would say every time (TRAMMEL_DEFAULTS)",
+        "The file that the environment variable TRAMMEL_DEFAULTS names, else ~/.config/trammel/defaults, holds "
+        "options as name = value, one a line; # begins a comment:\n"
+        "  port = 17501\n"
+        "  cell = /data/cells/cell-7.yaml\n"
+        "\n"
+        "Taken are host, port, domain, timeout, cell, tool, payload and seed, by each command that has the option, "
+        "cell only where a command needs one. What the command line says comes first. TRAMMEL_DEFAULTS= (empty) "
+        "takes none."},
+    HelpTopic{"exit-codes", "what a script may rely on",
+              "0 done; 1 done but not all (targets left as they were, a new model not in force, findings of doctor); 2 "
+              "wrong usage; 3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "
+              "{\"error\": {code, message, file, row, field, value, limit, next, sentence}}."},
+};
+
+constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
+    {"plan",
+     "  trammel plan --cell cell.yaml --count 60 -o plan.csv --rapid plan.mod\n"
+     "  trammel plan --cell cell.yaml --check 12 -o check.csv\n"
+     "  trammel plan --cell cell.yaml --count 40 --criterion observability -o p.csv"},
+    {"simulate", "  trammel simulate --cell cell.yaml --truth truth.yaml --plan plan.csv -o b.csv"},
+    {"convert",
+     "  trammel convert --points tracker.txt --joints plan.csv -o batch.csv\n"
+     "  trammel convert --robodk calibration.csv -o batch.csv"},
+    {"references", "  trammel references --nominal refs.csv --measured now.csv"},
+    {"cpa", "  trammel cpa --robot robot.yaml --arcs arcs.csv"},
+    {"deflection", "  trammel deflection --data loads.csv"},
+    {"train",
+     "  trammel train --cell cell.yaml --batch batch.csv -o cell.model\n"
+     "  trammel train --cell cell.yaml --batch mon.csv --batch tue.csv --level M3 -o m\n"
+     "  trammel train --cell tool.yaml --batch few.csv --from m --refit tool -o m2"},
+    {"evaluate", "  trammel evaluate --model cell.model --batch fresh.csv --json -"},
+    {"report", "  trammel report --model cell.model --batch fresh.csv -o report.html"},
+    {"predict",
+     "  trammel predict --model cell.model --joints plan.csv -o where.csv\n"
+     "  trammel predict --model cell.model drill.mod -o where.csv"},
+    {"correct",
+     "  trammel correct --model cell.model targets.csv -o corrected.csv\n"
+     "  trammel correct --model cell.model drill.mod -o out.mod --receipt r.csv\n"
+     "  trammel correct --undo out.mod -o drill.mod"},
+    {"check", "  trammel check --model cell.model --batch few.csv --json health.json"},
+    {"diagnose",
+     "  trammel diagnose --cell cell.yaml --batch batch.csv --report page.html\n"
+     "  trammel diagnose --cell cell.yaml --batch b.csv --next-poses next.csv"},
+    {"study", "  trammel study drilling --json -"},
+    {"fleet", "  trammel fleet --model a.model --model b.model --model c.model"},
+    {"import-backup",
+     "  trammel import-backup BACKUP -o cell.yaml\n"
+     "  trammel import-backup BACKUP --compare cell.yaml"},
+    {"export-robot",
+     "  trammel export-robot --model cell.model -o robot.urdf\n"
+     "  trammel export-robot --model cell.model -o robot.yaml --table robot.csv"},
+    {"submit", "  trammel submit --cell cell-7 --batch batch.csv --watch"},
+    {"retrain", "  trammel retrain --cell cell-7 --batch b1 --batch b2 --watch"},
+    {"status", "  trammel status --port 17500 --json -"},
+    {"watch", "  trammel watch --job 12"},
+    {"models", "  trammel models --cell cell-7"},
+    {"show", "  trammel show --model cell-7@3"},
+    {"jobs", "  trammel jobs --cell cell-7"},
+    {"batches",
+     "  trammel batches --cell cell-7\n"
+     "  trammel batches --cell cell-7 --batch b1 -o b1.csv"},
+    {"activate", "  trammel activate --model cell-7@3 --reason \"checked on 12 poses\""},
+    {"rollback", "  trammel rollback --cell cell-7 --reason \"drill jig was loose\""},
+    {"release", "  trammel release --cell cell-7 --batch b2"},
+    {"discard", "  trammel discard --cell cell-7 --batch b2"},
+    {"export", "  trammel export --model cell-7 -o cell-7.model"},
+    {"import", "  trammel import --cell cell-7 --model cell-7.model"},
+    {"audit", "  trammel audit --cell cell-7"},
+    {"history", "  trammel history --cell cell-7 -o history.html"},
+    {"help", "  trammel help\n  trammel help formats\n  trammel help train"},
+    {"doctor", "  trammel doctor\n  trammel doctor --port 17501 --store data/trammel.db --json -"},
+    {"completion",
+     "  source <(trammel completion bash)\n"
+     "  trammel completion zsh > _trammel"},
+    {"manual", "  trammel manual -o man1"},
+};
+
+}  // namespace
+
+std::span<const HelpTopic> help_topics() { return kTopics; }
+
+std::string_view examples_of(std::string_view command) {
+  const auto at = std::find_if(std::begin(kExamples), std::end(kExamples),
+                               [&](const auto& entry) { return entry.first == command; });
+  return at == std::end(kExamples) ? std::string_view() : at->second;
+}
+
+std::string_view common_footer() {
+  return "Joints are in deg (rails in mm), positions in mm, standard deviations in the unit of what they belong to.\n"
+         "An output file named '-' is standard output. Errors go to standard error and name file, row, value and "
+         "limit.\n"
+         "Exit codes: 0 done; 1 done but not all (targets left as they were, a new model not in force); 2 wrong "
+         "usage; 3 refused data; 4 service unreachable or busy.\n"
+         "trammel help lists commands and topics: formats, cell, units, service, ...";
+}
+
+}  // namespace trammel::cli
