@@ -163,7 +163,7 @@ TEST_F(WatchingTest, ARealPrometheusScrapesTheDaemonAndTakesTheShippedRules) {
   const std::string shipped = TRAMMEL_SOURCE_DIR "/deploy/watching/";
   folder.write("alerts.yml", test::read_file(shipped + "alerts.yml"));
   std::string config = test::read_file(shipped + "prometheus.yml");
-  config.replace(config.find("9464"), 4, std::to_string(port()));
+  config.replace(config.rfind("9464"), 4, std::to_string(port()));
   config.replace(config.find("15s"), 3, "1s");
   folder.write("prometheus.yml", config);
   const auto listens = static_cast<std::uint16_t>(port() + 1);
@@ -182,8 +182,8 @@ TEST_F(WatchingTest, ARealPrometheusScrapesTheDaemonAndTakesTheShippedRules) {
   EXPECT_EQ(ready[0]["metric"]["state"], "untrained");
   EXPECT_EQ(ready[0]["value"][1], "0");
   EXPECT_EQ(answer("up")[0]["value"][1], "1");
-  const auto rules = nlohmann::json::parse(test::http_get(listens, "/api/v1/rules").body, nullptr, false);
-  EXPECT_GE(rules["data"]["groups"][0]["rules"].size(), 10u);
+  const std::string rules = test::http_get(listens, "/api/v1/rules").body;
+  EXPECT_NE(rules.find("TrammelCellIsDark"), std::string::npos) << rules;
 }
 
 /// Where a manager of services listens.
