@@ -120,14 +120,14 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-/// Whoever asks for nonsense all day does not fill the log of a service that logs what happens.
+/// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are written.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
   const LogAbout about = {{"cell", call.cell},       {"operation", call.operation}, {"who", call.client},
                           {"request", call.request}, {"trace", call.trace},         {"result", call.result}};
   const std::string what = fmt::format("{}: {} of request {}{}", call.cell, call.operation, call.request, trace);
   if (!call.refused.empty()) {
-    tell(LogLevel::kDebug, "request_refused", fmt::format("{} is refused: {}", what, call.refused), about);
+    tell(LogLevel::kInfo, "request_refused", fmt::format("{} is refused: {}", what, call.refused), about);
   } else {
     tell(LogLevel::kInfo, "request_done", what + " is done", about);
   }

@@ -142,7 +142,7 @@ void tell(LogLevel level, const char* kind, const std::string& text, const LogAb
   const auto spoken = level_of(level);
   if (!spdlog::should_log(spoken)) return;
   LogLimit::Verdict verdict;
-  {
+  if (level != LogLevel::kDebug) {
     const MutexLock lock(state().mutex);
     verdict = state().limit.look(kind, std::chrono::steady_clock::now());
   }

@@ -8,8 +8,8 @@
 #include "server/host/log_options.h"
 
 /// The log of the process: a fact a line, as text for people or as JSON for programs. A line waits for nobody: what
-/// does not go at once is dropped and counted. Of one kind of fact at most LogLimit::kMost lines a minute are written;
-/// the next one says how many were left out. Thread-safe, start_log() excepted.
+/// does not go at once is dropped and counted. Of one kind of fact at most LogLimit::kMost lines a minute are written
+/// (of level debug all); the next one says how many were left out. Thread-safe, start_log() excepted.
 namespace trammel {
 
 enum class LogLevel { kDebug, kInfo, kWarn, kError };

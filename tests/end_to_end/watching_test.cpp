@@ -156,6 +156,36 @@ TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
   EXPECT_TRUE(refused);
 }
 
+TEST_F(WatchingTest, ARealPrometheusScrapesTheDaemonAndTakesTheShippedRules) {
+  if (test::run({"/bin/sh", "-c", "command -v prometheus"}).exit_code != 0)
+    GTEST_SKIP() << "Prometheus is not there (package prometheus)";
+  const test::TemporaryFolder folder;
+  const std::string shipped = TRAMMEL_SOURCE_DIR "/deploy/watching/";
+  folder.write("alerts.yml", test::read_file(shipped + "alerts.yml"));
+  std::string config = test::read_file(shipped + "prometheus.yml");
+  config.replace(config.rfind("9464"), 4, std::to_string(port()));
+  config.replace(config.find("15s"), 3, "1s");
+  folder.write("prometheus.yml", config);
+  const auto listens = static_cast<std::uint16_t>(port() + 1);
+  test::Process prometheus({"/usr/bin/env", "prometheus", "--config.file=" + folder.file("prometheus.yml"),
+                            "--storage.tsdb.path=" + folder.file("data"),
+                            fmt::format("--web.listen-address=127.0.0.1:{}", listens)});
+  const auto answer = [&](const std::string& query) {
+    const auto body =
+        nlohmann::json::parse(test::http_get(listens, "/api/v1/query?query=" + query).body, nullptr, false);
+    return body.is_object() ? body["data"]["result"] : nlohmann::json::array();
+  };
+  const auto until = std::chrono::steady_clock::now() + seconds(60);
+  while (answer("trammel_cell_ready").empty() && std::chrono::steady_clock::now() < until) continue;
+  const auto ready = answer("trammel_cell_ready");
+  ASSERT_EQ(ready.size(), 1u) << prometheus.standard_error();
+  EXPECT_EQ(ready[0]["metric"]["state"], "untrained");
+  EXPECT_EQ(ready[0]["value"][1], "0");
+  EXPECT_EQ(answer("up")[0]["value"][1], "1");
+  const std::string rules = test::http_get(listens, "/api/v1/rules").body;
+  EXPECT_NE(rules.find("TrammelCellIsDark"), std::string::npos) << rules;
+}
+
 /// Where a manager of services listens.
 class ManagerSocket {
  public:

@@ -73,8 +73,8 @@ HttpAnswer parse_http(const std::string& bytes) {
 }
 
 HttpAnswer http_get(std::uint16_t port, const std::string& path, std::chrono::milliseconds limit) {
-  return parse_http(
-      http_exchange(port, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", path, port), limit));
+  return parse_http(http_exchange(
+      port, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\r\n", path, port), limit));
 }
 
 }  // namespace trammel::test
