@@ -44,6 +44,8 @@ const std::map<std::string, Outsider> kOutsiders = {
     {"clients/session", {{"idl"}, 0}},
     {"clients/cam", {{"idl", "clients/session"}, 2}},
     {"clients/cli", {{"clients/session", "clients/cam"}, 7}},
+    {"clients/library", {{"clients/session"}, 7}},
+    {"clients/python", {{}, -1}},
     {"clients", {{"clients/cli"}, -1}},
     {"idl", {{"idl/guard"}, 0}},
     {"idl/guard", {{}, 0}},

@@ -1,0 +1,129 @@
+#include "clients/library/convert.h"
+
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel::library {
+
+namespace {
+
+constexpr double kUnitLength = 1e-3;   // how far a quaternion may be from length 1, as in files
+constexpr double kHottest = 1000;      // degrees Celsius, either side of zero
+constexpr double kFarthest_mm = 1e6;   // of a position, as in files
+constexpr double kLargestJoint = 1e6;  // deg, of a rail mm
+
+bool is_rail(const Chain& robot, int joint) { return robot.joint(joint).type == JointType::kPrismatic; }
+
+Error at_index(Error error, std::size_t index) {
+  return Failure(std::move(error)).at_row(static_cast<long>(index)).value();
+}
+
+}  // namespace
+
+api::Error to_api(const Error& error) {
+  api::Error out;
+  out.code = static_cast<api::ErrorCode>(error.code);
+  out.message = error.message;
+  out.file = error.file;
+  out.row = error.row;
+  out.field = error.field;
+  out.value = error.value;
+  out.limit = error.limit;
+  out.text = error.text;
+  out.next = error.next;
+  for (const Error& other : error.also) out.also.push_back(to_api(other));
+  out.sentence = sentence(error);
+  return out;
+}
+
+api::Pose to_api(const Pose& X_AB) {
+  const Eigen::Quaterniond R(X_AB.linear());
+  const Vector3 p = to_mm(1) * X_AB.translation();
+  return {{p.x(), p.y(), p.z()}, {R.w(), R.x(), R.y(), R.z()}};
+}
+
+Result<Pose> from_api(const api::Pose& X_AB) {
+  const Vector3 p_mm(X_AB.xyz_mm[0], X_AB.xyz_mm[1], X_AB.xyz_mm[2]);
+  for (const double mm : X_AB.xyz_mm) {
+    if (!(std::abs(mm) <= kFarthest_mm))
+      return refused("position is {} mm, limit {:.0f}", mm, kFarthest_mm).of("xyz_mm").beyond(mm, kFarthest_mm);
+  }
+  const Eigen::Quaterniond R(X_AB.q_wxyz[0], X_AB.q_wxyz[1], X_AB.q_wxyz[2], X_AB.q_wxyz[3]);
+  if (!(std::abs(R.norm() - 1) <= kUnitLength)) {
+    return refused("the quaternion has length {:.6g}, limit 1 +- {}", R.norm(), kUnitLength)
+        .of("q_wxyz")
+        .beyond(R.norm(), 1);
+  }
+  return make_pose(R.normalized().toRotationMatrix(), from_mm(1) * p_mm);
+}
+
+std::vector<double> joints_to_api(const JointVector& q, const Chain& robot) {
+  std::vector<double> joints;
+  for (int j = 0; j < q.size(); ++j) joints.push_back(is_rail(robot, j) ? to_mm(q(j)) : to_deg(q(j)));
+  return joints;
+}
+
+Result<JointVector> joints_from_api(std::span<const double> joints_deg, const Chain& robot) {
+  if (joints_deg.size() != static_cast<std::size_t>(robot.size())) {
+    return failure(ErrorCode::kUsage, "{} joints, robot {} has {}", joints_deg.size(), robot.name(), robot.size())
+        .of("joints_deg")
+        .beyond(joints_deg.size(), robot.size());
+  }
+  JointVector q(robot.size());
+  for (int j = 0; j < robot.size(); ++j) {
+    const double value = joints_deg[static_cast<std::size_t>(j)];
+    if (!(std::abs(value) <= kLargestJoint)) {
+      return refused("joint {} is {}, limit {:.0f}", j + 1, value, kLargestJoint)
+          .of("joints_deg")
+          .beyond(value, kLargestJoint);
+    }
+    q(j) = is_rail(robot, j) ? from_mm(value) : from_deg(value);
+  }
+  return q;
+}
+
+Result<std::vector<JointVector>> all_joints_from_api(std::span<const double> joints_deg, const Chain& robot) {
+  const auto n = static_cast<std::size_t>(robot.size());
+  if (joints_deg.size() % n != 0) {
+    return failure(ErrorCode::kUsage, "{} joint values, not a multiple of the {} joints of robot {}", joints_deg.size(),
+                   n, robot.name())
+        .of("joints_deg")
+        .beyond(joints_deg.size(), n);
+  }
+  std::vector<JointVector> all;
+  all.reserve(joints_deg.size() / n);
+  for (std::size_t i = 0; i < joints_deg.size(); i += n) {
+    Result<JointVector> q = joints_from_api(joints_deg.subspan(i, n), robot);
+    if (!q) return tl::make_unexpected(at_index(q.error(), i / n));
+    all.push_back(std::move(*q));
+  }
+  return all;
+}
+
+Status check_context(const api::Context& context, const Chain& robot) {
+  const auto count = static_cast<int>(context.directions.size());
+  if (count != 0 && count != robot.size()) {
+    return failure(ErrorCode::kUsage, "{} directions, robot {} has {} joints", count, robot.name(), robot.size())
+        .of("directions")
+        .beyond(count, robot.size());
+  }
+  for (const int direction : context.directions) {
+    if (direction < -1 || direction > 1)
+      return refused("direction is {}, not -1, 0 or 1", direction).of("directions").beyond(direction, 1);
+  }
+  if (context.temperature_c && !(std::abs(*context.temperature_c) <= kHottest)) {
+    return refused("temperature is {} C, limit {:.0f}", *context.temperature_c, kHottest)
+        .of("temperature_c")
+        .beyond(*context.temperature_c, kHottest);
+  }
+  return {};
+}
+
+}  // namespace trammel::library
+
+namespace trammel::api {
+
+std::string to_text(ErrorCode code) { return trammel::to_text(static_cast<trammel::ErrorCode>(code)); }
+
+}  // namespace trammel::api

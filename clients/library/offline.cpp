@@ -1,0 +1,421 @@
+#include "clients/library/trammel/offline.h"
+
+#include <algorithm>
+#include <map>
+
+#include "clients/library/convert.h"
+#include "clients/library/inside.h"
+#include "server/base/coverage.h"
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/base/unix_time.h"
+#include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
+#include "server/compensate/model_spec.h"
+#include "server/compensate/world.h"
+#include "server/diagnose/diagnose.h"
+#include "server/measurement/checked_batch.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/measurement/pose_check.h"
+#include "server/measurement/pose_columns.h"
+#include "server/plan/plan.h"
+#include "server/report/diagnosis_json.h"
+#include "server/robot/inverse_kinematics.h"
+#include "server/simulate/simulate.h"
+#include "server/trainer/pipeline/train.h"
+
+namespace trammel::api {
+
+using library::from_api;
+using library::joints_to_api;
+using library::passed_on;
+using library::to_api;
+
+namespace {
+
+constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
+
+/// Batches made ready for a cell, each a session of its own or as many as its column says. Two of one name get numbers.
+trammel::Result<CheckedBatch> checked(std::span<const Batch> batches, const trammel::Cell& cell,
+                                      const HoldOut& hold_out) {
+  if (batches.empty()) return failure(trammel::ErrorCode::kUsage, "no batch, at least 1 is needed").of("batches");
+  std::map<std::string, int> met;
+  std::vector<CheckedBatch> all;
+  for (const Batch& batch : batches) {
+    MeasurementBatch rows = batch.inside().rows;
+    if (const int count = ++met[rows.id]; count > 1) rows.id += fmt::format("-{}", count);
+    trammel::Result<CheckedBatch> one = check_against_cell(std::move(rows), cell, hold_out);
+    if (!one) return one;
+    all.push_back(std::move(*one));
+  }
+  return joined(std::move(all));
+}
+
+/// The cell, unless its own model could not be trained.
+trammel::Status trainable(const Cell& cell, SpecUse use) {
+  std::vector<trammel::Error> problems = check_model_spec(*cell.inside().cell, cell.inside().where, use);
+  if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
+  return {};
+}
+
+std::array<double, 3> mm(const Vector3& v) { return {to_mm(v.x()), to_mm(v.y()), to_mm(v.z())}; }
+std::array<double, 3> deg(const Vector3& v) { return {to_deg(v.x()), to_deg(v.y()), to_deg(v.z())}; }
+
+Prediction prediction_of(const ErrorPrediction& p) {
+  Prediction out;
+  out.nominal = to_api(p.X_BT_nominal);
+  out.predicted = to_api(p.X_BT_predicted);
+  out.error_mm = mm(p.error_B);
+  out.stddev_mm = mm(p.stddev_B);
+  out.true_stddev_mm = mm(p.true_stddev_B);
+  for (int k = 0; k < 9; ++k)
+    out.covariance_mm2[static_cast<std::size_t>(k)] = to_mm(to_mm(p.covariance_B(k / 3, k % 3)));
+  out.rotation_deg = deg(pose_difference(p.X_BT_predicted, p.X_BT_nominal).tail<3>());
+  if (p.rotation_stddev_B) out.rotation_stddev_deg = deg(*p.rotation_stddev_B);
+  out.in_domain = p.in_domain;
+  out.bias_share = p.bias_weight;
+  return out;
+}
+
+CorrectedTarget corrected(const Correction& c, const Chain& robot) {
+  return {std::string(to_string(c.status)),
+          to_api(c.X_BT_commanded),
+          joints_to_api(c.q, robot),
+          to_mm(c.error_before),
+          to_mm(c.error_after),
+          to_mm(c.stddev),
+          to_deg(c.turn_before),
+          to_deg(c.turn_after),
+          c.iterations,
+          c.message};
+}
+
+Figures figures_from(const ErrorFigures& f) {
+  return {to_mm(f.rms), to_mm(f.mean), to_mm(f.p997), to_mm(f.max), mm(f.axis_mean), mm(f.axis_stddev)};
+}
+
+Evaluation evaluation_of(const trammel::Evaluation& e) {
+  Evaluation out{e.poses,
+                 e.in_domain,
+                 e.coverage_95,
+                 figures_from(e.nominal),
+                 figures_from(e.calibrated),
+                 figures_from(e.compensated),
+                 {},
+                 {},
+                 doubt_of_bias(e).value_or("")};
+  if (e.nlpd) out.nlpd = nlpd_in_mm(*e.nlpd);
+  if (const auto& o = e.orientation) {
+    out.orientation =
+        OrientationErrors{o->poses, to_deg(o->nominal), to_deg(o->calibrated), to_deg(o->compensated), o->coverage_95};
+  }
+  return out;
+}
+
+/// A target as the model takes it. Refuses what a file of targets would.
+trammel::Result<trammel::Target> target_from(const Target& asked, const Context& context, const Chain& robot) {
+  trammel::Target target;
+  target.direction = context.directions;
+  target.temperature = context.temperature_c;
+  target.joint_target = !asked.pose;
+  if (!asked.joints_deg.empty() || target.joint_target) {
+    trammel::Result<JointVector> seed = library::joints_from_api(asked.joints_deg, robot);
+    if (!seed) return tl::make_unexpected(seed.error());
+    target.seed = std::move(*seed);
+  }
+  if (target.joint_target) return target;
+  const trammel::Result<trammel::Pose> X_BT = from_api(*asked.pose);
+  if (!X_BT) return tl::make_unexpected(X_BT.error());
+  target.X_BT = *X_BT;
+  if (!asked.conf && !target.seed) return refused("neither conf nor joints near the wanted branch").of("conf");
+  if (!asked.conf) return target;
+  if (*asked.conf < 0 || *asked.conf > 7)
+    return refused("conf is {}, limits 0 and 7", *asked.conf).of("conf").beyond(*asked.conf, 7);
+  if (!has_spherical_wrist(robot)) {
+    return refused("conf is {}, but robot {} has no spherical wrist to number branches by", *asked.conf, robot.name())
+        .of("conf")
+        .with_value(*asked.conf)
+        .next("give joints_deg");
+  }
+  target.conf = asked.conf;
+  return target;
+}
+
+/// The ids that a model is asked with.
+trammel::Result<Context> known_context(const CompensatedModel& model, Context context) {
+  if (const auto fits = library::check_context(context, model.cell().robot); !fits)
+    return tl::make_unexpected(fits.error());
+  auto tool = resolve_tool(model.cell(), context.tool);
+  if (!tool) return tl::make_unexpected(tool.error());
+  auto payload = resolve_payload(model.cell(), context.payload);
+  if (!payload) return tl::make_unexpected(payload.error());
+  if (const auto known = model.check_trained_with(*tool, *payload); !known) return tl::make_unexpected(known.error());
+  context.tool = std::move(*tool);
+  context.payload = std::move(*payload);
+  return context;
+}
+
+trammel::Result<std::vector<PoseContext>> contexts(std::span<const double> joints_deg, const Context& context,
+                                                   const trammel::Cell& cell) {
+  auto all = library::all_joints_from_api(joints_deg, cell.robot);
+  if (!all) return tl::make_unexpected(all.error());
+  std::vector<PoseContext> poses(all->size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    PoseContext& pose = poses[i];
+    pose.q = std::move((*all)[i]);
+    pose.direction = context.directions;
+    pose.temperature = context.temperature_c;
+    pose.tool = context.tool;
+    pose.payload = context.payload;
+    pose.served = true;
+    if (const auto fits = check_pose(pose, cell); !fits)
+      return Failure(fits.error()).at_row(static_cast<long>(i)).of("joints_deg");
+  }
+  return poses;
+}
+
+bool goes_on(const Progress& progress, const std::string& stage, double share) {
+  return !progress || progress(stage, share);
+}
+
+}  // namespace
+
+Result<Cell> Cell::load(const std::string& path) {
+  auto cell = read_cell(path);
+  if (!cell) return passed_on(cell);
+  return Cell(std::make_shared<const Inside>(Inside{std::make_shared<const trammel::Cell>(std::move(*cell)), path}));
+}
+std::string Cell::name() const { return inside_->cell->name; }
+std::string Cell::robot() const { return inside_->cell->robot.name(); }
+std::size_t Cell::joints() const { return static_cast<std::size_t>(inside_->cell->robot.size()); }
+std::vector<std::string> Cell::tools() const {
+  std::vector<std::string> ids;
+  for (const auto& [id, tool] : inside_->cell->tools) ids.push_back(id);
+  return ids;
+}
+std::vector<std::string> Cell::payloads() const {
+  std::vector<std::string> ids;
+  for (const auto& [id, payload] : inside_->cell->payloads) ids.push_back(id);
+  return ids;
+}
+
+Result<Batch> Batch::load(const std::string& path) {
+  auto rows = read_batch(path);
+  if (!rows) return passed_on(rows);
+  return Batch(std::make_shared<const Inside>(Inside{std::move(*rows)}));
+}
+Result<Batch> Batch::parse(const std::string& csv, const std::string& name) {
+  auto rows = parse_batch(csv, name);
+  if (!rows) return passed_on(rows);
+  rows->id = name;
+  return Batch(std::make_shared<const Inside>(Inside{std::move(*rows)}));
+}
+std::string Batch::name() const { return inside_->rows.id; }
+std::size_t Batch::size() const { return inside_->rows.measurements.size(); }
+std::string Batch::csv() const {
+  const MeasurementBatch& rows = inside_->rows;
+  return rows.source_text.empty() ? to_csv(rows) : rows.source_text;
+}
+
+Result<Model> Model::load(const std::string& path) {
+  auto model = load_model(path);
+  if (!model) return passed_on(model);
+  return Model(std::make_shared<const Inside>(Inside{std::move(*model)}));
+}
+Result<Model> Model::parse(const std::string& text, const std::string& where) {
+  auto model = deserialize(text, where);
+  if (!model) return passed_on(model);
+  return Model(std::make_shared<const Inside>(Inside{std::move(*model)}));
+}
+Status Model::save(const std::string& path) const {
+  const auto written = write_text_file(path, serialize(inside_->model));
+  if (!written) return passed_on(written);
+  return {};
+}
+
+ModelFacts Model::facts() const {
+  const ModelProvenance& from = inside_->model.provenance();
+  return {from.id, from.hash, inside_->model.cell().name, from.level, from.batch_id, from.training_poses, 0, false};
+}
+Cell Model::cell() const {
+  const auto& cell = inside_->model.parts().physics.cell;
+  return Cell(std::make_shared<const Cell::Inside>(Cell::Inside{cell, "model " + inside_->model.provenance().id}));
+}
+std::string Model::bias() const {
+  const auto& bias = inside_->model.parts().bias;
+  return bias ? bias->kernel : "none";
+}
+
+std::vector<Parameter> Model::parameters() const {
+  std::vector<Parameter> all;
+  for (const IdentifiedParameter& p : inside_->model.parts().parameters) {
+    const double scale = p.parameter.scale;
+    all.push_back({p.parameter.name, p.parameter.unit, scale * p.value, kExpanded * scale * p.stddev, p.identified});
+  }
+  return all;
+}
+
+std::vector<double> Model::parameter_covariance() const {
+  const auto& parts = inside_->model.parts();
+  std::vector<double> all;
+  for (Eigen::Index i = 0; i < parts.covariance.rows(); ++i) {
+    for (Eigen::Index j = 0; j < parts.covariance.cols(); ++j) {
+      const auto scale = [&](Eigen::Index k) { return parts.parameters[static_cast<std::size_t>(k)].parameter.scale; };
+      all.push_back(scale(i) * scale(j) * parts.covariance(i, j));
+    }
+  }
+  return all;
+}
+
+Evaluation Model::figures() const {
+  const auto& parts = inside_->model.parts();
+  return evaluation_of(parts.validation.value_or(parts.training));
+}
+
+Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg, const Context& context) const {
+  const CompensatedModel& model = inside_->model;
+  const auto known = known_context(model, context);
+  if (!known) return passed_on(known);
+  const auto poses = contexts(joints_deg, *known, model.cell());
+  if (!poses) return passed_on(poses);
+  std::vector<Prediction> all;
+  all.reserve(poses->size());
+  for (std::size_t first = 0; first < poses->size(); first += kPosesTogether) {
+    const auto from = poses->begin() + static_cast<std::ptrdiff_t>(first);
+    const auto count = static_cast<std::ptrdiff_t>(std::min(kPosesTogether, poses->size() - first));
+    for (const ErrorPrediction& p : model.predict_all({from, from + count})) all.push_back(prediction_of(p));
+  }
+  return all;
+}
+
+Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targets, const Context& context) const {
+  const CompensatedModel& model = inside_->model;
+  const Chain& robot = model.cell().robot;
+  const auto known = known_context(model, context);
+  if (!known) return passed_on(known);
+  std::vector<trammel::Target> wanted;
+  for (const Target& target : targets) {
+    auto one = target_from(target, *known, robot);
+    if (!one) return tl::make_unexpected(to_api(Failure(one.error()).at_row(static_cast<long>(wanted.size())).value()));
+    wanted.push_back(std::move(*one));
+  }
+  std::vector<CorrectedTarget> all;
+  all.reserve(wanted.size());
+  for (const trammel::Target& target : wanted)
+    all.push_back(corrected(model.correct(target, known->tool, known->payload), robot));
+  return all;
+}
+
+Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
+  const auto batch = checked(batches, inside_->model.cell(), drawn(0, 0));
+  if (!batch) return passed_on(batch);
+  const auto world = in_world_of(inside_->model, batch->rows());
+  if (!world) return passed_on(world);
+  return evaluation_of(inside_->model.evaluate(world->batch));
+}
+
+Result<Model> train(const Cell& cell, std::span<const Batch> batches, const TrainOptions& options) {
+  const auto fits = trainable(cell, {.error_sources = !options.level, .bias = !options.bias});
+  if (!fits) return passed_on(fits);
+  const auto batch = checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
+  if (!batch) return passed_on(batch);
+  trammel::TrainOptions how;
+  how.level = options.level;
+  how.bias = options.bias;
+  how.seed = options.seed;
+  how.trained_at = unix_now();
+  how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
+  auto model = trammel::train(cell.inside().cell, *batch, how);
+  if (!model) return passed_on(model);
+  return Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(*model)}));
+}
+
+Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
+  const auto fits = trainable(cell, {});
+  if (!fits) return passed_on(fits);
+  const auto batch = checked(batches, *cell.inside().cell, drawn(0, options.seed));
+  if (!batch) return passed_on(batch);
+  trammel::DiagnoseOptions how;
+  how.seed = options.seed;
+  how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
+  const auto found = trammel::diagnose(cell.inside().cell, *batch, how);
+  if (!found) return passed_on(found);
+  return diagnosis_json(*found).dump(2);
+}
+
+namespace {
+
+trammel::Result<trammel::PlanOptions> plan_options(const PlanOptions& asked) {
+  constexpr std::size_t kMost = 1'000'000;
+  const std::string separate = "separate:";
+  trammel::PlanOptions options;
+  if (asked.count < 1 || asked.count > kMost) {
+    return failure(trammel::ErrorCode::kUsage, "count is {}, limits 1 and {}", asked.count, kMost)
+        .of("count")
+        .beyond(asked.count, kMost);
+  }
+  options.count = static_cast<int>(asked.count);
+  options.seed = asked.seed;
+  options.orientation = !asked.positions_only;
+  const std::size_t comma = asked.criterion.find(',');
+  if (asked.criterion == "lhs") return options;
+  if (asked.criterion == "observability") {
+    options.criterion = PlanCriterion::kObservability;
+  } else if (asked.criterion == "check") {
+    options.criterion = PlanCriterion::kCheck;
+  } else if (asked.criterion.starts_with(separate) && comma != std::string::npos) {
+    options.criterion = PlanCriterion::kSeparation;
+    options.cause = asked.criterion.substr(separate.size(), comma - separate.size());
+    options.other = asked.criterion.substr(comma + 1);
+  } else {
+    return failure(trammel::ErrorCode::kUsage,
+                   "criterion '{}': expected lhs, observability, check or separate:CAUSE,CAUSE", asked.criterion)
+        .of("criterion")
+        .with_text(asked.criterion);
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<Plan> plan(const Cell& cell, const PlanOptions& options) {
+  const auto how = plan_options(options);
+  if (!how) return passed_on(how);
+  const auto fits = trainable(cell, {.bias = false});
+  if (!fits) return passed_on(fits);
+  const trammel::Cell& of = *cell.inside().cell;
+  const auto planned = make_plan(cell.inside().cell, *how);
+  if (!planned) return passed_on(planned);
+  JointList list{cell.name(), joint_types(of.robot), {}};
+  Plan out;
+  for (const PlannedPose& pose : planned->poses) {
+    CommandedPose& commanded = list.poses.emplace_back(CommandedPose{pose.id, pose.context});
+    if (of.tools.size() == 1) commanded.context.tool.clear();
+    if (of.payloads.size() == 1) commanded.context.payload.clear();
+    out.pose_ids.push_back(pose.id);
+    for (const double joint : joints_to_api(pose.context.q, of.robot)) out.joints_deg.push_back(joint);
+  }
+  out.csv = to_csv(list);
+  return out;
+}
+
+Result<Batch> simulate(const Cell& cell, const std::string& truth, const std::string& plan_csv,
+                       const SimulateOptions& options) {
+  const auto robot = read_virtual_robot(truth, cell.inside().cell);
+  if (!robot) return passed_on(robot);
+  const auto list = parse_joint_csv(plan_csv, "plan");
+  if (!list) return passed_on(list);
+  std::vector<PoseContext> poses;
+  for (const CommandedPose& pose : list->poses) poses.push_back(pose.context);
+  trammel::SimulateOptions how;
+  how.seed = options.seed;
+  how.orientation = !options.positions_only;
+  how.noise = !options.noise_free;
+  auto batch = trammel::simulate(*robot, poses, how);
+  if (!batch) return passed_on(batch);
+  batch->joint_types = list->joint_types;
+  for (std::size_t i = 0; i < poses.size(); ++i) batch->measurements[i].pose_id = list->poses[i].pose_id;
+  return Batch::parse(to_csv(*batch), "simulated");
+}
+
+}  // namespace trammel::api

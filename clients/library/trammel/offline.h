@@ -1,0 +1,205 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "trammel/result.h"
+#include "trammel/types.h"
+
+/// Everything that works on files, without a service. All classes are immutable values, cheap to copy and thread-safe.
+/// Work runs in the calling thread.
+namespace trammel::api {
+
+/// A cell as its file describes it: the robot, its base, tools, payloads and tracker.
+class TRAMMEL_API Cell {
+ public:
+  /// Reads a cell file (YAML) and the robot file that it names.
+  [[nodiscard]] static Result<Cell> load(const std::string& path);
+
+  /// Its name.
+  [[nodiscard]] std::string name() const;
+  /// Name of its robot.
+  [[nodiscard]] std::string robot() const;
+  /// Number of joints n.
+  [[nodiscard]] std::size_t joints() const;
+  /// Ids of its tools.
+  [[nodiscard]] std::vector<std::string> tools() const;
+  /// Ids of its payloads.
+  [[nodiscard]] std::vector<std::string> payloads() const;
+
+  /// What it is made of.
+  struct Inside;
+  /// For the library itself.
+  explicit Cell(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+  /// For the library itself.
+  [[nodiscard]] const Inside& inside() const { return *inside_; }
+
+ private:
+  std::shared_ptr<const Inside> inside_;
+};
+
+/// Measurements taken together.
+class TRAMMEL_API Batch {
+ public:
+  /// Reads a batch file: our CSV, or RoboDK's.
+  [[nodiscard]] static Result<Batch> load(const std::string& path);
+  /// The same from a text; `name` becomes the batch's id and names it in errors.
+  [[nodiscard]] static Result<Batch> parse(const std::string& csv, const std::string& name);
+
+  /// Its id.
+  [[nodiscard]] std::string name() const;
+  /// Number of poses.
+  [[nodiscard]] std::size_t size() const;
+  /// Its text as it came.
+  [[nodiscard]] std::string csv() const;
+
+  /// What it is made of.
+  struct Inside;
+  /// For the library itself.
+  explicit Batch(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+  /// For the library itself.
+  [[nodiscard]] const Inside& inside() const { return *inside_; }
+
+ private:
+  std::shared_ptr<const Inside> inside_;
+};
+
+/// Figures of the position errors |measured - predicted| of some poses.
+struct Figures {
+  double rms_mm = 0;                       ///< root mean square, mm
+  double mean_mm = 0;                      ///< mean, mm
+  double p997_mm = 0;                      ///< 99.7 % are smaller, mm
+  double max_mm = 0;                       ///< largest, mm
+  std::array<double, 3> axis_mean_mm{};    ///< mean by axis of B, mm
+  std::array<double, 3> axis_stddev_mm{};  ///< standard deviation by axis of B, mm
+};
+
+/// Orientation errors, where orientations were measured: rms of the rotation angle.
+struct OrientationErrors {
+  int poses = 0;                      ///< with a measured orientation
+  double nominal_rms_deg = 0;         ///< of the drawing, deg
+  double calibrated_rms_deg = 0;      ///< with the error sources identified, deg
+  double compensated_rms_deg = 0;     ///< with the learned bias, deg
+  std::optional<double> coverage_95;  ///< share of coordinates inside their 95 % interval; empty: not learned
+};
+
+/// The three levels of one model on the same poses.
+struct Evaluation {
+  int poses = 0;                                 ///< number of poses
+  int in_domain = 0;                             ///< of them in domain
+  double coverage_95 = 0;                        ///< share of coordinates inside their 95 % interval
+  Figures nominal;                               ///< of the drawing
+  Figures calibrated;                            ///< with the error sources identified
+  Figures compensated;                           ///< with the learned bias
+  std::optional<double> nlpd;                    ///< mean negative log predictive density, nat, positions in mm
+  std::optional<OrientationErrors> orientation;  ///< where orientations were measured
+  std::string doubt_of_bias;                     ///< where the bias does not help, a sentence; else empty
+};
+
+/// One identified parameter of a model.
+struct Parameter {
+  std::string name;         ///< as in files: `gamma0`, `C2`
+  std::string unit;         ///< of value and u95
+  double value = 0;         ///< the correction to the drawing
+  double u95 = 0;           ///< two standard uncertainties
+  bool identified = false;  ///< whether the poses say more of it than was known before
+};
+
+/// Nominal chain, identified error sources and learned bias.
+class TRAMMEL_API Model {
+ public:
+  /// Reads a model file. Refuses one whose hash does not fit its content.
+  [[nodiscard]] static Result<Model> load(const std::string& path);
+  /// The same from its text, as a service exports it; `where` names it in errors.
+  [[nodiscard]] static Result<Model> parse(const std::string& text, const std::string& where);
+  /// Writes the model file, whole or not at all.
+  [[nodiscard]] Status save(const std::string& path) const;
+
+  /// Its id, cell, level and batch.
+  [[nodiscard]] ModelFacts facts() const;
+  /// The cell that it was trained for.
+  [[nodiscard]] Cell cell() const;
+  /// The kernel of its bias; `none` without.
+  [[nodiscard]] std::string bias() const;
+  /// Its P parameters.
+  [[nodiscard]] std::vector<Parameter> parameters() const;
+  /// P x P covariance of the parameters, row by row, in the products of their units.
+  [[nodiscard]] std::vector<double> parameter_covariance() const;
+  /// Errors on poses held out from training, else on the training poses.
+  [[nodiscard]] Evaluation figures() const;
+
+  /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a rail mm). Refuses
+  /// joints beyond the robot's limits, numbers that are not finite, and a tool with a payload that no training pose
+  /// had.
+  [[nodiscard]] Result<std::vector<Prediction>> predict(std::span<const double> joints_deg,
+                                                        const Context& context = {}) const;
+  /// What to command so that the tool lands on each target. A target that cannot be corrected says so in its status.
+  /// Refuses targets that are none (wrong number of joints, no branch, no unit quaternion), and tools as predict()
+  /// does.
+  [[nodiscard]] Result<std::vector<CorrectedTarget>> correct(std::span<const Target> targets,
+                                                             const Context& context = {}) const;
+  /// Measured against predicted. Several batches are sessions of one arm.
+  [[nodiscard]] Result<Evaluation> evaluate(std::span<const Batch> batches) const;
+
+  /// What it is made of.
+  struct Inside;
+  /// For the library itself.
+  explicit Model(std::shared_ptr<const Inside> inside) : inside_(std::move(inside)) {}
+
+ private:
+  std::shared_ptr<const Inside> inside_;
+};
+
+/// How to train.
+struct TrainOptions {
+  std::optional<std::string> level;  ///< instead of the cell's error sources: `M0` to `M3`, `M2,gear_transmission:3`
+  std::optional<std::string> bias;   ///< instead of the cell's: `none`, `auto`, a kernel
+  std::uint64_t seed = 1;            ///< of the search for hyperparameters and of the rows held out
+  double validation_share = 0;       ///< of the rows, held out where the batch has no column `set`
+  Progress progress;                 ///< may be empty
+};
+/// A model of the cell, from batches of measurements. Several batches are sessions of one arm.
+[[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
+                                              const TrainOptions& options = {});
+
+/// How to diagnose.
+struct DiagnoseOptions {
+  std::uint64_t seed = 1;  ///< of the bootstrap
+  Progress progress;       ///< may be empty
+};
+/// What the cell's model lacks, as JSON: the text that `trammel diagnose --json` writes.
+[[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches,
+                                                       const DiagnoseOptions& options = {});
+
+/// How to plan.
+struct PlanOptions {
+  std::size_t count = 0;          ///< number of poses
+  std::uint64_t seed = 1;         ///< of the draw
+  std::string criterion = "lhs";  ///< `lhs`, `observability`, `separate:CAUSE,CAUSE` or `check`
+  bool positions_only = false;    ///< choose for a single reflector, which shows no orientations
+};
+/// Poses to measure.
+struct Plan {
+  std::vector<std::string> pose_ids;  ///< one a pose
+  std::vector<double> joints_deg;     ///< N x n, one pose after the other, deg; of a rail mm
+  std::string csv;                    ///< the text that `trammel plan -o` writes
+};
+/// Poses of the cell, inside its workspace and in sight of its tracker.
+[[nodiscard]] TRAMMEL_API Result<Plan> plan(const Cell& cell, const PlanOptions& options);
+
+/// How to simulate.
+struct SimulateOptions {
+  std::uint64_t seed = 1;       ///< of the measuring noise
+  bool positions_only = false;  ///< leave out orientations, as a single reflector does
+  bool noise_free = false;      ///< write where the tool really is
+};
+/// Measures a plan (its CSV) on a virtual robot; `truth` is the path of a truth file.
+[[nodiscard]] TRAMMEL_API Result<Batch> simulate(const Cell& cell, const std::string& truth,
+                                                 const std::string& plan_csv, const SimulateOptions& options = {});
+
+}  // namespace trammel::api

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "trammel/result.h"
+#include "trammel/types.h"
+
+/// The client of the service.
+namespace trammel::api {
+
+/// Where the service is.
+struct SessionOptions {
+  std::uint32_t domain = 0;                    ///< DDS domain, 0 to 232
+  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on 127.0.0.1, one per replica
+  std::chrono::milliseconds timeout{5000};     ///< of one request, discovery included
+};
+
+/// What a call is about.
+struct Asked {
+  std::string cell;                     ///< name of the cell
+  Context context;                      ///< what its arm carries, and how it comes there
+  bool controller_compensates = false;  ///< whether the controller corrects by itself already
+};
+
+/// Answers, all from one model.
+template <typename T>
+struct Answer {
+  ModelFacts model;      ///< the one that answered
+  std::vector<T> items;  ///< one for each asked
+};
+
+/// A job of a service.
+struct Job {
+  std::int64_t id = 0;    ///< its number
+  std::string cell;       ///< its cell
+  std::string stage;      ///< `queued training storing done failed`
+  std::string what;       ///< what is being done, or what became of it
+  double share = 0;       ///< done of all, [0, 1]
+  std::string verdict;    ///< `open in_force not_better undecided diagnosed quarantined refused broken ...`
+  int version = 0;        ///< of the model that it made; 0: none
+  bool in_force = false;  ///< whether that model serves its cell
+  std::string why;        ///< of a job that made no model
+  std::string next;       ///< what to do, as one clause
+};
+
+/// A server, by its last status.
+struct Server {
+  std::string id;                  ///< its name
+  std::string version;             ///< of its program
+  std::string state;               ///< what it does
+  std::vector<std::string> cells;  ///< that it serves
+  std::string trouble;             ///< what it cannot do now, and why; empty: nothing
+  double uptime_s = 0;             ///< since its start, s
+  int queued_jobs = 0;             ///< that wait
+};
+
+/// One client of the service; one per process is enough. Thread-safe; calls from several threads overlap. A request
+/// without an answer is sent once more with the same id, so what changes something happens once. Errors: kUnreachable
+/// where no server answered in time, else the server's.
+class TRAMMEL_API Session {
+ public:
+  /// Does not wait for a server.
+  [[nodiscard]] static Result<Session> open(const SessionOptions& options = {});
+  /// Takes over.
+  Session(Session&&) noexcept;
+  /// Takes over.
+  Session& operator=(Session&&) noexcept;
+  /// Leaves the network.
+  ~Session();
+
+  /// The servers that are there. Waits up to the timeout for the first.
+  [[nodiscard]] Result<std::vector<Server>> servers() const;
+  /// The models of a cell; empty: those in force, of all cells.
+  [[nodiscard]] Result<std::vector<ModelFacts>> models(const std::string& cell) const;
+  /// The text of a model file, for Model::parse(); version 0: in force.
+  [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version = 0) const;
+
+  /// As Model::predict(), by the model in force: N x n values, deg; of a rail mm.
+  [[nodiscard]] Result<Answer<Prediction>> predict(const Asked& asked, std::span<const double> joints_deg) const;
+  /// As Model::correct(), by the model in force.
+  [[nodiscard]] Result<Answer<CorrectedTarget>> correct(const Asked& asked, std::span<const Target> targets) const;
+
+  /// Hands in measurements (CSV), from which the service trains. Returns the job. The same id with the same content is
+  /// the same submission.
+  [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
+                                            const std::string& csv) const;
+  /// Waits until the job is done or failed, and tells `listener`, if any, how far it is. kUnreachable: `limit` is over.
+  /// kNotFound: no server knows it.
+  [[nodiscard]] Result<Job> wait_for(std::int64_t job, std::chrono::milliseconds limit,
+                                     const std::function<void(const Job&)>& listener = {}) const;
+  /// Jobs that wait or run or ended lately, of one cell or (empty) of all, oldest first.
+  [[nodiscard]] Result<std::vector<Job>> jobs(const std::string& cell) const;
+  /// Puts a version in force; refused where `expected_version` is not. `reason` is for the audit trail.
+  [[nodiscard]] Result<int> activate(const std::string& cell, int version, const std::string& reason = {},
+                                     std::optional<int> expected_version = {}) const;
+  /// Puts the version before in force again, and returns it.
+  [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {}) const;
+
+ private:
+  struct Inside;
+  explicit Session(std::unique_ptr<Inside> inside);
+  std::unique_ptr<Inside> inside_;
+};
+
+}  // namespace trammel::api

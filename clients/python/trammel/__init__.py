@@ -1,0 +1,381 @@
+"""Trammel: an industrial robot lands where it was told to.
+
+Offline, on files:  `Cell`, `Batch`, `Model`, `train`, `diagnose`, `plan`, `simulate`.
+A running service:  `Session`.
+What goes wrong:    `TrammelError` and its kinds, with code, file, row, column, value and limit.
+
+Lengths are mm and angles deg, as in files; joints of rails are mm. Frames: B is the robot's base, T the tool. Poses are
+X_BT in rows of seven: `x_mm, y_mm, z_mm, qw, qx, qy, qz` (unit quaternion, Hamilton, active). N is a number of poses, n
+the robot's number of joints. Work runs without the interpreter's lock; values may be shared by threads.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _trammel
+from .errors import (Busy, Conflict, Internal, NotFound, Refused, TooLarge, TrammelError, Unreachable, Usage)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "Batch", "Busy", "Cell", "Conflict", "Corrections", "Internal", "Model", "NotFound", "Plan", "Predictions", "Refused",
+    "Session", "TooLarge", "TrammelError", "Unreachable", "Usage", "diagnose", "plan", "simulate", "train",
+]
+
+Path = Union[str, "os.PathLike[str]"]
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[str, float], object]  #: told what is being done and the share done, [0, 1]; may raise to give up
+
+_POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+
+
+def _frame(columns: Mapping[str, Any]) -> "pd.DataFrame":
+    import pandas
+
+    return pandas.DataFrame(dict(columns))
+
+
+def _column_by_column(names: Sequence[str], table: Floats) -> Dict[str, Any]:
+    return {name: table[:, k] for k, name in enumerate(names)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Predictions:
+    """The errors to expect at N poses; all vectors in B."""
+
+    nominal: Floats  #: (N, 7): X_BT, where the controller believes the tool to be; mm and quaternion
+    predicted: Floats  #: (N, 7): X_BT, where it will be
+    error_mm: Floats  #: (N, 3): predicted - nominal
+    stddev_mm: Floats  #: (N, 3): of one measurement of it, the instrument's noise included
+    true_stddev_mm: Floats  #: (N, 3): of the true error
+    covariance_mm2: Floats  #: (N, 3, 3): of one measurement
+    rotation_deg: Floats  #: (N, 3): rotation vector from nominal to predicted
+    rotation_stddev_deg: Floats  #: (N, 3): of one measured orientation; NaN where none was learned
+    in_domain: npt.NDArray[np.bool_]  #: (N,): False where the learned bias is not fully taken
+    bias_share: Floats  #: (N,): of the learned bias that is taken
+
+    def __len__(self) -> int:
+        return len(self.error_mm)
+
+    def frame(self) -> "pd.DataFrame":
+        """A pandas frame with the columns of `trammel predict`: `dx_mm ... sz_mm, in_domain`, the predicted pose."""
+        return _frame({**_column_by_column(("dx_mm", "dy_mm", "dz_mm"), self.error_mm),
+                       **_column_by_column(("sx_mm", "sy_mm", "sz_mm"), self.stddev_mm),
+                       "in_domain": self.in_domain, **_column_by_column(_POSE, self.predicted)})
+
+
+@dataclasses.dataclass(frozen=True)
+class Corrections:
+    """What to command so that the tool lands on each of N targets."""
+
+    status: List[str]  #: N of `ok out_of_domain joint_limit unreachable singular not_converged refused`
+    pose: Floats  #: (N, 7): X_BT to command; of a target that is neither ok nor out of domain the wanted one
+    joints_deg: Floats  #: (N, n): the controller's joints for it; of rails mm; NaN where there are none
+    error_before_mm: Floats  #: (N,): rms distance to expect without correction; NaN: nothing to say
+    error_after_mm: Floats  #: (N,): the same with it
+    sigma_mm: Floats  #: (N,): stddev of the true position, rms of the axes
+    turn_before_deg: Floats  #: (N,): orientation error to expect without correction
+    turn_after_deg: Floats  #: (N,): the same with it
+    iterations: npt.NDArray[np.int32]  #: (N,)
+    message: List[str]  #: N: why it is not ok
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def frame(self) -> "pd.DataFrame":
+        """A pandas frame with the columns of `trammel correct`."""
+        joints = [f"q{j + 1}_deg" for j in range(self.joints_deg.shape[1])]
+        return _frame({"status": self.status, **_column_by_column(_POSE, self.pose),
+                       **_column_by_column(joints, self.joints_deg), "error_before_mm": self.error_before_mm,
+                       "error_after_mm": self.error_after_mm, "sigma_mm": self.sigma_mm, "message": self.message})
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """N poses to measure."""
+
+    pose_ids: List[str]  #: N
+    joints_deg: Floats  #: (N, n); of rails mm
+    csv: str  #: the text that `trammel plan -o` writes
+
+    def __len__(self) -> int:
+        return len(self.pose_ids)
+
+
+class Cell:
+    """A cell as its file describes it: the robot, its base, tools, payloads and tracker. Immutable."""
+
+    def __init__(self, inside: _trammel.Cell) -> None:
+        self._inside = inside
+
+    @staticmethod
+    def load(path: Path) -> "Cell":
+        """Reads a cell file (YAML) and the robot file that it names. Raises `Refused` with file, row and key."""
+        return Cell(_trammel.Cell.load(os.fspath(path)))
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._inside.name()
+
+    @property
+    def robot(self) -> str:
+        """Name of its robot."""
+        return self._inside.robot()
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return self._inside.joints()
+
+    @property
+    def tools(self) -> List[str]:
+        """Ids of its tools."""
+        return self._inside.tools()
+
+    @property
+    def payloads(self) -> List[str]:
+        """Ids of its payloads."""
+        return self._inside.payloads()
+
+
+class Batch:
+    """Measurements taken together: commanded joints and measured tool positions. Immutable."""
+
+    def __init__(self, inside: _trammel.Batch) -> None:
+        self._inside = inside
+
+    @staticmethod
+    def load(path: Path) -> "Batch":
+        """Reads a batch file: our CSV, or RoboDK's."""
+        return Batch(_trammel.Batch.load(os.fspath(path)))
+
+    @staticmethod
+    def parse(csv: str, name: str) -> "Batch":
+        """The same from a text; `name` becomes its id."""
+        return Batch(_trammel.Batch.parse(csv, name))
+
+    @staticmethod
+    def from_arrays(joints_deg: npt.ArrayLike, position_mm: npt.ArrayLike, name: str = "batch",
+                    orientation: Optional[npt.ArrayLike] = None, **columns: Sequence[object]) -> "Batch":
+        """From arrays: `joints_deg` (N, n) as commanded, `position_mm` (N, 3) measured in W or B, `orientation` (N, 4)
+        unit quaternions `qw, qx, qy, qz`. More columns of a batch file come by their names, N values each:
+        `pose_id=..., sigma_mm=..., temperature_c=..., session_id=...`. Rails (mm) need a file or a frame."""
+        joints = np.asarray(joints_deg, dtype=np.float64)
+        position = np.asarray(position_mm, dtype=np.float64)
+        if joints.ndim != 2 or position.shape != (len(joints), 3):
+            raise Usage(f"joints_deg {joints.shape} and position_mm {position.shape}: (N, n) and (N, 3) are needed")
+        parts = [joints, position]
+        names = [f"q{j + 1}_deg" for j in range(joints.shape[1])] + ["x_mm", "y_mm", "z_mm"]
+        if orientation is not None:
+            turned = np.asarray(orientation, dtype=np.float64)
+            if turned.shape != (len(joints), 4):
+                raise Usage(f"orientation {turned.shape}: (N, 4) is needed")
+            parts.append(turned)
+            names += ["qw", "qx", "qy", "qz"]
+        text = io.StringIO()
+        text.write(",".join([*names, *columns]) + "\n")
+        rows = np.hstack(parts)
+        for i, row in enumerate(rows):
+            more = [str(values[i]) for values in columns.values()]
+            text.write(",".join([*(repr(float(value)) for value in row), *more]) + "\n")
+        return Batch.parse(text.getvalue(), name)
+
+    @staticmethod
+    def from_frame(frame: "pd.DataFrame", name: str = "batch") -> "Batch":
+        """From a pandas frame with the columns of a batch file: `q1_deg ... qn_deg, x_mm, y_mm, z_mm` and more."""
+        return Batch.parse(frame.to_csv(index=False), name)
+
+    @property
+    def name(self) -> str:
+        """Its id."""
+        return self._inside.name()
+
+    def __len__(self) -> int:
+        return self._inside.size()
+
+    def csv(self) -> str:
+        """Its text as it came."""
+        return self._inside.csv()
+
+    def frame(self) -> "pd.DataFrame":
+        """As a pandas frame with the columns of a batch file."""
+        import pandas
+
+        return pandas.read_csv(io.StringIO(self.csv()), comment="#")
+
+
+Batches = Union[Batch, Sequence[Batch]]  #: several are sessions of one arm
+
+
+def _inside_of(batches: Batches) -> List[_trammel.Batch]:
+    return [one._inside for one in ([batches] if isinstance(batches, Batch) else batches)]
+
+
+class Model:
+    """Nominal chain, identified error sources and learned bias. Immutable."""
+
+    def __init__(self, inside: _trammel.Model) -> None:
+        self._inside = inside
+
+    @staticmethod
+    def load(path: Path) -> "Model":
+        """Reads a model file. Raises `Refused` where its hash does not fit its content."""
+        return Model(_trammel.Model.load(os.fspath(path)))
+
+    @staticmethod
+    def parse(text: str, where: str = "model") -> "Model":
+        """The same from its text, as `Session.export_model()` returns it; `where` names it in errors."""
+        return Model(_trammel.Model.parse(text, where))
+
+    def save(self, path: Path) -> None:
+        """Writes the model file, whole or not at all."""
+        self._inside.save(os.fspath(path))
+
+    @property
+    def id(self) -> str:
+        """First 12 characters of the hash of its content."""
+        return str(self.facts["id"])
+
+    @property
+    def facts(self) -> Dict[str, Any]:
+        """`id hash cell level batch training_poses`."""
+        return self._inside.facts()
+
+    @property
+    def cell(self) -> Cell:
+        """The cell that it was trained for."""
+        return Cell(self._inside.cell())
+
+    @property
+    def bias(self) -> str:
+        """The kernel of its bias; `none` without."""
+        return self._inside.bias()
+
+    @property
+    def parameters(self) -> List[Dict[str, Any]]:
+        """P dictionaries `name unit value u95 identified`; u95 is U(k=2)."""
+        return self._inside.parameters()
+
+    @property
+    def parameter_covariance(self) -> Floats:
+        """(P, P), in the products of the parameters' units."""
+        return self._inside.parameter_covariance()
+
+    @property
+    def figures(self) -> Dict[str, Any]:
+        """Errors on poses held out from training, else on the training poses, as `evaluate()` returns them."""
+        return self._inside.figures()
+
+    def predict(self, joints_deg: npt.ArrayLike, tool: str = "", payload: str = "", directions: Sequence[int] = (),
+                temperature_c: Optional[float] = None) -> Predictions:
+        """The error to expect at `joints_deg` (N, n) or (n,), deg, of rails mm.
+
+        `tool`, `payload`: ids of the cell; empty: its only one. `directions`: from which each joint is approached,
+        n of -1, 0, +1. Raises `Refused` with the row of a pose beyond the limits.
+        """
+        return Predictions(**self._inside.predict(joints_deg, tool, payload, list(directions), temperature_c))
+
+    def correct(self, pose: Optional[npt.ArrayLike] = None, joints_deg: Optional[npt.ArrayLike] = None,
+                conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
+                directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
+        """What to command so that the tool lands on each target.
+
+        `pose` (N, 7): X_BT wanted, mm and quaternion. The branch is said by `conf` (N,) or one for all (0..7: +4 wrist
+        behind axis 1, +2 behind the lower arm, +1 joint 5 negative) or by `joints_deg` (N, n) near it, deg, of rails mm.
+        Without `pose` the nominal poses at `joints_deg` are wanted. A target that cannot be corrected says so in its
+        status.
+        """
+        return Corrections(**self._inside.correct(pose, joints_deg, conf, tool, payload, list(directions), temperature_c))
+
+    def evaluate(self, batches: Batches) -> Dict[str, Any]:
+        """Measured against predicted, with the keys of `trammel evaluate --json`; mm and deg."""
+        return self._inside.evaluate(_inside_of(batches))
+
+
+def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optional[str] = None, seed: int = 1,
+          validation_share: float = 0.0, progress: Optional[Progress] = None) -> Model:
+    """A model of `cell`. `level` (`M0` to `M3`, `M2,gear_transmission:3`) and `bias` (`none`, `auto`, a kernel) instead
+    of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`."""
+    return Model(_trammel.train(cell._inside, _inside_of(batches), level, bias, seed, validation_share, progress))
+
+
+def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Dict[str, Any]:
+    """What the cell's model lacks, with the keys of `trammel diagnose --json`."""
+    found: Dict[str, Any] = json.loads(_trammel.diagnose(cell._inside, _inside_of(batches), seed, progress))
+    return found
+
+
+def plan(cell: Cell, count: int, seed: int = 1, criterion: str = "lhs", positions_only: bool = False) -> Plan:
+    """`count` poses to measure, inside the cell's workspace and in sight of its tracker. `criterion`: `lhs`,
+    `observability`, `separate:CAUSE,CAUSE`, `check`. `positions_only`: for a single reflector."""
+    return Plan(**_trammel.plan(cell._inside, count, seed, criterion, positions_only))
+
+
+def simulate(cell: Cell, truth: Path, planned: Union[Plan, str], seed: int = 1, positions_only: bool = False,
+             noise_free: bool = False) -> Batch:
+    """Measures a plan (or its CSV) on a virtual robot; `truth` is a truth file: what is really wrong with the robot."""
+    text = planned.csv if isinstance(planned, Plan) else planned
+    return Batch(_trammel.simulate(cell._inside, os.fspath(truth), text, seed, positions_only, noise_free))
+
+
+class Session:
+    """One client of a running service, on 127.0.0.1; one per process is enough. Raises `Unreachable` where no server
+    answers within `timeout_s`."""
+
+    def __init__(self, domain: int = 0, ports: Sequence[int] = (17500,), timeout_s: float = 5.0) -> None:
+        self._inside = _trammel.Session.open(domain, list(ports), timeout_s)
+
+    def status(self) -> List[Dict[str, Any]]:
+        """The servers that are there: `id version state cells trouble uptime_s queued_jobs`."""
+        return self._inside.servers()
+
+    def models(self, cell: str = "") -> List[Dict[str, Any]]:
+        """The models of a cell, or those in force of all: `id hash cell level batch training_poses version in_force`."""
+        return self._inside.models(cell)
+
+    def export_model(self, cell: str, version: int = 0) -> str:
+        """The text of a model file, for `Model.parse()`; version 0: in force."""
+        return self._inside.export_model(cell, version)
+
+    def predict(self, cell: str, joints_deg: npt.ArrayLike, tool: str = "", payload: str = "",
+                directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Predictions:
+        """As `Model.predict()`, by the model in force: `joints_deg` (N, n) or (n,), deg, of rails mm."""
+        _, items = self._inside.predict(cell, joints_deg, tool, payload, list(directions), temperature_c)
+        return Predictions(**items)
+
+    def correct(self, cell: str, pose: Optional[npt.ArrayLike] = None, joints_deg: Optional[npt.ArrayLike] = None,
+                conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
+                directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
+        """As `Model.correct()`, by the model in force: `pose` (N, 7), `joints_deg` (N, n), `conf` (N,)."""
+        _, items = self._inside.correct(cell, pose, joints_deg, conf, tool, payload, list(directions), temperature_c)
+        return Corrections(**items)
+
+    def submit(self, cell: str, batch: Batch) -> int:
+        """Hands in measurements, from which the service trains. Returns the job."""
+        return self._inside.submit(cell, batch.name, batch.csv())
+
+    def wait_for(self, job: int, limit_s: float = 600.0) -> Dict[str, Any]:
+        """Waits until the job is done or failed: `id cell stage what share verdict version in_force why next`."""
+        return self._inside.wait_for(job, limit_s)
+
+    def jobs(self, cell: str = "") -> List[Dict[str, Any]]:
+        """Jobs that wait or run or ended lately, oldest first."""
+        return self._inside.jobs(cell)
+
+    def activate(self, cell: str, version: int, reason: str = "", expected_version: Optional[int] = None) -> int:
+        """Puts a version in force; `Conflict` where another than `expected_version` is."""
+        return self._inside.activate(cell, version, reason, expected_version)
+
+    def roll_back(self, cell: str, reason: str = "") -> int:
+        """Puts the version before in force again, and returns it."""
+        return self._inside.roll_back(cell, reason)

@@ -1,0 +1,361 @@
+"""The Python package as somebody uses it: what it returns is what the command line writes, and what goes wrong is data.
+
+TRAMMEL_SOURCE and TRAMMEL_BUILD name the project's folder and its build tree.
+"""
+
+import csv
+import inspect
+import io
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+import numpy as np
+
+import trammel
+
+SOURCE = pathlib.Path(os.environ["TRAMMEL_SOURCE"])
+BUILD = pathlib.Path(os.environ["TRAMMEL_BUILD"])
+CELL = SOURCE / "config/cell-7.yaml"
+TRUTH = SOURCE / "models/truth/chapter-5.yaml"
+
+
+def command_line(*arguments):
+    """What `trammel` prints."""
+    done = subprocess.run([BUILD / "clients/trammel", *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+class Offline(unittest.TestCase):
+    """On files, held against the command line."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.cell = trammel.Cell.load(CELL)
+        cls.planned = trammel.plan(cls.cell, 60, seed=3)
+        cls.batch = trammel.simulate(cls.cell, TRUTH, cls.planned, seed=3)
+        cls.batch_path = cls.folder / "batch.csv"
+        cls.batch_path.write_text(cls.batch.csv())
+        cls.model = trammel.train(cls.cell, trammel.Batch.load(cls.batch_path), bias="se")
+        cls.model_path = cls.folder / "cell.model"
+        cls.model.save(cls.model_path)
+
+    def test_plans_the_poses_that_the_command_line_plans(self):
+        command_line("plan", "--cell", CELL, "--count", 60, "--seed", 3, "-o", self.folder / "plan.csv")
+        self.assertEqual((self.folder / "plan.csv").read_text(), self.planned.csv)
+        self.assertEqual(self.planned.joints_deg.shape, (60, 6))
+
+    def test_simulates_the_batch_that_the_command_line_simulates(self):
+        (self.folder / "planned.csv").write_text(self.planned.csv)
+        command_line("simulate", "--cell", CELL, "--truth", TRUTH, "--plan", self.folder / "planned.csv", "--seed", 3,
+                     "-o", self.folder / "simulated.csv")
+        self.assertEqual((self.folder / "simulated.csv").read_text(), self.batch.csv())
+
+    def test_trains_the_model_that_the_command_line_trains(self):
+        command_line("train", "--cell", CELL, "--batch", self.batch_path, "--bias", "se", "-o", self.folder / "b.model")
+        other = trammel.Model.load(self.folder / "b.model")
+        self.assertEqual(other.facts["hash"], self.model.facts["hash"])
+        self.assertEqual(other.bias, "se")
+
+    def test_a_saved_model_is_the_same_model(self):
+        loaded = trammel.Model.load(self.model_path)
+        self.assertEqual(loaded.facts, self.model.facts)
+        np.testing.assert_array_equal(loaded.predict(self.planned.joints_deg).error_mm,
+                                      self.model.predict(self.planned.joints_deg).error_mm)
+
+    def test_predicts_what_the_command_line_predicts(self):
+        (self.folder / "j.csv").write_text(self.planned.csv)
+        command_line("predict", "--model", self.model_path, "--joints", self.folder / "j.csv", "-o", self.folder / "p.csv")
+        rows = list(csv.DictReader(io.StringIO((self.folder / "p.csv").read_text())))
+        here = self.model.predict(self.planned.joints_deg)
+        for name, column in {"dx_mm": here.error_mm[:, 0], "dz_mm": here.error_mm[:, 2], "sy_mm": here.stddev_mm[:, 1],
+                             "z_mm": here.predicted[:, 2], "qx": here.predicted[:, 4]}.items():
+            np.testing.assert_allclose([float(row[name]) for row in rows], column, atol=2e-6, err_msg=name)
+        np.testing.assert_allclose(np.sqrt(np.einsum("nii->ni", here.covariance_mm2)), here.stddev_mm, rtol=1e-9)
+        self.assertTrue((here.true_stddev_mm <= here.stddev_mm).all())
+
+    def test_corrects_as_the_command_line_does(self):
+        nominal = self.model.predict(self.planned.joints_deg[:7]).nominal
+        names = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"] + [f"q{j}_deg" for j in range(1, 7)]
+        lines = [",".join(names)] + [",".join(repr(float(v)) for v in row)
+                                     for row in np.hstack([nominal, self.planned.joints_deg[:7]])]
+        (self.folder / "t.csv").write_text("\n".join(lines) + "\n")
+        command_line("correct", "--allow-failed", "--model", self.model_path, self.folder / "t.csv", "-o",
+                     self.folder / "c.csv")
+        rows = list(csv.DictReader(io.StringIO((self.folder / "c.csv").read_text())))
+        here = self.model.correct(nominal, joints_deg=self.planned.joints_deg[:7])
+        self.assertEqual([row["status"] for row in rows], here.status)
+        self.assertEqual(here.pose.shape, (7, 7))
+        done = [status in ("ok", "out_of_domain") for status in here.status]
+        self.assertGreater(sum(done), 3)
+        there = [row for row, is_done in zip(rows, done) if is_done]
+        np.testing.assert_allclose([float(row["x_mm"]) for row in there], here.pose[done, 0], atol=2e-6)
+        np.testing.assert_allclose([float(row["q5_deg"]) for row in there], here.joints_deg[done, 4], atol=2e-6)
+        # Commanded so, the tool lands on the wanted pose.
+        landed = self.model.predict(here.joints_deg[done]).predicted
+        np.testing.assert_allclose(landed[:, :3], nominal[done, :3], atol=1e-3)
+
+    def test_a_joint_target_is_its_nominal_pose(self):
+        joints = self.planned.joints_deg[:3]
+        np.testing.assert_allclose(self.model.correct(joints_deg=joints).joints_deg,
+                                   self.model.correct(self.model.predict(joints).nominal, joints_deg=joints).joints_deg,
+                                   atol=1e-6)
+
+    def test_a_branch_stands_for_joints_near_it(self):
+        reached = self.model.correct(self.model.predict(np.zeros((1, 6))).nominal + np.eye(7)[0] * 5, conf=0)
+        self.assertIn(reached.status[0], ("ok", "out_of_domain", "joint_limit", "singular", "unreachable"))
+        self.assertEqual(reached.joints_deg.shape, (1, 6))
+
+    def test_evaluates_with_the_keys_and_figures_of_the_command_line(self):
+        printed = json.loads(command_line("evaluate", "--model", self.model_path, "--batch", self.batch_path, "--json", "-"))
+        printed.pop("structure", None)
+        here = self.model.evaluate(trammel.Batch.load(self.batch_path))
+        self.assertEqual(json.loads(json.dumps(here)), printed)
+
+    def test_diagnoses_what_the_command_line_diagnoses(self):
+        few = trammel.Batch.parse("".join(self.batch.csv().splitlines(keepends=True)[:41]), "few")
+        (self.folder / "few.csv").write_text(few.csv())
+        printed = json.loads(command_line("diagnose", "--cell", CELL, "--batch", self.folder / "few.csv", "--json", "-"))
+        here = trammel.diagnose(self.cell, trammel.Batch.load(self.folder / "few.csv"))
+        self.assertEqual(here["verdict"], printed["verdict"])
+        self.assertEqual(here["findings"], printed["findings"])
+
+    def test_arrays_are_as_good_as_a_file(self):
+        rows = list(csv.DictReader(io.StringIO(self.batch.csv())))
+        column = lambda *names: np.array([[float(row[name]) for name in names] for row in rows])
+        batch = trammel.Batch.from_arrays(column(*(f"q{j}_deg" for j in range(1, 7))), column("x_mm", "y_mm", "z_mm"),
+                                          orientation=column("qw", "qx", "qy", "qz"), pose_id=[row["pose_id"] for row in rows])
+        model = trammel.train(self.cell, batch, bias="none")
+        same = trammel.train(self.cell, self.batch, bias="none")
+        np.testing.assert_allclose(model.predict(self.planned.joints_deg).error_mm,
+                                   same.predict(self.planned.joints_deg).error_mm, atol=1e-9)
+
+    def test_pandas_frames_go_in_and_out(self):
+        try:
+            import pandas
+        except ImportError:
+            self.skipTest("no pandas here")
+        frame = pandas.read_csv(self.batch_path)
+        self.assertEqual(len(trammel.Batch.from_frame(frame)), 60)
+        self.assertEqual(list(self.model.predict(self.planned.joints_deg).frame().columns[:7]),
+                         ["dx_mm", "dy_mm", "dz_mm", "sx_mm", "sy_mm", "sz_mm", "in_domain"])
+        self.assertEqual(len(self.model.correct(joints_deg=self.planned.joints_deg[:2]).frame()), 2)
+        self.assertEqual(len(self.batch.frame()), 60)
+
+    def test_parameters_have_a_covariance_in_their_units(self):
+        u95 = np.array([parameter["u95"] for parameter in self.model.parameters])
+        np.testing.assert_allclose(2 * np.sqrt(np.diag(self.model.parameter_covariance)), u95, rtol=1e-6)
+
+
+class Refusals(unittest.TestCase):
+    """What goes wrong says where, which value and which limit."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.cell = trammel.Cell.load(CELL)
+        cls.batch = trammel.simulate(cls.cell, TRUTH, trammel.plan(cls.cell, 40), seed=1)
+        cls.model = trammel.train(cls.cell, cls.batch, level="M1", bias="none")
+
+    def test_a_file_that_is_not_there(self):
+        with self.assertRaises(trammel.TrammelError) as raised:
+            trammel.Model.load("/nowhere/cell.model")
+        self.assertEqual(raised.exception.file, "/nowhere/cell.model")
+        self.assertIn("/nowhere/cell.model", str(raised.exception))
+
+    def test_a_row_of_a_batch(self):
+        lines = self.batch.csv().splitlines()
+        names = lines[0].split(",")
+        fields = lines[4].split(",")
+        fields[names.index("q3_deg")] = "241.2"
+        lines[4] = ",".join(fields)
+        with self.assertRaises(trammel.Refused) as raised:
+            trammel.train(self.cell, trammel.Batch.parse("\n".join(lines) + "\n", "lt-07"))
+        error = raised.exception
+        self.assertEqual((error.code, error.row, error.column), ("refused", 5, "q3_deg"))
+        self.assertAlmostEqual(error.value, 241.2)
+        self.assertIn("lt-07", error.file)
+        self.assertIsNotNone(error.limit)
+
+    def test_a_pose_of_an_array(self):
+        joints = np.zeros((9, 6))
+        joints[7, 4] = 500
+        with self.assertRaises(trammel.Refused) as raised:
+            self.model.predict(joints)
+        self.assertEqual(raised.exception.row, 7)
+        self.assertAlmostEqual(raised.exception.value, 500)
+
+    def test_numbers_that_are_none(self):
+        for bad in (np.nan, np.inf, 1e300):
+            with self.assertRaises(trammel.Refused):
+                self.model.predict(np.full((1, 6), bad))
+            with self.assertRaises(trammel.Refused):
+                self.model.correct(np.full((1, 7), bad), conf=0)
+
+    def test_shapes(self):
+        for wrong in (np.zeros(5), np.zeros((3, 7)), np.zeros((2, 3, 6)), np.zeros(())):
+            with self.assertRaises(trammel.Usage):
+                self.model.predict(wrong)
+        with self.assertRaises(trammel.Usage):
+            self.model.correct()
+        with self.assertRaises(trammel.Usage):
+            self.model.correct(np.zeros((2, 7)), joints_deg=np.zeros((3, 6)))
+        with self.assertRaises(trammel.Usage):
+            self.model.correct(np.zeros((2, 7)), conf=[0, 0, 0])
+        self.assertEqual(self.model.predict(np.zeros((0, 6))).error_mm.shape, (0, 3))
+
+    def test_a_tool_that_the_cell_has_not(self):
+        with self.assertRaises(trammel.Refused) as raised:
+            self.model.predict(np.zeros(6), tool="saw")
+        self.assertIn("saw", str(raised.exception))
+
+    def test_a_pose_without_a_branch(self):
+        with self.assertRaises(trammel.Refused) as raised:
+            self.model.correct([[1000, 0, 1000, 1, 0, 0, 0]])
+        self.assertEqual(raised.exception.row, 0)
+
+    def test_a_service_that_is_not_there(self):
+        with self.assertRaises(trammel.Unreachable):
+            trammel.Session(domain=41, ports=[19999], timeout_s=0.2).status()
+
+
+class Threads(unittest.TestCase):
+    """Long work leaves the interpreter to others."""
+
+    def test_others_run_while_a_model_predicts(self):
+        cell = trammel.Cell.load(CELL)
+        planned = trammel.plan(cell, 100)
+        model = trammel.train(cell, trammel.simulate(cell, TRUTH, planned), level="M2", bias="se")
+        joints = np.tile(planned.joints_deg, (100, 1))
+        started, ended = threading.Event(), threading.Event()
+
+        def work():
+            started.set()
+            model.predict(joints)
+            ended.set()
+
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(1000)  # nobody else runs unless the interpreter's lock is given back
+        self.addCleanup(sys.setswitchinterval, interval)
+        worker = threading.Thread(target=work)
+        worker.start()
+        started.wait()
+        seen = ended.is_set()
+        worker.join()
+        self.assertFalse(seen)
+
+    def test_what_the_listener_raises_ends_the_training(self):
+        cell = trammel.Cell.load(CELL)
+        batch = trammel.simulate(cell, TRUTH, trammel.plan(cell, 40))
+        told = []
+
+        def listener(stage, share):
+            told.append(stage)
+            raise LookupError("enough")
+
+        with self.assertRaisesRegex(LookupError, "enough"):
+            trammel.train(cell, batch, progress=listener)
+        self.assertEqual(len(told), 1)
+
+    def test_control_c_ends_the_training(self):
+        cell = trammel.Cell.load(CELL)
+        batch = trammel.simulate(cell, TRUTH, trammel.plan(cell, 40))
+        with self.assertRaises(KeyboardInterrupt):
+            trammel.train(cell, batch, progress=lambda stage, share: os.kill(os.getpid(), signal.SIGINT))
+
+
+class Service(unittest.TestCase):
+    """A session asks a daemon of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        port, domain = 20000 + 4 * (os.getpid() % 3000), 1 + os.getpid() % 40
+        text = CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none")
+        (pathlib.Path(folder.name) / "cell-7.yaml").write_text(text)
+        config = pathlib.Path(folder.name) / "server.yaml"
+        config.write_text(f"version: 1\nserver: python-{port}\ncells: [cell-7.yaml]\nstore: trammel.db\n")
+        cls.daemon = subprocess.Popen([BUILD / "server/trammeld", "--config", config, "--port", str(port), "--domain", str(domain)],
+                                      stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        cls.addClassCleanup(cls.end)
+        cls.session = trammel.Session(domain=domain, ports=[port], timeout_s=30)
+        cls.cell = trammel.Cell.load(CELL)
+        cls.planned = trammel.plan(cls.cell, 60)
+        job = cls.session.submit("cell-7", trammel.simulate(cls.cell, TRUTH, cls.planned))
+        cls.ended = cls.session.wait_for(job, limit_s=300)
+
+    @classmethod
+    def end(cls):
+        cls.daemon.terminate()
+        cls.daemon.wait()
+
+    def test_says_what_is_there(self):
+        self.assertEqual(self.session.status()[0]["cells"], ["cell-7"])
+        self.assertTrue(self.ended["in_force"], self.ended)
+        self.assertEqual([job["id"] for job in self.session.jobs("cell-7")], [self.ended["id"]])
+        self.assertTrue(self.session.models()[0]["in_force"])
+
+    def test_answers_as_its_model_does_offline(self):
+        model = trammel.Model.parse(self.session.export_model("cell-7"))
+        joints = self.planned.joints_deg[:20]
+        here, there = model.predict(joints), self.session.predict("cell-7", joints)
+        for field in ("error_mm", "stddev_mm", "true_stddev_mm", "covariance_mm2", "rotation_deg", "predicted"):
+            np.testing.assert_allclose(getattr(there, field), getattr(here, field), atol=1e-9, err_msg=field)
+        here, there = model.correct(joints_deg=joints), self.session.correct("cell-7", joints_deg=joints)
+        self.assertEqual(there.status, here.status)
+        np.testing.assert_allclose(there.joints_deg, here.joints_deg, atol=1e-9)
+        np.testing.assert_allclose(there.turn_after_deg, here.turn_after_deg, atol=1e-9)
+
+    def test_refuses_with_the_servers_reason(self):
+        with self.assertRaises(trammel.NotFound):
+            self.session.predict("cell-8", np.zeros(6))
+        with self.assertRaises(trammel.TrammelError) as raised:
+            self.session.activate("cell-7", 99)
+        self.assertIn(raised.exception.code, ("not_found", "refused"))
+
+
+class Documents(unittest.TestCase):
+    """What is written is true."""
+
+    def test_everything_says_what_it_is(self):
+        for name in trammel.__all__:
+            thing = getattr(trammel, name)
+            self.assertTrue(inspect.getdoc(thing), name)
+            for member, value in vars(thing).items() if inspect.isclass(thing) else ():
+                if not member.startswith("_") and (callable(value) or isinstance(value, (property, staticmethod))):
+                    self.assertTrue(inspect.getdoc(value), f"{name}.{member}")
+
+    def test_the_tour_prints_what_its_comments_say(self):
+        script = SOURCE / "clients/python/tour.py"
+        said = [line[3:] for line in script.read_text().splitlines() if line.startswith("#> ")]
+        done = subprocess.run([sys.executable, script, SOURCE], capture_output=True, text=True)
+        self.assertEqual(done.stderr, "")
+        self.assertEqual(done.stdout.splitlines(), said)
+
+    def test_stubs_fit_the_module_and_types_fit_the_stubs(self):
+        package = pathlib.Path(trammel.__file__).parent
+        mypy = ["-m", "mypy", "--strict", "--cache-dir", str(BUILD / "mypy"), "--ignore-missing-imports"]
+        done = subprocess.run([sys.executable, *mypy, "-p", "trammel"], capture_output=True, text=True, cwd=package.parent)
+        if "No module named mypy" in done.stderr:
+            self.skipTest("no mypy here")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        done = subprocess.run([sys.executable, *mypy, str(SOURCE / "clients/python/tour.py")], capture_output=True, text=True,
+                              cwd=package.parent)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "trammel._trammel", "--ignore-missing-stub"],
+                              capture_output=True, text=True, cwd=package.parent)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
