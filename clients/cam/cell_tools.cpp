@@ -41,12 +41,24 @@ std::string difference_text(const ProgramTool& tool, const std::string& name, co
 
 bool same_load(const StatedLoad& load, const Payload& payload) {
   return std::abs(load.mass - payload.mass) <= std::max(0.1, kLoadMassTolerance * payload.mass) &&
-         (load.p_F - payload.p_FoCog_F).norm() <= kLoadCentreTolerance;
+         (!load.has_centre || (load.p_F - payload.p_FoCog_F).norm() <= kLoadCentreTolerance);
 }
 
 std::string load_text(double mass, const Vector3& p_F) {
   const Vector3 p = p_F * to_mm(1);
   return fmt::format("{:.3f} kg at [{:.1f}, {:.1f}, {:.1f}] mm", mass, p.x(), p.y(), p.z());
+}
+
+std::string load_difference(const ProgramTool& tool, const std::string& name, const Payload& payload) {
+  const StatedLoad& load = *tool.load;
+  const std::string in_cell =
+      fmt::format("payload {} is {} in the cell", name, load_text(payload.mass, payload.p_FoCog_F));
+  const double mass = std::abs(load.mass - payload.mass);
+  if (!load.has_centre)
+    return fmt::format("load of tool {} is {:.3f} kg in the program, {}: {:.3f} kg apart", called(tool), load.mass,
+                       in_cell, mass);
+  return fmt::format("load of tool {} is {} in the program, {}: {:.3f} kg and {:.1f} mm apart", called(tool),
+                     load_text(load.mass, load.p_F), in_cell, mass, to_mm((load.p_F - payload.p_FoCog_F).norm()));
 }
 
 /// The tool of the cell whose name a program's tool has, case left aside.
@@ -66,12 +78,12 @@ class Choosing {
     for (std::size_t k = 0; k < choices.size(); ++k) {
       if (!used[k]) continue;
       choices[k] = choice(program_.tools[k]);
-      any |= choices[k].why_not.empty();
       if (choices[k].why_not.empty()) choose_payload(program_.tools[k], choices[k]);
+      any |= choices[k].why_not.empty();
     }
     // Where no tool is the cell's, the program is not of this cell.
     for (std::size_t k = 0; k < choices.size() && !any; ++k) {
-      if (used[k] && program_.tools[k].X_FT) refuse(program_.tools[k], choices[k].why_not);
+      if (used[k] && (program_.tools[k].X_FT || program_.tools[k].load)) refuse(program_.tools[k], choices[k].why_not);
     }
     if (!refusals_.empty()) return tl::make_unexpected(together(std::move(refusals_)));
     return choices;
@@ -129,21 +141,24 @@ class Choosing {
   void choose_payload(const ProgramTool& tool, ToolChoice& choice) {
     choice.payload = payload_;
     const bool stated = tool.load && !is_placeholder(*tool.load);
-    if (choice.payload.empty() && cell_.payloads.size() == 1) choice.payload = cell_.payloads.begin()->first;
-    if (choice.payload.empty() && cell_.payloads.contains(choice.tool)) choice.payload = choice.tool;
-    if (choice.payload.empty() && stated) {
+    const auto find_by_load = [&] {
       for (const auto& [name, payload] : cell_.payloads) {
         if (same_load(*tool.load, payload)) choice.payload = name;
       }
-    }
+    };
+    if (choice.payload.empty() && stated && !tool.carries.empty()) find_by_load();
+    if (choice.payload.empty() && cell_.payloads.size() == 1) choice.payload = cell_.payloads.begin()->first;
+    if (choice.payload.empty() && cell_.payloads.contains(choice.tool)) choice.payload = choice.tool;
+    if (choice.payload.empty() && stated) find_by_load();
     const auto known = cell_.payloads.find(choice.payload);
+    choice.load_note = tool.load_note;
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
-    refuse(tool,
-           fmt::format(
-               "load of tool {} is {} in the program, payload {} is {} in the cell: {:.3f} kg and {:.1f} mm apart",
-               shown(tool.name), load_text(tool.load->mass, tool.load->p_F), known->first,
-               load_text(known->second.mass, known->second.p_FoCog_F), std::abs(tool.load->mass - known->second.mass),
-               to_mm((tool.load->p_F - known->second.p_FoCog_F).norm())));
+    const std::string why = load_difference(tool, known->first, known->second);
+    // What is carried for a part of the program concerns that part.
+    if (tool.carries.empty())
+      refuse(tool, why);
+    else
+      choice.why_not = why;
   }
 
   const Program& program_;

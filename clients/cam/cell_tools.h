@@ -19,6 +19,7 @@ struct CellTools {
 struct ToolChoice {
   std::string tool, payload;  ///< of the cell
   std::string note;           ///< what could not be compared
+  std::string load_note;      ///< the same of the load
   std::string why_not;        ///< why targets of this tool cannot be corrected; empty: they can
 };
 
@@ -32,8 +33,9 @@ constexpr double kLoadCentreTolerance = 5e-3;    // m
 
 /// One choice a tool of the program; `used` says which of them targets need. `tool` and `payload` are what the user
 /// said, or empty. Refuses with both values and their difference: a tool that is not the cell's of that name, tools of
-/// which none is the cell's, a load that is not the cell's. A tool that is not in the files must be named as one of the
-/// cell's, or by the user.
+/// which none is the cell's, a load that is not the cell's; where motions set a load that is not the cell's, only what
+/// they do with it cannot be corrected, as long as anything else can. A tool that is not in the files must be named as
+/// one of the cell's, or by the user.
 [[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
                                                            const CellTools& cell, const std::string& tool,
                                                            const std::string& payload);

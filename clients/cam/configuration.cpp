@@ -1,5 +1,8 @@
 #include "clients/cam/configuration.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <cmath>
 
 #include "server/base/units.h"
@@ -11,7 +14,24 @@ namespace {
 
 constexpr double kNoBranch = 1e9;
 constexpr int kBranches = 8;
+constexpr double kOpen = 0.01;       // rad: a wrist that is open more decides joints 4 and 6
 constexpr double kStretched = 1e-9;  // rad: a wrist that is open less is stretched
+
+/// Where the branch that is said has joints outside the quarter turns that are said, which joints and how. A stretched
+/// wrist leaves joints 4 and 6 open.
+std::string contradiction(const Configuration& said, const JointVector& q) {
+  std::vector<std::string> joints;
+  for (std::size_t j = 0; said.conf && j < said.near.size(); ++j) {
+    const double value = q(static_cast<Eigen::Index>(j));
+    const bool open = j < 3 || std::abs(q(4)) > kOpen;
+    if (!said.near[j] || !open || std::abs(value - *said.near[j]) <= kPi / 4 + 0.02) continue;
+    joints.push_back(fmt::format("joint {} at {:.1f} deg and not at {:.0f} to {:.0f} deg", j + 1, to_deg(value),
+                                 to_deg(*said.near[j] - kPi / 4), to_deg(*said.near[j] + kPi / 4)));
+  }
+  if (joints.empty()) return "";
+  return fmt::format("its configuration contradicts itself: branch {} has {}; the branch is followed", *said.conf,
+                     fmt::join(joints, ", "));
+}
 
 /// The chain without joints in front.
 Result<Chain> arm_of(const Chain& robot, std::size_t first) {
@@ -180,6 +200,7 @@ NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, 
       *made.q << from_mm(value->second), *arm;
     }
   }
+  if (made.q) made.doubt = contradiction(said, made.q->tail(6));
   if (!made.q) {
     made.conf = said.conf;
     made.why_not = said.conf ? fmt::format("no joints of conf {} bring the tool there", *said.conf)

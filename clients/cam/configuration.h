@@ -14,6 +14,7 @@ struct NominalJoints {
   std::optional<JointVector> q;  ///< rad; empty: none found
   std::optional<int> conf;       ///< the branch, where the arm has numbered branches
   std::string why_not;
+  std::string doubt = {};  ///< what the program says of the configuration contradicts itself; empty: it does not
 };
 
 /// Robot arm with its rail, if any, as a chain and as the six turning axes alone.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "clients/cam/configuration.h"
 #include "clients/cam/edits.h"
@@ -121,6 +123,8 @@ class Correcting {
       row.suggestion = row.message.substr(at + 2);
       row.message.erase(at);
     }
+    if (const std::string& doubt = nominal_.targets[t].doubt; !doubt.empty())
+      row.message += row.message.empty() ? doubt : "; " + doubt;
     row.error_before_mm = item.error_before_mm;
     row.error_after_mm = item.error_after_mm;
     row.sigma_mm = item.sigma_mm;
@@ -227,11 +231,48 @@ class Correcting {
       row.status = "refused";
       row.message = left.why;
     }
+    tell_readings();
     std::stable_sort(result_.rows.begin(), result_.rows.end(), [](const ReceiptRow& a, const ReceiptRow& b) {
       return std::tie(a.file, a.line) < std::tie(b.file, b.line);
     });
     for (std::size_t f = 0; f < program_.files.size(); ++f) write_file(f);
     return std::move(result_);
+  }
+
+  /// What is left as it stands moves all the same where it is made of a target that is corrected.
+  void tell_readings() {
+    std::set<std::pair<std::size_t, std::size_t>> written;
+    for (std::size_t t = 0; t < program_.targets.size(); ++t) {
+      if (!result_.rows[t].corrected()) continue;
+      for (const Rewrite& rewrite : program_.targets[t].rewrites)
+        written.emplace(program_.targets[t].file, rewrite.span.begin);
+    }
+    std::multimap<std::pair<std::string, int>, std::size_t> by_line;
+    std::multimap<std::string, std::size_t> by_name;
+    for (std::size_t r = program_.targets.size(); r < result_.rows.size(); ++r) {
+      by_name.emplace(result_.rows[r].name, r);
+      if (!result_.rows[r].motion.empty()) by_line.emplace(std::pair(result_.rows[r].file, result_.rows[r].line), r);
+    }
+    std::set<std::string> said;
+    for (const Reading& reading : program_.readings) {
+      const auto first = written.lower_bound({reading.file, reading.of.begin});
+      if (first == written.end() || first->first != reading.file || first->second >= reading.of.end) continue;
+      const std::string& by_file = program_.files[reading.by_file].name;
+      const std::string moves = fmt::format("it moves with {}, which is corrected", shown(reading.name));
+      bool found = reading.motion;
+      const auto tell = [&](auto rows) {
+        for (auto row = rows.first; row != rows.second; ++row) {
+          std::string& message = result_.rows[row->second].message;
+          if (message.find(moves) == std::string::npos) message += "; " + moves;
+          found = true;
+        }
+      };
+      tell(by_line.equal_range({by_file, reading.by_line}));
+      if (!reading.by.empty()) tell(by_name.equal_range(reading.by));
+      const std::string note = fmt::format("{} line {} reads {}, which is corrected: what it makes of it moves with it",
+                                           by_file, reading.by_line, shown(reading.name));
+      if (!found && said.insert(note).second) result_.notes.push_back(note);
+    }
   }
 
   void write_file(std::size_t f) {

@@ -72,7 +72,10 @@ std::string dialect_names() {
 
 Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadOptions& options) {
   for (const Entry& entry : entries()) {
-    if (entry.dialect == dialect) return entry.read(std::move(files), options);
+    if (entry.dialect != dialect) continue;
+    Program program = entry.read(std::move(files), options);
+    leave_halves_of_arcs(program);
+    return program;
   }
   return {};
 }

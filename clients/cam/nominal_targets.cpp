@@ -31,13 +31,22 @@ class Finding {
     note_tools();
     find_moving_axes();
     find_joints();
+    if (doubts_ > 0)
+      found_.notes.push_back(fmt::format(
+          "{} targets: what the program says of the configuration contradicts itself, see their messages", doubts_));
     return std::move(found_);
   }
 
  private:
   void note_tools() {
+    found_.notes = program_.notes;
+    const auto add = [&](const std::string& note) {
+      if (!note.empty() && std::find(found_.notes.begin(), found_.notes.end(), note) == found_.notes.end())
+        found_.notes.push_back(note);
+    };
     for (const ToolChoice& choice : found_.tools) {
-      if (!choice.note.empty()) found_.notes.push_back(choice.note);
+      add(choice.note);
+      add(choice.load_note);
     }
   }
 
@@ -105,6 +114,8 @@ class Finding {
     asked.pose = to_wire(X_BT);
     const NominalJoints found =
         arm_.joints(X_BT * cell_.tools.at(choice.tool).inverse(), target.configuration, target.external, previous);
+    found_.targets[t].doubt = found.doubt;
+    if (!found.doubt.empty()) ++doubts_;
     if (found.q) {
       asked.seed_rad = joints_on_wire(*found.q, arm_.robot());
       found_.targets[t].q = *found.q;
@@ -127,6 +138,7 @@ class Finding {
   const CellTools& cell_;
   NominalTargets found_;
   std::set<int> moving_axes_;
+  std::size_t doubts_ = 0;
 };
 
 }  // namespace

@@ -16,6 +16,7 @@ struct NominalTarget {
   client::TargetMm asked;        ///< as a model is asked to correct it
   std::optional<JointVector> q;  ///< the controller's joints; empty: not found
   std::string why_not;           ///< why it cannot be corrected; empty: it may be
+  std::string doubt = {};        ///< what the program says of it that contradicts itself
 };
 
 struct NominalTargets {

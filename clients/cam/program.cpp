@@ -1,9 +1,12 @@
 #include "clients/cam/program.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "server/base/plain_text.h"
 #include "server/base/units.h"
 
 namespace trammel::cam {
@@ -63,6 +66,47 @@ Vector3 nearest_rotation_vector(const Matrix3& R, const Vector3& like) {
 
 bool is_joints(Coordinates coordinates) {
   return coordinates == Coordinates::kJoints || coordinates == Coordinates::kJointRadians;
+}
+
+bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b) {
+  return a.name == b.name && a.file == b.file && a.line == b.line && a.carries == b.carries;
+}
+
+std::string called(const ProgramTool& tool) {
+  return tool.carries.empty() ? shown(tool.name) : fmt::format("{} carrying {}", shown(tool.name), shown(tool.carries));
+}
+
+void leave_halves_of_arcs(Program& program) {
+  std::vector<bool> leave(program.targets.size(), false);
+  bool any = false;
+  for (bool more = true; more;) {
+    more = false;
+    for (ProgramMove& move : program.moves) {
+      const auto is_left = [&](std::size_t t) { return leave[t]; };
+      move.left_some |= std::any_of(move.targets.begin(), move.targets.end(), is_left);
+      if (!move.is_arc || !move.left_some) continue;
+      for (const std::size_t t : move.targets) {
+        if (leave[t]) continue;
+        leave[t] = more = any = true;
+        const ProgramTarget& target = program.targets[t];
+        program.left.push_back(
+            {target.name, target.file, target.line, target.motion,
+             fmt::format("the other point of its arc ({} line {}) is left", program.files[move.file].name, move.line)});
+      }
+    }
+  }
+  if (!any) return;
+  std::vector<std::size_t> now(program.targets.size());
+  std::vector<ProgramTarget> kept;
+  for (std::size_t t = 0; t < program.targets.size(); ++t) {
+    now[t] = kept.size();
+    if (!leave[t]) kept.push_back(std::move(program.targets[t]));
+  }
+  program.targets = std::move(kept);
+  for (ProgramMove& move : program.moves) {
+    std::erase_if(move.targets, [&](std::size_t t) { return leave[t]; });
+    for (std::size_t& t : move.targets) t = now[t];
+  }
 }
 
 int line_of(const std::string& text, std::size_t at) {

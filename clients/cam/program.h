@@ -68,6 +68,7 @@ struct Configuration {
 struct StatedLoad {
   double mass = 0;                ///< kg
   Vector3 p_F = Vector3::Zero();  ///< centre of gravity, m, in F
+  bool has_centre = true;         ///< false: only the mass is said
 };
 
 /// A tool as the program has it.
@@ -79,6 +80,8 @@ struct ProgramTool {
   std::optional<StatedLoad> load;
   double rotation_rounding = 0;  ///< rad, what its digits leave open
   std::string why_not;           ///< why its targets cannot be corrected; empty: they can
+  std::string carries = {};    ///< the load that motions set, as the program calls it; empty: `load` is the tool's own
+  std::string load_note = {};  ///< why that load cannot be compared
 };
 
 /// A frame that targets are given in, seen from the robot's base.
@@ -120,9 +123,21 @@ struct LeftAlone {
 struct ProgramMove {
   std::size_t file = 0;
   int line = 0;
-  std::vector<std::size_t> targets;  ///< of Program::targets, that it may go to; empty: left alone
-  bool corrected_by_others = false;
+  std::vector<std::size_t> targets;       ///< of Program::targets, that it may go to; empty: left alone
+  bool is_arc = false;                    ///< to an end by way of another target
+  bool left_some = false;                 ///< a target of it is left
   std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
+};
+
+/// A statement reads the stored numbers of a target: what it makes of them moves where the target is corrected.
+struct Reading {
+  std::size_t file = 0;
+  Span of;           ///< the bytes that hold the target
+  std::string name;  ///< of the target
+  std::size_t by_file = 0;
+  int by_line = 0;
+  std::string by;       ///< what is made of it: `pX`; empty: something else
+  bool motion = false;  ///< it is a motion, which goes to what is made of it
 };
 
 /// Where and how a dialect takes the mark of a correction.
@@ -142,6 +157,8 @@ struct Program {
   std::vector<ProgramTarget> targets;
   std::vector<LeftAlone> left;
   std::vector<ProgramMove> moves;
+  std::vector<Reading> readings;
+  std::vector<std::string> notes;  ///< what could not be compared, a sentence each
 };
 
 struct ReadOptions {
@@ -149,6 +166,13 @@ struct ReadOptions {
   bool keep_joints = false;                 ///< joint targets stay as they are
   std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
 };
+
+/// A tool of the list that is the same to every motion: name, place, and what it carries.
+[[nodiscard]] bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b);
+/// `spindle`, `spindle carrying lPart`
+[[nodiscard]] std::string called(const ProgramTool& tool);
+/// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
+void leave_halves_of_arcs(Program& program);
 
 /// The number of the line of a byte, from 1.
 [[nodiscard]] int line_of(const std::string& text, std::size_t at);

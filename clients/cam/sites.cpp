@@ -38,7 +38,7 @@ void Sites::add(std::size_t file, std::size_t begin, const std::string& name, Si
 std::string used_differently(const Program& program, const std::vector<SiteUse>& ways) {
   std::vector<std::string> texts;
   for (const SiteUse& way : ways) {
-    texts.push_back(fmt::format("tool {} in {} ({} line {})", shown(program.tools[way.tool].name),
+    texts.push_back(fmt::format("tool {} in {} ({} line {})", called(program.tools[way.tool]),
                                 shown(program.frames[way.frame].name), program.files[way.file].name, way.line));
   }
   return fmt::format("it is used in different ways: {}", fmt::join(texts, ", "));
@@ -69,6 +69,7 @@ void Sites::finish(Program& program, const Describe& describe) const {
     if (why.empty() && !joints) why = program.frames[target.frame].why_not;
     if (!why.empty()) {
       program.left.push_back({target.name, target.file, target.line, target.motion, why});
+      for (const SiteUse& use : site.uses) program.moves[use.move].left_some = true;
       continue;
     }
     for (const SiteUse& use : site.uses) program.moves[use.move].targets.push_back(program.targets.size());

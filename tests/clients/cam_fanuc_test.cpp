@@ -98,5 +98,46 @@ TEST(Fanuc, WhatIsNoLsFileIsLeftAsItIs) {
   }
 }
 
+std::string selected_position(int number) {
+  std::string text = position(number, kXyz);
+  return text.replace(text.find("UF : 1, UT : 2"), 14, "UF : F, UT : F");
+}
+
+TEST(Fanuc, FMeansTheFrameAndToolThatAreSelected) {
+  const test::Corrected made =
+      ls(program("   2:  UTOOL_NUM=2 ;\n   3:L P[1] 100mm/sec FINE ;\n   4:  CALL OTHER ;\n"
+                 "   5:L P[2] 100mm/sec FINE ;\n",
+                 selected_position(1) + selected_position(2)));
+  EXPECT_TRUE(row_of(made.program, "P[1]").corrected()) << why(made, "P[1]");
+  EXPECT_NE(made.program.files[0].text.find("X =   300.123  mm"), std::string::npos) << "taken out of UFRAME[1]";
+  EXPECT_NE(why(made, "P[2]").find("CALL OTHER may select"), std::string::npos) << why(made, "P[2]");
+  const test::Corrected none = ls(program("   3:L P[1] 100mm/sec FINE ;\n", selected_position(1)));
+  EXPECT_NE(why(none, "P[1]").find("no UTOOL_NUM is set before it"), std::string::npos) << why(none, "P[1]");
+}
+
+TEST(Fanuc, WhatAJumpBackChangesHoldsAtItsLabelToo) {
+  for (const std::string& jump :
+       std::vector<std::string>{"JMP LBL[1]", "IF DI[1]=ON,JMP LBL[1]", "IF (DI[1]=ON),JMP LBL[1]"}) {
+    const test::Corrected made = ls(program(
+        "   2:  UTOOL_NUM=2 ;\n   3:  LBL[1:again] ;\n   4:L P[1] 100mm/sec FINE ;\n   5:  UFRAME_NUM=3 ;\n   6:  " +
+            jump + " ;\n",
+        selected_position(1)));
+    EXPECT_NE(why(made, "P[1]").find("a branch, a jump or a loop"), std::string::npos) << jump << why(made, "P[1]");
+  }
+}
+
+TEST(Fanuc, APayloadThatOnlyTheControllerKnowsIsSaid) {
+  const test::Corrected made = ls(program("   2:  PAYLOAD[3] ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
+  ASSERT_EQ(made.program.notes.empty(), false);
+  EXPECT_NE(made.program.notes[0].find("PAYLOAD[3] (p1.ls line"), std::string::npos) << made.program.notes[0];
+}
+
+TEST(Fanuc, ARegisterThatIsMadeOfACorrectedPositionIsSaidToMoveWithIt) {
+  const test::Corrected made = ls(
+      program("   2:  PR[5]=P[1] ;\n   3:L P[1] 100mm/sec FINE ;\n   4:L PR[5] 100mm/sec FINE ;\n", position(1, kXyz)));
+  EXPECT_TRUE(row_of(made.program, "P[1]").corrected());
+  EXPECT_NE(why(made, "PR[5]").find("it moves with P[1], which is corrected"), std::string::npos) << why(made, "PR[5]");
+}
+
 }  // namespace
 }  // namespace trammel::cam

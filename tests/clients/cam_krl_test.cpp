@@ -135,5 +135,67 @@ TEST(Krl, WhatIsNoKrlIsLeftAsItIs) {
   }
 }
 
+const std::string kPoint = "{X 300,Y 0,Z 500,A 0,B 60,C 0}";
+
+TEST(Krl, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
+  const std::vector<std::pair<std::string, std::string>> loops = {
+      {"LOOP\n", "ENDLOOP\n"},        {"WHILE $IN[1]\n", "ENDWHILE\n"}, {"FOR I=1 TO 2\n", "ENDFOR\n"},
+      {"REPEAT\n", "UNTIL $IN[1]\n"}, {"M1:\n", "GOTO M1\n"},           {"M1:\n", "IF $IN[1] THEN\nGOTO M1\nENDIF\n"}};
+  for (const auto& [head, end] : loops) {
+    const test::Corrected frame = krl(program(head + "LIN " + kPoint + "\n$BASE=$NULLFRAME\n" + end));
+    EXPECT_NE(why(frame, kPoint).find("$BASE: a branch or a loop"), std::string::npos) << head << why(frame, kPoint);
+    const test::Corrected tool = krl(program(head + "LIN " + kPoint + "\n$TOOL=$NULLFRAME\n" + end));
+    EXPECT_NE(why(tool, kPoint).find("$TOOL: a branch or a loop"), std::string::npos) << head << why(tool, kPoint);
+    const test::Corrected called =
+        krl(program(head + "LIN " + kPoint + "\nnull( )\n" + end) + "DEF null( )\n$BASE=$NULLFRAME\nEND\n");
+    EXPECT_FALSE(row_of(called.program, kPoint).corrected()) << head;
+  }
+}
+
+TEST(Krl, ALoopThatSetsWhatItNeedsIsCorrected) {
+  const test::Corrected made = krl(
+      program("LOOP\n" + kSet + "LIN " + kPoint + "\n$BASE=$NULLFRAME\nIF $IN[1] THEN\nEXIT\n" + "ENDIF\nENDLOOP\n"));
+  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
+}
+
+TEST(Krl, ALoadThatMotionsSetIsComparedWithTheCells) {
+  const test::Corrected all =
+      krl(program("$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nLIN " + kPoint + "\n"));
+  EXPECT_NE(all.refusal.find("40.000 kg"), std::string::npos) << all.refusal;
+  EXPECT_NE(all.refusal.find("60.000 kg and 0.0 mm apart"), std::string::npos) << all.refusal;
+  const test::Corrected some =
+      krl(program("LIN " + kPoint +
+                  "\n$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\n"
+                  "LIN {X 301,Y 0,Z 500,A 0,B 60,C 0}\n$LOAD.M=W\nLIN {X 302,Y 0,Z 500,A 0,B 60,C 0}\n"
+                  "$LOAD=LOAD_DATA[1]\nLIN {X 303,Y 0,Z 500,A 0,B 60,C 0}\n"));
+  EXPECT_TRUE(row_of(some.program, kPoint).corrected()) << why(some, kPoint);
+  EXPECT_NE(why(some, "{X 301,Y 0,Z 500,A 0,B 60,C 0}").find("60.000 kg"), std::string::npos);
+  EXPECT_NE(why(some, "{X 302,Y 0,Z 500,A 0,B 60,C 0}").find("a part of $LOAD"), std::string::npos);
+  EXPECT_TRUE(row_of(some.program, "{X 303,Y 0,Z 500,A 0,B 60,C 0}").corrected());
+}
+
+TEST(Krl, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
+  const std::string dat =
+      "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\n"
+      "DECL E6POS XP2={X 310,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nDECL E6POS Xq={X 1,Y 0,Z 0,A 0,B 0,C 0,S 0,T 0}\n"
+      "ENDDAT\n";
+  const test::Corrected made = krl(program("DECL E6POS XX\nXX=XP1\nXX.Z=XX.Z+50\nLIN XX\nLIN XP1\nH=XP2.Z\nLIN "
+                                           "XP2\nLIN XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}\n"),
+                                   dat);
+  EXPECT_TRUE(row_of(made.program, "XP1").corrected());
+  EXPECT_NE(why(made, "XX").find("it moves with XP1, which is corrected"), std::string::npos) << why(made, "XX");
+  EXPECT_NE(why(made, "XP1:{X DX,Y 0,Z 0,A 0,B 0,C 0}").find("it moves with XP1"), std::string::npos);
+  EXPECT_NE(why(made, "XP2").find("its numbers are read elsewhere too"), std::string::npos) << why(made, "XP2");
+  EXPECT_EQ(why(made, "Xq"), "no motion in these files goes to it");
+}
+
+TEST(Krl, AnArcIsCorrectedWithBothPointsOrWithNone) {
+  const std::string dat = "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const test::Corrected made = krl(program("CIRC {X 300,Y 20,Z 510},XP1\n"), dat);
+  EXPECT_FALSE(row_of(made.program, "{X 300,Y 20,Z 510}").corrected());
+  EXPECT_NE(why(made, "XP1").find("the other point of its arc (p.src line"), std::string::npos) << why(made, "XP1");
+  EXPECT_EQ(made.program.moves_corrected, 0u);
+}
+
 }  // namespace
 }  // namespace trammel::cam

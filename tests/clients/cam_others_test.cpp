@@ -51,6 +51,20 @@ TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
   EXPECT_NE(why(made, "C00003").find("pulses"), std::string::npos);
 }
 
+TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
+  const std::string point = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
+  for (const std::string& lines : std::vector<std::string>{
+           "*A\r\nMOVL C00000 V=100.0\r\nSFTON P001 UF#(1)\r\nJUMP *A IF IN#(1)=ON\r\n",
+           "WHILE IN#(1)=ON\r\nMOVL C00000 V=100.0\r\nSFTON P001 UF#(1)\r\nENDWHILE\r\n",
+           "*A\r\nMOVL C00000 V=100.0\r\nJUMP *B IF IN#(1)=ON\r\nSFTOF\r\n*B\r\nSFTON P001\r\nJUMP *A\r\n"}) {
+    const test::Corrected made = jbi(job(point, lines));
+    EXPECT_NE(why(made, "C00000").find("SFTON displaces it (line "), std::string::npos) << lines << why(made, "C00000");
+  }
+  const test::Corrected off =
+      jbi(job(point, "*A\r\nMOVL C00000 V=100.0\r\nSFTON P001\r\nSFTOF\r\nJUMP *A IF IN#(1)=ON\r\n"));
+  EXPECT_TRUE(row_of(off.program, "C00000").corrected()) << why(off, "C00000");
+}
+
 // Universal Robots
 
 test::Corrected script(const std::string& text) { return corrected_by_shift(Dialect::kUrScript, {{"p.script", text}}); }
@@ -94,6 +108,45 @@ TEST(UrScript, AToolThatIsNotTheCellsIsRefused) {
   const test::Corrected made =
       script("def p():\n  set_tcp(p[0.1,0,0.151,0,-0.785398163,0])\n  movel(p[1.8,0,0.8,0,1,0])\nend\n");
   EXPECT_NE(made.refusal.find("1.000 mm"), std::string::npos) << made.refusal;
+}
+
+TEST(UrScript, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
+  const std::string hole = "  hole = p[1.8, -0.125, 0.8, 0, 1.570796327, 0]\n  movej([0, -0.35, 0.35, 0, 0.5, 0])\n";
+  const std::string loop = "  while i < 2:\n    movel(hole, a=1.2, v=0.05)\n";
+  const test::Corrected tool =
+      script("def p():\n" + kTcp + hole + loop + "    set_tcp(p[0, 0, 0, 0, 0, 0])\n  end\nend\n");
+  EXPECT_NE(why(tool, "hole").find("set_tcp: a branch or a loop"), std::string::npos) << why(tool, "hole");
+  const test::Corrected called = script("def null():\n  set_tcp(p[0, 0, 0, 0, 0, 0])\nend\ndef p():\n" + kTcp + hole +
+                                        loop + "    null()\n  end\nend\n");
+  EXPECT_FALSE(row_of(called.program, "hole").corrected());
+  const test::Corrected set = script("def p():\n" + hole + "  while i < 2:\n  " + kTcp +
+                                     "    movel(hole, a=1.2, v=0.05)\n    set_tcp(p[0, 0, 0, 0, 0, 0])\n  end\nend\n");
+  EXPECT_TRUE(row_of(set.program, "hole").corrected()) << why(set, "hole");
+}
+
+TEST(UrScript, ThePayloadIsComparedWithTheCells) {
+  const std::string moves = "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n";
+  const test::Corrected other = script("def p():\n" + kTcp + "  set_payload(40, [0, 0, 0.1])\n" + moves + "end\n");
+  EXPECT_NE(other.refusal.find("60.000 kg and 0.0 mm apart"), std::string::npos) << other.refusal;
+  const test::Corrected mass = script("def p():\n" + kTcp + "  set_payload_mass(40)\n" + moves + "end\n");
+  EXPECT_NE(mass.refusal.find("60.000 kg apart"), std::string::npos) << mass.refusal;
+  const test::Corrected same = script("def p():\n" + kTcp + "  set_payload(100, [0, 0, 0.1])\n" + moves + "end\n");
+  EXPECT_EQ(same.refusal, "");
+  EXPECT_EQ(same.program.left_alone(), 0u);
+  const test::Corrected unknown =
+      script("def p():\n" + kTcp + moves + "  set_payload(m)\n  movel(p[1.8, 0, 0.8, 0, 1.5, 0])\nend\n");
+  EXPECT_NE(why(unknown, "p[1.8, 0, 0.8, 0, 1.5, 0]").find("is not constant"), std::string::npos);
+}
+
+TEST(UrScript, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
+  const test::Corrected made =
+      script("def p():\n" + kTcp +
+             "  hole = p[1.8, 0, 0.8, 0, 1.5707963, 0]\n  low = p[1.8, 0, 0.7, 0, 1.5707963, 0]\n"
+             "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n  movel(hole)\n  movel(pose_add(hole, off))\n"
+             "  h = low[2] + 0.1\n  movel(low)\nend\n");
+  EXPECT_TRUE(row_of(made.program, "hole").corrected());
+  EXPECT_NE(why(made, "pose_add(hole, off)").find("it moves with hole"), std::string::npos);
+  EXPECT_NE(why(made, "low").find("its numbers are read elsewhere too"), std::string::npos) << why(made, "low");
 }
 
 // Tables

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/shifting_model.h"
@@ -218,6 +220,94 @@ TEST(Rapid, WhatIsNoRapidIsLeftAsItIs) {
     const test::Corrected made = rapid(text);
     EXPECT_EQ(made.program.files[0].text, text);
   }
+}
+
+const std::string kLoads =
+    "  PERS loaddata lPart:=[40,[0,0,300],[1,0,0,0],0,0,0];\n  PERS loaddata lAll:=[100,[0,0,100],[1,0,0,0],0,0,0];\n";
+
+TEST(Rapid, ALoadThatMotionsSetIsComparedWithTheCells) {
+  const std::string points =
+      kLoads + target("p10", "0,125,400") + target("p20", "0,135,400") + target("p30", "0,145,400");
+  const test::Corrected all = rapid(program(points, "    GripLoad lPart;\n" + move_l("p10")));
+  EXPECT_NE(all.refusal.find("load of tool tSpindle carrying lPart is 140.000 kg"), std::string::npos) << all.refusal;
+  const test::Corrected total = rapid(program(points, move_l("p10", "\\WObj:=wPanel\\TLoad:=lPart")));
+  EXPECT_NE(total.refusal.find("60.000 kg"), std::string::npos) << total.refusal;
+  const test::Corrected same = rapid(program(points, move_l("p10", "\\WObj:=wPanel\\TLoad:=lAll")));
+  EXPECT_TRUE(row_of(same.program, "p10").corrected()) << same.refusal;
+  const test::Corrected some = rapid(program(
+      points, move_l("p10") + "    GripLoad lPart;\n" + move_l("p20") + "    GripLoad load0;\n" + move_l("p30")));
+  EXPECT_TRUE(row_of(some.program, "p10").corrected()) << some.refusal << why(some, "p10");
+  EXPECT_NE(why(some, "p20").find("carrying lPart"), std::string::npos) << why(some, "p20");
+  EXPECT_TRUE(row_of(some.program, "p30").corrected());
+}
+
+TEST(Rapid, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
+  const std::string points = kLoads + target("p10", "0,125,400") + target("p20", "0,135,400");
+  for (const auto& [head, end] :
+       std::vector<std::pair<std::string, std::string>>{{"    WHILE TRUE DO\n", "    ENDWHILE\n"},
+                                                        {"    FOR i FROM 1 TO 2 DO\n", "    ENDFOR\n"},
+                                                        {"    again:\n", "    GOTO again;\n"},
+                                                        {"    again:\n", "    IF di1=1 GOTO again;\n"}}) {
+    const test::Corrected load = rapid(program(
+        points, move_l("p20") + head + move_l("p10") + "    GripLoad lPart;\n" + end + "    GripLoad load0;\n"));
+    EXPECT_NE(why(load, "p10").find("a branch, a loop or a caller"), std::string::npos) << head << why(load, "p10");
+    const test::Corrected shifted = rapid(program(
+        points, head + move_l("p10") + "    PDispSet peX;\n    IF di2=1 PDispOff;\n" + end + "    PDispOff;\n"));
+    EXPECT_NE(why(shifted, "p10").find("PDispSet displaces it"), std::string::npos) << head << why(shifted, "p10");
+  }
+}
+
+TEST(Rapid, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
+  const test::Corrected made =
+      rapid(program(target("pA", "0,125,400") + "  VAR robtarget pX;\n  VAR num n;\n",
+                    move_l("pA") + "    pX:=pA;\n    pX.trans.z:=pX.trans.z+10;\n" + move_l("pX") + "    n:=n+1;\n" +
+                        move_l("Offs(pA,0,0,n)") + "    TPWrite \"at\"\\Pos:=pA;\n"));
+  EXPECT_TRUE(row_of(made.program, "pA").corrected());
+  EXPECT_NE(why(made, "pX").find("pX is set at run time"), std::string::npos) << why(made, "pX");
+  EXPECT_NE(why(made, "pX").find("it moves with pA, which is corrected"), std::string::npos) << why(made, "pX");
+  EXPECT_NE(why(made, "Offs(pA,0,0,n)").find("it moves with pA"), std::string::npos) << why(made, "Offs(pA,0,0,n)");
+  EXPECT_NE(fmt::format("{}", fmt::join(made.program.notes, "\n")).find("reads pA, which is corrected"),
+            std::string::npos);
+}
+
+TEST(Rapid, ATargetWhoseNumbersAreReadElsewhereStaysUnlessItIsSplit) {
+  for (const std::string& reading :
+       {"    h:=pA.trans.y;\n", "    IF pA.trans.x=0 Stop;\n", "    IF pA.trans.x=0 THEN\n    ENDIF\n",
+        "    look pA.trans;\n", "    height pA;\n"}) {
+    const std::string text =
+        program(target("pA", "0,125,400") + "  VAR num h;\n",
+                reading + move_l("pA") + "  ENDPROC\n  PROC height(robtarget p)\n    h:=p.trans.z;\n");
+    const test::Corrected left = rapid(text);
+    EXPECT_NE(why(left, "pA").find("its numbers are read elsewhere too (m.mod line"), std::string::npos)
+        << reading << why(left, "pA");
+    EXPECT_EQ(left.program.files[0].text, text);
+    const test::Corrected split = rapid(text, {.split = true});
+    EXPECT_TRUE(row_of(split.program, "pA").corrected()) << reading << why(split, "pA");
+    EXPECT_NE(split.program.files[0].text.find("pA:=[[0,125,400]"), std::string::npos) << split.program.files[0].text;
+  }
+}
+
+TEST(Rapid, AConfigurationThatContradictsItselfIsSaid) {
+  std::string text = program(target("p10", "0,0,0"), move_l("p10"));
+  text.replace(text.find("[0,0,0,0],[9E9"), 9, "[-1,-1,0,0]");
+  const test::Corrected made = rapid(text);
+  ASSERT_TRUE(row_of(made.program, "p10").corrected());
+  EXPECT_NE(why(made, "p10").find("contradicts itself: branch 0 has joint 4 at"), std::string::npos)
+      << why(made, "p10");
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  text.replace(text.find("[-1,-1,0,0]"), 11, "[-1,-1,0,1]");
+  const test::Corrected consistent = rapid(text);
+  EXPECT_EQ(why(consistent, "p10"), "");
+  EXPECT_TRUE(consistent.program.notes.empty());
+}
+
+TEST(Rapid, NamesAreSpelledAsTheProgramSpellsThemAndOptionalArgumentsAreFollowed) {
+  const test::Corrected made =
+      rapid(program(target("pUnUsed", "0,125,400") + target("pA", "0,125,400"),
+                    "    drill pA\\w:=wPanel;\n  ENDPROC\n  PROC drill(robtarget p\\PERS wobjdata w)\n"
+                    "    MoveL p,v100,fine,tSpindle\\WObj?w;\n"));
+  EXPECT_EQ(why(made, "pUnUsed"), "no motion in these files goes to it");
+  EXPECT_TRUE(row_of(made.program, "pA").corrected()) << why(made, "pA");
 }
 
 }  // namespace

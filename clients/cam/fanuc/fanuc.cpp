@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -27,7 +28,7 @@ struct Group {
 };
 
 struct Position {
-  std::size_t begin = 0;
+  std::size_t begin = 0, end = 0;
   int line = 1;
   std::string name;  ///< `P[3]`
   std::map<int, Group> groups;
@@ -39,6 +40,15 @@ struct Register {
   std::array<std::optional<double>, 6> elements;
   std::string changed;  ///< why it is not constant
 };
+
+/// What UFRAME_NUM and UTOOL_NUM select: a number; empty: not set; else why it is not known.
+struct Selected {
+  std::string frame, tool;
+  bool operator==(const Selected&) const = default;
+};
+bool is_number(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
 
 double number(const Piece& piece) {
   const auto written = read_number(piece.text);
@@ -59,7 +69,14 @@ class File {
     read_positions(pieces(positions));
     statements_ = statements(pieces(motions));
     for (const Pieces& statement : statements_) note_setting(statement);
-    for (const Pieces& statement : statements_) motion(statement);
+    std::vector<Step> steps;
+    for (const Pieces& statement : statements_) {
+      steps.push_back(step_of(statement));
+      note_load(statement);
+    }
+    const std::vector<Selected> selected = states_before(
+        next_of(steps), {0}, Selected{}, [&](std::size_t s, Selected& state) { select(statements_[s], state); }, join);
+    for (std::size_t s = 0; s < statements_.size(); ++s) motion(statements_[s], selected[s]);
     finish();
   }
 
@@ -125,6 +142,7 @@ class File {
       while (at < pieces.size() && !pieces[at].is("{")) ++at;
       const std::size_t begin = at;
       while (at < pieces.size() && !pieces[at].is("}")) ++at;
+      position.end = at < pieces.size() ? pieces[at].end : text_.size();
       read_groups(pieces, begin, at, position);
       by_name_[position.name] = position.begin;
       positions_[position.begin] = std::move(position);
@@ -170,6 +188,60 @@ class File {
     return all;
   }
 
+  static Step step_of(const Pieces& statement) {
+    using Kind = Step::Kind;
+    if (statement.empty()) return {};
+    const Piece& first = statement[0];
+    if (first.is("LBL")) return {Kind::kLabel, indexed_number(statement, 0)};
+    for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
+      if (statement[at].is("JMP") && statement[at + 1].is("LBL"))
+        return {at == 0 ? Kind::kJump : Kind::kJumpMaybe, indexed_number(statement, at + 1)};
+    }
+    const bool block = statement.back().is("THEN");
+    if (first.is("IF") && block) return {Kind::kIf};
+    if (first.is("ELSE") && statement.size() == 1) return {Kind::kElse};
+    if (first.is("FOR")) return {Kind::kWhile};
+    if (first.is("ENDIF") || first.is("ENDFOR")) return {Kind::kEnd};
+    if ((first.is("END") || first.is("ABORT")) && statement.size() == 1) return {Kind::kReturn};
+    return {};
+  }
+  /// `LBL[3:again]` -> `3`
+  static std::string indexed_number(const Pieces& pieces, std::size_t at) {
+    return at + 2 < pieces.size() ? std::string(pieces[at + 2].text) : std::string();
+  }
+
+  /// `UFRAME_NUM=1`, `UTOOL_NUM=R[2]`, `CALL SUB`
+  void select(const Pieces& statement, Selected& selected) const {
+    for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
+      if (!statement[at].is("CALL") && !statement[at].is("RUN")) continue;
+      selected.frame = selected.tool =
+          fmt::format("{} {} may select another one", statement[at].text, statement[at + 1].text);
+    }
+    for (std::size_t at = 0; at + 2 < statement.size(); ++at) {
+      if (!statement[at + 1].is("=") || (!statement[at].is("UFRAME_NUM") && !statement[at].is("UTOOL_NUM"))) continue;
+      const bool constant = statement[at + 2].kind == Piece::Kind::kNumber && at + 3 == statement.size();
+      (statement[at].is("UFRAME_NUM") ? selected.frame : selected.tool) =
+          constant ? std::string(statement[at + 2].text)
+                   : fmt::format("{} is set at run time ({} line {})", statement[at].text, program_.files[index_].name,
+                                 statement[at].line);
+    }
+  }
+  static void join(Selected& state, const Selected& other) {
+    const std::string why = "a branch, a jump or a loop of the program decides it";
+    if (state.frame != other.frame) state.frame = why;
+    if (state.tool != other.tool) state.tool = why;
+  }
+
+  /// `PAYLOAD[3]`
+  void note_load(const Pieces& statement) {
+    for (std::size_t at = 0; at + 2 < statement.size(); ++at) {
+      if (!statement[at].is("PAYLOAD")) continue;
+      program_.notes.push_back(
+          fmt::format("{} ({} line {}): the controller alone knows this load, it is not compared with the cell's",
+                      indexed(statement, at), program_.files[index_].name, statement[at].line));
+    }
+  }
+
   static std::string indexed(const Pieces& pieces, std::size_t at) {
     if (at + 3 >= pieces.size() || !pieces[at + 1].is("[")) return "";
     if (pieces[at + 2].kind != Piece::Kind::kNumber) return fmt::format("{}[*]", pieces[at].text);
@@ -185,6 +257,7 @@ class File {
     const std::string word(statement[0].text);
     const std::string name = indexed(statement, 0);
     const std::string where = fmt::format("{} line {}", program_.files[index_].name, statement[0].line);
+    note_reading(statement, equals, name);
     if (word == "PR" && !name.empty()) return note_register(statement, equals, name, where);
     if ((word == "UFRAME" || word == "UTOOL") && !name.empty()) {
       const std::string from = indexed(statement, equals + 1);
@@ -196,6 +269,19 @@ class File {
       if (position != by_name_.end()) positions_[position->second].changed = why;
       if (name == "P[*]") {
         for (auto& [begin, any] : positions_) any.changed = why;
+      }
+    }
+  }
+
+  /// `PR[5]=P[3]`, `P[4]=P[3]`
+  void note_reading(const Pieces& statement, std::size_t equals, const std::string& name) {
+    for (std::size_t at = equals + 1; at + 2 < statement.size(); ++at) {
+      if (!statement[at].is("P")) continue;
+      const std::string from = indexed(statement, at);
+      for (const auto& [known, begin] : by_name_) {
+        if (known == from || from == "P[*]")
+          program_.readings.push_back(
+              {index_, {begin, positions_.at(begin).end}, known, index_, statement[0].line, name});
       }
     }
   }
@@ -268,16 +354,43 @@ class File {
     return program_.tools.size() - 1;
   }
 
+  /// `UF : F` is the frame that is selected.
+  std::size_t frame_of(const std::string& number_text, const std::string& selected) {
+    if (number_text != "F") return frame_of(number_text);
+    if (is_number(selected)) return frame_of(selected);
+    ProgramFrame frame{"UFRAME[F]", Pose::Identity(),
+                       selected.empty() ? "UF : F, and no UFRAME_NUM is set before it" : "UF : F, " + selected};
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      if (program_.frames[k].name == frame.name && program_.frames[k].why_not == frame.why_not) return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+  std::size_t tool_of(const std::string& number_text, const std::string& selected) {
+    if (number_text != "F") return tool_of(number_text);
+    if (is_number(selected)) return tool_of(selected);
+    ProgramTool tool;
+    tool.name = "UTOOL[F]";
+    tool.why_not = selected.empty() ? "UT : F, and no UTOOL_NUM is set before it" : "UT : F, " + selected;
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      if (program_.tools[k].name == tool.name && program_.tools[k].why_not == tool.why_not) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
   void leave(const Pieces& statement, const std::string& name, const std::string& why) {
+    program_.moves.back().left_some = true;
     program_.left.push_back({name, index_, statement[0].line, std::string(statement[0].text), why});
   }
 
   /// `J P[1] 100% FINE`, `L PR[3] ... Offset,PR[1]`, `C P[4] P[5] ...`, `A P[6] ...`
-  void motion(const Pieces& statement) {
+  void motion(const Pieces& statement, const Selected& selected) {
     static const std::set<std::string_view> kMotions = {"J", "L", "C", "A", "S"};
     if (statement.size() < 4 || !kMotions.contains(statement[0].text)) return;
     if (!statement[1].is("P") && !statement[1].is("PR")) return;
     program_.moves.push_back({index_, statement[0].line, {}, false});
+    program_.moves.back().is_arc = statement[0].is("C");
     note_speed(statement);
     std::string why;
     for (const Piece& piece : statement) {
@@ -295,7 +408,7 @@ class File {
       } else if (!why.empty()) {
         leave(statement, name, why);
       } else {
-        use(statement, name);
+        use(statement, name, selected);
       }
       if (!statement[0].is("C")) return;
     }
@@ -310,7 +423,7 @@ class File {
     }
   }
 
-  void use(const Pieces& statement, const std::string& name) {
+  void use(const Pieces& statement, const std::string& name, const Selected& selected) {
     bool any = false;
     for (const auto& [known, begin] : by_name_) {
       if (known != name && name != "P[*]") continue;
@@ -321,8 +434,9 @@ class File {
       const Group& robot = group == position.groups.end() ? empty : group->second;
       const bool joint = statement[0].is("J");
       sites_.add(index_, begin, known,
-                 {tool_of(robot.tool.empty() ? "?" : robot.tool), frame_of(robot.frame.empty() ? "?" : robot.frame),
-                  std::string(statement[0].text), index_, statement[0].line, program_.moves.size() - 1, !joint});
+                 {tool_of(robot.tool.empty() ? "?" : robot.tool, selected.tool),
+                  frame_of(robot.frame.empty() ? "?" : robot.frame, selected.frame), std::string(statement[0].text),
+                  index_, statement[0].line, program_.moves.size() - 1, !joint});
       used_.insert(begin);
     }
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));

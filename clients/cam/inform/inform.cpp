@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -22,6 +23,12 @@ struct Position {
   std::vector<Piece> numbers;
 };
 
+/// A line behind //INST.
+struct Statement {
+  std::size_t begin = 0, end = 0;
+  int line = 1;
+};
+
 class Job {
  public:
   Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
@@ -37,12 +44,52 @@ class Job {
       if (line.starts_with("//INST")) instructions = true;
       if (line.starts_with("NOP") && instructions && program_.mark_places[index_].at == text_.size())
         program_.mark_places[index_].at = std::min(end + 1, text_.size());
+      if (line.starts_with("//NAME ")) name_ = value_behind(line);
       if (instructions)
-        instruction(begin, end, number);
+        statements_.push_back({begin, end, number});
       else
         header(line, begin, end, number);
       begin = end + 1;
     }
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::vector<Statement>& statements() const { return statements_; }
+
+  /// What a statement does to the order. A condition behind it makes a block of it.
+  [[nodiscard]] std::vector<Step> steps_of(const Statement& statement) const {
+    using Kind = Step::Kind;
+    static const std::map<std::string, Kind> kWords = {
+        {"IFTHEN", Kind::kIf},        {"IFTHENEXP", Kind::kIf}, {"ELSEIF", Kind::kCase},   {"ELSEIFEXP", Kind::kCase},
+        {"ELSE", Kind::kElse},        {"ENDIF", Kind::kEnd},    {"WHILE", Kind::kWhile},   {"WHILEEXP", Kind::kWhile},
+        {"ENDWHILE", Kind::kEnd},     {"FOR", Kind::kWhile},    {"NEXT", Kind::kEnd},      {"SWITCH", Kind::kSwitch},
+        {"CASE", Kind::kCase},        {"DEFAULT", Kind::kElse}, {"ENDSWITCH", Kind::kEnd}, {"BREAK", Kind::kExit},
+        {"CONTINUE", Kind::kContinue}};
+    const std::vector<Piece> pieces = pieces_at(statement);
+    if (pieces.empty()) return {{}};
+    if (pieces[0].is("*")) return {{Kind::kLabel, word_from(pieces[0].begin)}};
+    const bool maybe = std::any_of(pieces.begin() + 1, pieces.end(), [](const Piece& piece) { return piece.is("IF"); });
+    if (pieces[0].is("RET") || pieces[0].is("END")) return {{maybe ? Kind::kPlain : Kind::kReturn}};
+    if (pieces[0].is("JUMP") && pieces.size() > 1 && pieces[1].is("*"))
+      return {{maybe ? Kind::kJumpMaybe : Kind::kJump, word_from(pieces[1].begin)}};
+    if (pieces[0].is("JUMP")) return {{maybe ? Kind::kPlain : Kind::kReturn}};
+    if (pieces[0].is("CALL") && pieces.size() > 3 && pieces[1].is("JOB")) {
+      const Step call{Kind::kCall, word_from(pieces[3].begin)};
+      return maybe ? std::vector<Step>{{Kind::kIf}, call, {Kind::kEnd}} : std::vector<Step>{call};
+    }
+    const auto word = kWords.find(std::string(pieces[0].text));
+    return {word == kWords.end() ? Step{} : Step{word->second}};
+  }
+
+  /// `SFTON`, `SFTOF`: the line that displaces what follows; 0: none.
+  void shift(const Statement& statement, int& shifted_at) const {
+    const std::vector<Piece> pieces = pieces_at(statement);
+    if (pieces.empty()) return;
+    if (pieces[0].is("SFTON")) shifted_at = statement.line;
+    if (pieces[0].is("SFTOF")) shifted_at = 0;
+  }
+
+  void list_unused() {
     for (const auto& [name, position] : positions_) {
       if (!used_.contains(name))
         program_.left.push_back({name, index_, position.line, "", "no motion in this job goes to it"});
@@ -126,25 +173,35 @@ class Job {
     return program_.frames.size() - 1;
   }
 
-  void instruction(std::size_t begin, std::size_t end, int number) {
-    const std::vector<Piece> pieces = pieces_of(text_, begin, end, number, {"'", "\""});
+  [[nodiscard]] std::vector<Piece> pieces_at(const Statement& statement) const {
+    return pieces_of(text_, statement.begin, statement.end, statement.line, {"'", "\""});
+  }
+  /// Up to the next blank.
+  [[nodiscard]] std::string word_from(std::size_t at) const {
+    return text_.substr(at, std::min(text_.find_first_of(" \t\r\n", at), text_.size()) - at);
+  }
+
+ public:
+  /// `shifted_at`: the line of a SFTON that holds; 0: none does.
+  void motion(const Statement& statement, int shifted_at) {
+    const std::vector<Piece> pieces = pieces_at(statement);
+    const int number = statement.line;
     if (pieces.empty()) return;
     const std::string word(pieces[0].text);
-    if (word == "SFTON") shifted_ = fmt::format("SFTON displaces it (line {})", number);
-    if (word == "SFTOF") shifted_.clear();
     static const std::set<std::string> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
     if (!kMotions.contains(word) || pieces.size() < 2) return;
     program_.moves.push_back({index_, number, {}, false});
     const std::string name(pieces[1].text);
     const auto leave = [&](const std::string& why) {
       used_.insert(name);
+      program_.moves.back().left_some = true;
       program_.left.push_back({name, index_, number, word, why});
     };
     for (const Piece& piece : pieces) {
       if (piece.is("UNTIL")) return leave("a sensor may end the motion (UNTIL)");
     }
     if (word == "IMOV") return leave("it is relative to where the robot is");
-    if (!shifted_.empty()) return leave(shifted_);
+    if (shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", shifted_at));
     const auto position = positions_.find(name);
     if (position == positions_.end()) return leave("it is a variable, which any job may set");
     used_.insert(name);
@@ -153,6 +210,7 @@ class Job {
                 word != "MOVJ"});
   }
 
+ private:
   /// `1,0,0,0,0,0`: wrist not flipped, upper arm, front; R, T, S below 180 deg.
   static Configuration configuration_of(const std::vector<int>& conf) {
     Configuration said;
@@ -176,8 +234,44 @@ class Job {
   Position now_;
   std::map<std::string, Position> positions_;
   std::set<std::string> used_;
-  std::string shifted_;
+  std::string name_;
+  std::vector<Statement> statements_;
 };
+
+/// The motions of all jobs, each with the shift that holds before it: a job calls another.
+void read_motions(std::vector<Job>& jobs) {
+  struct Place {
+    std::size_t job = 0;
+    const Statement* statement = nullptr;  ///< nullptr: none stands there
+  };
+  std::vector<Step> steps;
+  std::vector<Place> places;
+  const auto add = [&](Step step, Place place) {
+    steps.push_back(std::move(step));
+    places.push_back(place);
+  };
+  for (std::size_t j = 0; j < jobs.size(); ++j) {
+    add({Step::Kind::kRoutine, jobs[j].name()}, {});
+    for (const Statement& statement : jobs[j].statements()) {
+      bool first = true;
+      for (Step& step : jobs[j].steps_of(statement)) {
+        add(std::move(step), first ? Place{j, &statement} : Place{});
+        first = false;
+      }
+    }
+    add({Step::Kind::kEnd}, {});
+  }
+  const std::vector<int> shifted = states_before(
+      next_of(steps), entries_of(steps), 0,
+      [&](std::size_t s, int& at) {
+        if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, at);
+      },
+      [](int& at, const int& other) { at = std::max(at, other); });
+  for (std::size_t s = 0; s < steps.size(); ++s) {
+    if (places[s].statement != nullptr) jobs[places[s].job].motion(*places[s].statement, shifted[s]);
+  }
+  for (Job& job : jobs) job.list_unused();
+}
 
 }  // namespace
 
@@ -189,6 +283,7 @@ Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
   std::vector<Job> jobs;
   jobs.reserve(program.files.size());
   for (std::size_t f = 0; f < program.files.size(); ++f) jobs.emplace_back(f, program, sites, options).read();
+  read_motions(jobs);
   sites.finish(program,
                [&](const Site& site, ProgramTarget& target) { return jobs[site.file].describe(site, target); });
   return program;

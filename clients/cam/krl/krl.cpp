@@ -9,6 +9,7 @@
 #include <set>
 #include <tl/expected.hpp>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/krl/lines.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -57,8 +58,16 @@ struct Routine {
 /// What the controller has set when a motion comes.
 struct State {
   std::size_t tool = 0, frame = 0;
+  std::size_t load = 0;    ///< 0: the tool's own
   std::string fixed_tool;  ///< why the robot does not hold the tool; empty: it does
   auto operator<=>(const State&) const = default;
+};
+
+/// What `$LOAD` was set to.
+struct Load {
+  std::string name;
+  std::optional<StatedLoad> load;
+  std::string note, why_not;
 };
 
 std::string upper(std::string text) {
@@ -94,6 +103,7 @@ class Reader {
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
     std::set<std::string> called;
+    for (std::size_t r = 0; r < routines_.size(); ++r) by_name_.emplace(routines_[r].name, r);
     for (const Routine& routine : routines_) note_calls(routine, called);
     for (std::size_t r = 0; r < routines_.size(); ++r) {
       if (!called.contains(routines_[r].name)) run(r, {}, 0);
@@ -101,6 +111,7 @@ class Reader {
     for (std::size_t r = 0; r < routines_.size(); ++r) {
       if (!ran_.contains(r)) run(r, {}, 0);
     }
+    for (std::size_t f = 0; f < lines_.size(); ++f) note_readings(f);
     sites_.finish(program_, [this](const Site& site, ProgramTarget& target) { return describe(site, target); });
     list_unused();
     return std::move(program_);
@@ -183,10 +194,20 @@ class Reader {
   }
 
   std::string set_at(const std::string& name, std::size_t f, std::size_t k) const {
-    return fmt::format("{} is set at run time ({})", shown(name), place(f, k));
+    return fmt::format("{} is set at run time ({})", shown(spelled(name, f, k)), place(f, k));
   }
   std::string place(std::size_t f, std::size_t k) const {
     return fmt::format("{} line {}", program_.files[f].name, lines_[f][k].number);
+  }
+
+  /// A name as a line spells it.
+  [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const {
+    const std::string word = name.substr(0, name.find('['));
+    for (const Token& token : lines_[f][k].tokens) {
+      if (token.kind == TokenKind::kWord && token.text == word)
+        return program_.files[f].text.substr(token.begin, token.end - token.begin) + name.substr(word.size());
+    }
+    return name;
   }
 
   /// The variable of a file's own data list, else of any.
@@ -254,8 +275,7 @@ class Reader {
 
   std::size_t add_tool(ProgramTool tool) {
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      const ProgramTool& known = program_.tools[k];
-      if (known.name == tool.name && known.file == tool.file && known.line == tool.line) return k;
+      if (same_tool_of_program(program_.tools[k], tool) && program_.tools[k].why_not == tool.why_not) return k;
     }
     program_.tools.push_back(std::move(tool));
     return program_.tools.size() - 1;
@@ -329,6 +349,47 @@ class Reader {
     return add_tool(std::move(tool));
   }
 
+  std::size_t add_load(Load load) {
+    for (std::size_t k = 0; k < loads_.size(); ++k) {
+      if (loads_[k].name == load.name && loads_[k].why_not == load.why_not) return k;
+    }
+    loads_.push_back(std::move(load));
+    return loads_.size() - 1;
+  }
+
+  /// `$LOAD = ...`
+  std::size_t load_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
+    Load load{fmt::format("$LOAD ({})", place(f, k)), std::nullopt, "", ""};
+    const std::vector<Value>* value = &operands;
+    if (operands.size() == 1 && operands[0].kind == Value::Kind::kName) {
+      load.name = operands[0].name;
+      if (find(root_of(load.name), f) == nullptr) {
+        load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
+        return add_load(std::move(load));
+      }
+      const Told<const Assigned*> assigned = value_of(load.name, f);
+      if (assigned) value = &(*assigned)->operands;
+      if (!assigned) load.why_not = "$LOAD: " + assigned.error();
+    }
+    if (load.why_not.empty()) load.load = load_of(*value);
+    if (load.why_not.empty() && !load.load) load.why_not = fmt::format("$LOAD is not constant ({})", place(f, k));
+    return add_load(std::move(load));
+  }
+
+  /// The tool as a motion has it.
+  std::size_t tool_carrying(std::size_t tool, std::size_t index) {
+    const Load& load = loads_[index];
+    const std::optional<StatedLoad>& own = program_.tools[tool].load;
+    const bool same = own && load.load && own->mass == load.load->mass && own->p_F == load.load->p_F;
+    if (index == 0 || same) return tool;
+    ProgramTool carrying = program_.tools[tool];
+    carrying.carries = load.name;
+    carrying.load = load.load;
+    carrying.load_note = load.note;
+    if (carrying.why_not.empty()) carrying.why_not = load.why_not;
+    return add_tool(std::move(carrying));
+  }
+
   std::size_t base_numbered(int number, std::size_t f) {
     if (number == 0) return 1;
     const std::string data = fmt::format("BASE_DATA[{}]", number);
@@ -364,6 +425,7 @@ class Reader {
       return;
     }
     state.tool = tool_numbered(static_cast<int>(tool->number), f);
+    state.load = 0;
     state.frame = base_numbered(static_cast<int>(base->number), f);
     const Value* frame = (*assigned)->operands[0].field("IPO_FRAME");
     const std::string& text = program_.files[(*assigned)->file].text;
@@ -380,58 +442,91 @@ class Reader {
     }
   }
 
-  State run(std::size_t r, const State& begin, int depth) {
+  static Step step_of(const std::vector<Token>& tokens) {
+    using Kind = Step::Kind;
+    static const std::map<std::string, Kind> kWords = {
+        {"IF", Kind::kIf},         {"ELSE", Kind::kElse},     {"ENDIF", Kind::kEnd},     {"SWITCH", Kind::kSwitch},
+        {"CASE", Kind::kCase},     {"DEFAULT", Kind::kElse},  {"ENDSWITCH", Kind::kEnd}, {"LOOP", Kind::kRepeat},
+        {"ENDLOOP", Kind::kEnd},   {"WHILE", Kind::kWhile},   {"ENDWHILE", Kind::kEnd},  {"FOR", Kind::kWhile},
+        {"ENDFOR", Kind::kEnd},    {"REPEAT", Kind::kRepeat}, {"UNTIL", Kind::kEnd},     {"EXIT", Kind::kExit},
+        {"RETURN", Kind::kReturn}, {"RESUME", Kind::kReturn}};
+    if (tokens.empty()) return {};
+    if (tokens.size() == 2 && tokens[1].text == ":") return {Kind::kLabel, tokens[0].text};
+    if (tokens.size() > 1 && tokens[0].text == "GOTO") return {Kind::kJump, tokens[1].text};
+    if (tokens.size() > 1 && (tokens[1].text == "=" || tokens[1].text == "[" || tokens[1].text == ".")) return {};
+    const auto word = kWords.find(tokens[0].text);
+    return word == kWords.end() ? Step{} : Step{word->second};
+  }
+
+  /// Before each line of a routine, and at its end.
+  std::vector<State> states_in(std::size_t r, const State& begin, int depth) {
+    const Routine& routine = routines_[r];
+    const auto [order, is_new] = orders_.try_emplace(r);
+    if (is_new) {
+      std::vector<Step> steps;
+      for (std::size_t k = routine.first; k < routine.last; ++k)
+        steps.push_back(step_of(lines_[routine.file][k].tokens));
+      order->second = next_of(steps);
+    }
+    return states_before(
+        order->second, {0}, begin,
+        [&](std::size_t step, State& state) { set(routine.file, routine.first + step, state, depth); },
+        [&](State& state, const State& other) { join(state, other); });
+  }
+
+  State end_of(std::size_t r, const State& begin, int depth) {
     const auto key = std::pair(r, begin);
     if (const auto known = ends_.find(key); known != ends_.end()) return known->second;
     ends_[key] = begin;
+    return ends_[key] = states_in(r, begin, depth).back();
+  }
+
+  /// Its motions, and those of what it calls.
+  void run(std::size_t r, const State& begin, int depth) {
+    if (!run_.emplace(r, begin).second) return;
     ran_.insert(r);
-    State state = begin;
-    struct Branch {
-      State entry;
-      std::vector<State> ends;
-    };
-    std::vector<Branch> open;
     const Routine routine = routines_[r];
+    const std::vector<State> states = states_in(r, begin, depth);
     for (std::size_t k = routine.first; k < routine.last; ++k) {
       const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
       if (tokens.empty()) continue;
-      const std::string& word = tokens[0].text;
-      if (word == "IF" || word == "SWITCH") {
-        open.push_back({state, {}});
-      } else if (!open.empty() && (word == "ELSE" || word == "CASE" || word == "DEFAULT")) {
-        open.back().ends.push_back(state);
-        state = open.back().entry;
-      } else if (!open.empty() && (word == "ENDIF" || word == "ENDSWITCH")) {
-        for (const State& end : open.back().ends) join(state, end);
-        join(state, open.back().entry);
-        open.pop_back();
-      } else {
-        line(routine.file, k, state, depth);
-      }
+      const State& state = states[k - routine.first];
+      if (is_motion(tokens[0].text) || is_relative(tokens[0].text)) motion(routine.file, k, state);
+      if (const auto called = called_by(tokens); called && depth < kDeepest) run(*called, state, depth + 1);
     }
-    return ends_[key] = state;
   }
 
-  /// Where branches come together, what they set differently is not known.
+  [[nodiscard]] std::optional<std::size_t> called_by(const std::vector<Token>& tokens) const {
+    if (tokens.size() < 2 || tokens[1].text != "(") return std::nullopt;
+    const auto routine = by_name_.find(tokens[0].text);
+    return routine == by_name_.end() ? std::nullopt : std::optional(routine->second);
+  }
+
+  /// Where ways come together, what they set differently is not known.
   void join(State& state, const State& other) {
-    const std::string why = "a branch of the program decides it";
+    const std::string why = "a branch or a loop of the program decides it";
     if (state.tool != other.tool)
       state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
     if (state.frame != other.frame) state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    if (state.load != other.load) state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
     if (state.fixed_tool != other.fixed_tool) state.fixed_tool = why;
   }
 
-  void line(std::size_t f, std::size_t k, State& state, int depth) {
+  /// What a line sets.
+  void set(std::size_t f, std::size_t k, State& state, int depth) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
+    if (tokens.empty()) return;
     const std::string& word = tokens[0].text;
     const bool assigns = tokens.size() > 2 && tokens[1].text == "=";
     std::size_t end = 0;
-    if (is_motion(word) || is_relative(word)) {
-      motion(f, k, state);
-    } else if (word == "$TOOL" && assigns) {
+    if (word == "$TOOL" && assigns) {
       state.tool = tool_set(krl::operands_at(tokens, 2, &end), f, k);
     } else if (word == "$BASE" && assigns) {
       state.frame = base_set(krl::operands_at(tokens, 2, &end), f);
+    } else if (word == "$LOAD" && tokens.size() > 1) {
+      state.load = assigns
+                       ? load_set(krl::operands_at(tokens, 2, &end), f, k)
+                       : add_load({"$LOAD", std::nullopt, "", fmt::format("a part of $LOAD is set ({})", place(f, k))});
     } else if ((word == "$TOOL" || word == "$BASE") && tokens.size() > 1) {
       const std::string why = fmt::format("a part of {} is set ({})", word, place(f, k));
       if (word == "$TOOL") state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
@@ -442,12 +537,8 @@ class Reader {
       apply_fdat(tokens[2].text, f, state);
     } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
       set_by_bas(tokens, f, k, state);
-    } else if (tokens.size() > 1 && tokens[1].text == "(" && depth < kDeepest) {
-      for (std::size_t r = 0; r < routines_.size(); ++r) {
-        if (routines_[r].name != word) continue;
-        state = run(r, state, depth + 1);
-        break;
-      }
+    } else if (const auto called = called_by(tokens); called && depth < kDeepest) {
+      state = end_of(*called, state, depth + 1);
     }
   }
 
@@ -457,6 +548,7 @@ class Reader {
     const int number = constant ? std::atoi(tokens[5].text.c_str()) : 0;
     const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), place(f, k));
     if (tokens[3].text == "TOOL" || tokens[3].text == "EX_TOOL") {
+      state.load = 0;
       state.tool = constant ? tool_numbered(number, f)
                             : add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
     } else if (tokens[3].text == "BASE") {
@@ -474,6 +566,7 @@ class Reader {
       std::size_t end = 0;
       State one = state;
       if (by_fdat) apply_fdat(tokens[at + 4].text, f, one);
+      if (by_fdat && tokens[at].text == "$TOOL") state.load = 0;
       if (tokens[at].text == "$TOOL") {
         state.tool = by_fdat ? one.tool : tool_set(krl::operands_at(tokens, at + 2, &end), f, k);
       } else {
@@ -484,6 +577,7 @@ class Reader {
 
   void leave(std::size_t f, std::size_t k, const std::string& name, const std::string& why) {
     const Line& line = lines_[f][k];
+    program_.moves[move_at(f, k)].left_some = true;
     if (left_.emplace(f, line.number, name).second)
       program_.left.push_back({name, f, line.number, line.tokens[0].text, why});
   }
@@ -498,8 +592,10 @@ class Reader {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     const std::string& word = tokens[0].text;
     const std::size_t move = move_at(f, k);
+    program_.moves[move].is_arc = word == "CIRC" || word == "SCIRC";
     if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
     apply_with(f, k, state);
+    state.tool = tool_carrying(state.tool, state.load);
     std::size_t next = 1;
     const int count = word == "CIRC" || word == "SCIRC" ? 2 : 1;
     for (int target = 0; target < count; ++target) {
@@ -540,7 +636,8 @@ class Reader {
     for (const auto& [key, variable] : variables_) {
       if (!key.second.starts_with(beginning) || key.second == wanted) continue;
       any = true;
-      use_named(f, k, key.second, key.second, use);
+      const Assigned* at = variable.values.empty() ? nullptr : &variable.values[0];
+      use_named(f, k, key.second, at == nullptr ? key.second : spelled(key.second, at->file, at->line), use);
     }
     if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
   }
@@ -559,6 +656,7 @@ class Reader {
   std::string describe(const Site& site, ProgramTarget& target) const {
     const Assigned& place = places_.at({site.file, site.begin});
     target.line = lines_[place.file][place.line].number;
+    if (const auto read = read_.find({site.file, site.begin}); read != read_.end()) return read->second;
     const Value& first = place.operands[0];
     if (place.operands.size() == 1 && first.kind == Value::Kind::kAggregate) {
       if (first.field("A1") != nullptr) return describe_axes(first, target);
@@ -654,6 +752,75 @@ class Reader {
     }
   }
 
+  /// What else reads the targets that are written anew.
+  void note_readings(std::size_t f) {
+    if (targets_.empty()) {
+      for (const auto& [key, variable] : variables_) {
+        if (variable.values.size() != 1 || variable.values[0].operands.empty()) continue;
+        const Assigned& at = variable.values[0];
+        if (!places_.contains({at.file, at.operands[0].begin})) continue;
+        targets_.emplace(key.second, &at);
+        words_of_targets_.insert(key.second.substr(0, key.second.find('[')));
+      }
+    }
+    for (std::size_t k = 0; k < lines_[f].size(); ++k) {
+      const std::vector<Token>& tokens = lines_[f][k].tokens;
+      for (std::size_t at = 0; at < tokens.size(); ++at) {
+        if (tokens[at].kind == TokenKind::kWord && words_of_targets_.contains(tokens[at].text)) note_reading(f, k, at);
+      }
+    }
+  }
+
+  void note_reading(std::size_t f, std::size_t k, std::size_t at) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    std::size_t end = at;
+    const std::vector<Value> one = krl::operands_at(tokens, at, &end);
+    if (one.empty() || one[0].name.empty()) return;
+    const std::string root = root_of(one[0].name);
+    const bool number = root != one[0].name;
+    const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
+    const bool plain = one.size() == 1 && tokens[at > 0 ? at - 1 : 0].text != ":";
+    if (moves && !number && plain) return;  // the motion goes to it
+    const auto own = variables_.find({stem_of(program_.files[f].name), root});
+    if (own != variables_.end()) {
+      if (own->second.values.size() == 1) add_reading(f, k, at, number, own->second.values[0]);
+    } else if (const auto other = targets_.find(root); other != targets_.end()) {
+      add_reading(f, k, at, number, *other->second);
+    } else if (root.ends_with("[*]")) {
+      const std::string beginning = root.substr(0, root.size() - 2);
+      for (auto any = targets_.lower_bound(beginning); any != targets_.end() && any->first.starts_with(beginning);
+           ++any)
+        add_reading(f, k, at, number, *any->second);
+    }
+  }
+
+  void add_reading(std::size_t f, std::size_t k, std::size_t at, bool number, const Assigned& source) {
+    if (source.operands.empty() || (source.file == f && source.line == k)) return;
+    const auto where = std::pair(source.file, source.operands[0].begin);
+    if (!places_.contains(where)) return;
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
+    const std::string& text = program_.files[f].text;
+    static const std::set<std::string> kConditions = {"IF", "WHILE", "UNTIL", "SWITCH", "CASE", "FOR", "WAIT"};
+    std::string by;
+    for (std::size_t k2 = 1; k2 < at && !moves && !kConditions.contains(tokens[0].text); ++k2) {
+      if (tokens[k2].text != "=" || tokens[k2 - 1].kind != TokenKind::kWord) continue;
+      by = text.substr(tokens[k2 - 1].begin, tokens[k2 - 1].end - tokens[k2 - 1].begin);
+    }
+    if (number && !moves) {
+      read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", place(f, k)));
+      return;
+    }
+    const Line& line = lines_[f][k];
+    program_.readings.push_back({source.file,
+                                 {source.operands.front().begin, source.operands.back().end},
+                                 text.substr(tokens[at].begin, tokens[at].end - tokens[at].begin),
+                                 f,
+                                 line.number,
+                                 by,
+                                 moves});
+  }
+
   /// Positions of data lists that nothing moves to.
   void list_unused() {
     for (const auto& one : variables_) {
@@ -667,19 +834,26 @@ class Reader {
       const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
                                       [&](const LeftAlone& left) { return upper(left.name) == name; });
       if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
-      program_.left.push_back(
-          {name, at.file, lines_[at.file][at.line].number, "", "no motion in these files goes to it"});
+      program_.left.push_back({spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
+                               "no motion in these files goes to it"});
     }
   }
 
   ReadOptions options_;
   Program program_;
   std::vector<std::vector<Line>> lines_;
+  std::map<std::string, const Assigned*> targets_;  ///< by name, of all files
+  std::set<std::string> words_of_targets_;
   std::vector<Routine> routines_;
   std::map<std::pair<std::string, std::string>, Variable> variables_;
   std::map<std::string, std::string> tool_names_;
+  std::vector<Load> loads_ = std::vector<Load>(1);
+  std::map<std::string, std::size_t> by_name_;                           ///< routines
+  std::map<std::size_t, std::vector<std::vector<std::size_t>>> orders_;  ///< of the lines of each routine
   std::map<std::pair<std::size_t, State>, State> ends_;
+  std::set<std::pair<std::size_t, State>> run_;
   std::set<std::size_t> ran_;
+  std::map<std::pair<std::size_t, std::size_t>, std::string> read_;  ///< why the numbers at a place must stay
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;
   std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;

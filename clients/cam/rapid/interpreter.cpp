@@ -172,7 +172,8 @@ void Interpreter::note_changes() {
       const Expression* root = root_of(assignment.target);
       if (root == nullptr) continue;
       note_change(assignment.target, *own_scope(m, assignment.routine),
-                  fmt::format("{} is set at run time ({})", root->name.text(), place_of(m, assignment.line)));
+                  fmt::format("{} is set at run time ({})", text_of(*root, {m, assignment.routine}),
+                              place_of(m, assignment.line)));
     }
   }
   // A change of a parameter changes what is handed over, through any number of calls.
@@ -193,8 +194,8 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
     const std::size_t at = argument.label.empty() ? position++ : position;
     const Expression* root = root_of(argument);
     if (root == nullptr) continue;
-    const std::string why = fmt::format("{} may be changed by {} ({})", root->name.text(), shown(instruction.spelled),
-                                        place_of(module, instruction.line));
+    const std::string why = fmt::format("{} may be changed by {} ({})", text_of(*root, scope),
+                                        shown(instruction.spelled), place_of(module, instruction.line));
     if (routine) {
       const Routine& called = modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
       const std::string& parameter = !argument.label.empty()         ? argument.label.text()
@@ -298,9 +299,10 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
   switch (expression.kind) {
     case Kind::kName: {
       const auto found = find(expression.name, scope);
-      if (!found) return because(fmt::format("{} is not in the files handed over", shown(expression.name.text())));
+      if (!found) return because(fmt::format("{} is not in the files handed over", shown(text_of(expression, scope))));
       const Declaration& declared = *found->declaration;
-      if (declared.storage == Storage::kLoop) return because(fmt::format("a loop counts {}", shown(declared.name)));
+      if (declared.storage == Storage::kLoop)
+        return because(fmt::format("a loop counts {}", shown(text_of(expression, scope))));
       if (declared.storage == Storage::kParameter) {
         const Told<const Expression*> argument = bound(declared, scope);
         if (!argument) return because(argument.error());
@@ -311,7 +313,7 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
         return std::vector<Data>{{*argument, scope.caller, declared.type, nullptr}};
       }
       if (const std::string why = changed(&declared); !why.empty()) return because(why);
-      if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.name)));
+      if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
       // What a declaration says is looked up where it stands.
       const Scope* where = declared.routine >= 0 ? &scope : own_.at({found->module, -1});
       return std::vector<Data>{{&*declared.value, where, declared.type, &declared}};

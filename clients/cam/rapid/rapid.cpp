@@ -8,6 +8,8 @@
 #include <set>
 #include <tuple>
 
+#include "clients/cam/cell_tools.h"
+#include "clients/cam/flow.h"
 #include "clients/cam/rapid/interpreter.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -82,20 +84,20 @@ class Reader {
         const Data data{&*declared.value, &own(m), declared.type, &declared};
         if (declared.type == "tooldata") {
           ProgramTool tool;
-          tool.name = spelled(m, declared);
+          tool.name = declared.spelled;
           tool.file = program_.files[m].name;
           tool.line = declared.line;
           read_tool(data, tool);
           found.tools.push_back(std::move(tool));
         } else if (declared.type == "wobjdata") {
           ProgramFrame frame;
-          frame.name = spelled(m, declared);
+          frame.name = declared.spelled;
           const Told<Data> parts = aggregate(data, 5);
           if (parts) read_frame(*parts, frame);
           if (!parts) frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
           found.frames.push_back(std::move(frame));
         } else if (declared.type == "loaddata") {
-          if (const auto load = load_of(data)) found.loads.emplace_back(spelled(m, declared), *load);
+          if (const auto load = load_of(data)) found.loads.emplace_back(declared.spelled, *load);
         }
       }
     }
@@ -104,7 +106,8 @@ class Reader {
 
   Program read() {
     note_displacements();
-    for (std::size_t m = 0; m < modules_.size(); ++m) read_motions(m);
+    read_motions();
+    for (std::size_t m = 0; m < modules_.size(); ++m) note_readings(m);
     program_.targets.reserve(sites_.size());
     for (auto& [place, site] : sites_) {
       finish(site);
@@ -127,7 +130,8 @@ class Reader {
   std::size_t known_tool(ProgramTool tool) {
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       const ProgramTool& known = program_.tools[k];
-      if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line)
+      if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line &&
+          known.carries == tool.carries)
         return k;
     }
     program_.tools.push_back(std::move(tool));
@@ -246,17 +250,11 @@ class Reader {
     return StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
   }
 
-  /// The name as it is written: RAPID does not tell cases apart.
-  std::string spelled(std::size_t module, const Declaration& declared) const {
-    const std::string statement = program_.files[module].text.substr(declared.begin, declared.end - declared.begin);
-    const std::size_t at = in_lower_case(statement).find(in_lower_case(declared.name), declared.type.size());
-    return at == std::string::npos ? declared.name : statement.substr(at, declared.name.size());
-  }
-
   std::size_t frame_of(const Expression* argument, const Scope& scope) {
     if (argument == nullptr) return 0;
     ProgramFrame frame;
     frame.name = meaning_->text_of(*argument, scope);
+    if (frame.name.empty()) frame.name = "\\WObj";
     const auto handed = meaning_->handed_over(*argument, scope);
     if (!handed) {
       frame.why_not = handed.error();
@@ -310,32 +308,209 @@ class Reader {
   // Motions.
 
   void leave(std::size_t module, const Instruction& motion, const std::string& name, const std::string& why) {
+    for (std::size_t k = program_.moves.size(); k-- > 0;) {
+      if (program_.moves[k].file != module || program_.moves[k].line != motion.line) continue;
+      program_.moves[k].left_some = true;
+      break;
+    }
     if (left_.emplace(module, motion.line, name).second)
       program_.left.push_back({name, module, motion.line, motion.spelled, why});
   }
 
-  /// From PDispOn or PDispSet to PDispOff in the text of a routine, targets are displaced. Where it is not switched
-  /// off, all motions may be.
+  /// Where a routine leaves targets displaced, all motions may be.
   void note_displacements() {
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       std::map<int, std::string> open;
       for (const Instruction& instruction : modules_[m].instructions) {
-        if (instruction.name == "pdispon" || instruction.name == "pdispset")
-          open[instruction.routine] =
-              fmt::format("{} displaces it ({})", instruction.spelled, meaning_->place_of(m, instruction.line));
+        if (displaces(instruction)) open[instruction.routine] = displacement(m, instruction);
         if (instruction.name == "pdispoff") open.erase(instruction.routine);
-        if (const auto by = open.find(instruction.routine); by != open.end()) displaced_[&instruction] = by->second;
       }
       for (const auto& [routine, why] : open) open_displacement_ = why + ", and is not switched off where it stands";
     }
   }
+  static bool displaces(const Instruction& instruction) {
+    return instruction.name == "pdispon" || instruction.name == "pdispset";
+  }
+  std::string displacement(std::size_t module, const Instruction& instruction) const {
+    return fmt::format("{} displaces it ({})", instruction.spelled, meaning_->place_of(module, instruction.line));
+  }
 
-  void read_motions(std::size_t module) {
-    for (const Instruction& motion : modules_[module].instructions) {
-      if (!is_motion(motion.name) || meaning_->find_routine(motion.name, module)) continue;
-      program_.moves.push_back({module, motion.line, {}, false});
-      read_motion(module, motion);
+  /// An instruction, or a word that decides the order.
+  struct Place {
+    std::size_t module = 0;
+    const Instruction* instruction = nullptr;  ///< nullptr: a word
+  };
+
+  /// The statements of all modules in a row.
+  std::pair<std::vector<Step>, std::vector<Place>> steps() const {
+    std::pair<std::vector<Step>, std::vector<Place>> all;
+    const auto add = [&](Step step, Place place) {
+      all.first.push_back(std::move(step));
+      all.second.push_back(place);
+    };
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      auto turn = modules_[m].turns.begin();
+      const auto add_turns = [&](std::size_t before) {
+        for (; turn != modules_[m].turns.end() && turn->before <= before; ++turn) {
+          Step step = turn->step;
+          if (step.kind == Step::Kind::kRoutine) step.label = fmt::format("{}:{}", m, step.label);
+          add(std::move(step), {m, nullptr});
+        }
+      };
+      const std::vector<Instruction>& instructions = modules_[m].instructions;
+      for (std::size_t i = 0; i < instructions.size(); ++i) {
+        add_turns(i);
+        add(step_of(m, instructions[i]), {m, &instructions[i]});
+      }
+      add_turns(instructions.size());
     }
+    return all;
+  }
+
+  Step step_of(std::size_t module, const Instruction& instruction) const {
+    static const std::set<std::string> kReturns = {"return", "raise", "exit", "exitcycle", "retry", "trynext"};
+    if (is_motion(instruction.name)) return {};
+    if (kReturns.contains(instruction.name)) return {Step::Kind::kReturn};
+    if (instruction.name == "goto" && !instruction.arguments.empty())
+      return {Step::Kind::kJump, instruction.arguments[0].name};
+    const auto routine = meaning_->find_routine(instruction.name, module);
+    if (!routine) return {};
+    return {Step::Kind::kCall, fmt::format("{}:{}", routine->first, routine->second)};
+  }
+
+  /// What holds where a motion begins.
+  struct State {
+    std::size_t load = 0;       ///< of loads_; 0: the tool's own
+    std::size_t displaced = 0;  ///< of displacements_; 0: none
+    bool operator==(const State&) const = default;
+  };
+
+  void set(const Place& place, State& state) {
+    if (place.instruction == nullptr) return;
+    const Instruction& instruction = *place.instruction;
+    if (instruction.name == "gripload") state.load = load_set(place.module, instruction);
+    if (instruction.name == "pdispoff") state.displaced = 0;
+    if (!displaces(instruction)) return;
+    const std::string why = displacement(place.module, instruction);
+    const auto known = std::find(displacements_.begin(), displacements_.end(), why);
+    state.displaced = static_cast<std::size_t>(known - displacements_.begin());
+    if (known == displacements_.end()) displacements_.push_back(why);
+  }
+  void join(State& state, const State& other) {
+    state.displaced = std::max(state.displaced, other.displaced);
+    if (state.load == other.load) return;
+    Load load;
+    load.name = "GripLoad";
+    load.why_not = "GripLoad: a branch, a loop or a caller decides what the robot carries";
+    state.load = known_load(std::move(load));
+  }
+
+  void read_motions() {
+    const auto [steps, places] = this->steps();
+    const std::vector<State> states = states_before(
+        next_of(steps, true), entries_of(steps), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
+        [&](State& state, const State& other) { join(state, other); });
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      const Instruction* motion = places[s].instruction;
+      const std::size_t module = places[s].module;
+      if (motion == nullptr || !is_motion(motion->name) || meaning_->find_routine(motion->name, module)) continue;
+      program_.moves.push_back({module, motion->line, {}, is_arc(motion->name)});
+      state_ = states[s];
+      read_motion(module, *motion);
+    }
+  }
+
+  // Loads.
+
+  struct Load {
+    std::string name;
+    std::optional<StatedLoad> load;
+    std::string note, why_not;
+    bool total = false;  ///< with the tool's own
+    bool operator==(const Load& other) const {
+      return name == other.name && why_not == other.why_not && total == other.total;
+    }
+  };
+
+  std::size_t known_load(Load load) {
+    const auto known = std::find(loads_.begin(), loads_.end(), load);
+    if (known != loads_.end()) return static_cast<std::size_t>(known - loads_.begin());
+    loads_.push_back(std::move(load));
+    return loads_.size() - 1;
+  }
+
+  Load load_called(const Expression& argument, const Scope& scope) const {
+    Load load;
+    load.name = meaning_->text_of(argument, scope);
+    const auto handed = meaning_->handed_over(argument, scope);
+    if (!handed) {
+      load.why_not = handed.error();
+      return load;
+    }
+    const auto& [expression, where] = *handed;
+    load.name = meaning_->text_of(*expression, *where);
+    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
+      if (expression->name == "load0")
+        load.load = StatedLoad{};
+      else
+        load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
+      return load;
+    }
+    const Told<Data> data = named(*expression, *where);
+    if (data) load.load = load_of(*data);
+    if (!load.load)
+      load.why_not = fmt::format("load {}: {}", shown(load.name), data ? "it is not constant" : data.error());
+    return load;
+  }
+
+  /// `GripLoad lPart;`: beside the tool's own load.
+  std::size_t load_set(std::size_t module, const Instruction& instruction) {
+    const std::vector<const Scope*> scopes = meaning_->scopes_of(module, instruction.routine);
+    if (instruction.arguments.empty()) return 0;
+    Load load = load_called(instruction.arguments[0], *scopes[0]);
+    for (const Scope* scope : scopes) {
+      if (!(load_called(instruction.arguments[0], *scope) == load))
+        load.why_not = "GripLoad: its callers decide the load";
+    }
+    if (load.load && is_placeholder(*load.load)) return 0;
+    return known_load(std::move(load));
+  }
+
+  /// The tool with what it carries: `\TLoad` says all of it, else GripLoad what comes to the tool's own.
+  std::size_t tool_carrying(std::size_t tool, const Instruction& motion, const Scope& scope) {
+    std::size_t index = state_.load;
+    for (const Expression& argument : motion.arguments) {
+      if (argument.label != "tload") continue;
+      Load total = load_called(argument, scope);
+      total.total = true;
+      if (!total.load || total.load->mass > 0) index = known_load(std::move(total));
+    }
+    if (index == 0) return tool;
+    const auto [entry, is_new] = carrying_.try_emplace({tool, index}, 0);
+    if (!is_new) return entry->second;
+    const Load& load = loads_[index];
+    ProgramTool carrying = program_.tools[tool];
+    const std::optional<StatedLoad> own = carrying.load;
+    carrying.load = load.load;
+    if (load.load && !load.total) carrying.load = together(*load.load, own, carrying.X_FT);
+    if (own && carrying.load && own->mass == carrying.load->mass && own->p_F == carrying.load->p_F)
+      return entry->second = tool;
+    carrying.carries = load.name;
+    carrying.load_note = load.note;
+    if (carrying.why_not.empty()) carrying.why_not = load.why_not;
+    return entry->second = known_tool(std::move(carrying));
+  }
+
+  /// What the flange bears: a gripped load, whose centre is given in the tool, and the tool's own where it is stated.
+  static StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own,
+                             const std::optional<Pose>& X_FT) {
+    StatedLoad all = gripped;
+    all.has_centre = X_FT.has_value();
+    if (X_FT) all.p_F = *X_FT * gripped.p_F;
+    if (!own || is_placeholder(*own)) return all;
+    all.p_F = (all.p_F * gripped.mass + own->p_F * own->mass) / (gripped.mass + own->mass);
+    all.mass = gripped.mass + own->mass;
+    return all;
   }
 
   void read_motion(std::size_t module, const Instruction& motion) {
@@ -356,8 +531,7 @@ class Reader {
       leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
     };
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
-    const auto displaced = displaced_.find(&motion);
-    if (displaced != displaced_.end()) return leave_it(displaced->second);
+    if (state_.displaced != 0) return leave_it(displacements_[state_.displaced]);
     if (!open_displacement_.empty()) return leave_it(open_displacement_);
     for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
       const Expression* with = tool != nullptr ? tool : tool_argument(motion, positional, *scope);
@@ -368,7 +542,8 @@ class Reader {
       const bool joints = motion.name.starts_with("moveabsj");
       const std::size_t targets = is_arc(motion.name) ? 2 : 1;
       for (std::size_t k = 0; k < std::min(targets, positional.size()); ++k) {
-        use(module, motion, *positional[k], joints, tool_of(*with, *scope), frame_of(frame, *scope), *scope);
+        use(module, motion, *positional[k], joints, tool_carrying(tool_of(*with, *scope), motion, *scope),
+            frame_of(frame, *scope), *scope);
       }
     }
   }
@@ -457,19 +632,32 @@ class Reader {
       else
         same->push_back(&use);
     }
+    const auto read = read_.find(site.uses.front().data.declared);
+    const bool is_read = site.uses.front().data.declared != nullptr && read != read_.end();
+    if ((groups.size() > 1 || is_read) && !options_.split) {
+      for (const Use& use : site.uses) program_.moves[use.move].left_some = true;
+    }
     if (groups.size() > 1 && !options_.split) return leave_ambiguous(site, groups);
+    if (is_read && !options_.split) return leave_read(site, read->second);
     for (std::size_t k = 0; k < groups.size(); ++k) {
-      if (k == 0)
+      if (k == 0 && !is_read)
         add_target(site, groups[k], site.uses.front().data);
       else
         split_off(site, groups[k]);
     }
   }
 
+  void leave_read(const Site& site, const std::string& where) {
+    const Use& first = site.uses.front();
+    program_.left.push_back(
+        {site.name, site.module, first.data.node->line, first.motion->spelled,
+         fmt::format("its numbers are read elsewhere too ({}); --split makes a target of each motion", where)});
+  }
+
   void leave_ambiguous(const Site& site, const std::vector<std::vector<const Use*>>& groups) {
     std::vector<std::string> ways;
     for (const auto& group : groups) {
-      ways.push_back(fmt::format("tool {} in {} ({})", shown(program_.tools[group[0]->tool].name),
+      ways.push_back(fmt::format("tool {} in {} ({})", called(program_.tools[group[0]->tool]),
                                  shown(program_.frames[group[0]->frame].name),
                                  meaning_->place_of(group[0]->module, group[0]->motion->line)));
     }
@@ -523,6 +711,7 @@ class Reader {
     if (why.empty()) why = program_.frames[target.frame].why_not;
     if (!why.empty()) {
       program_.left.push_back({target.name, target.file, target.line, target.motion, why});
+      for (const Use* use : uses) program_.moves[use->move].left_some = true;
       return;
     }
     for (const Use* use : uses) program_.moves[use->move].targets.push_back(program_.targets.size());
@@ -642,6 +831,88 @@ class Reader {
     target.rewrites.push_back(std::move(whole));
   }
 
+  // What else reads the targets that are written anew.
+
+  void note_readings(std::size_t m) {
+    const Module& module = modules_[m];
+    for (const Assignment& assignment : module.assignments) {
+      const std::string by = root_text(assignment.target, m);
+      note_readings(m, {assignment.begin, assignment.end}, assignment.routine, assignment.line, by);
+    }
+    for (const Condition& condition : module.conditions)
+      note_readings(m, {condition.begin, condition.end}, condition.routine, condition.line, "");
+    for (const Instruction& instruction : module.instructions) {
+      const bool motion = is_motion(instruction.name) && !meaning_->find_routine(instruction.name, m);
+      const bool calls = std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
+                                     [](const Expression& argument) { return argument.kind == Kind::kCall; });
+      if (motion && !calls) continue;
+      calls_routine_ = !motion && meaning_->find_routine(instruction.name, m).has_value();
+      moves_ = motion;
+      note_readings(m, {instruction.begin, instruction.end}, instruction.routine, instruction.line, "");
+      calls_routine_ = moves_ = false;
+    }
+  }
+
+  std::string root_text(const Expression& target, std::size_t m) {
+    const Expression* root = &target;
+    while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty()) root = &root->parts[0];
+    return meaning_->text_of(*root, own(m));
+  }
+
+  void note_readings(std::size_t m, const Span& span, int routine, int line, const std::string& by) {
+    if (span.end <= span.begin) return;
+    const std::string_view text = std::string_view(program_.files[m].text).substr(span.begin, span.end - span.begin);
+    const std::vector<Token> tokens = tokens_of(text);
+    const auto word = [&](std::size_t k) {
+      return k < tokens.size() ? text.substr(tokens[k].begin, tokens[k].end - tokens[k].begin) : std::string_view();
+    };
+    for (std::size_t k = 0; k < tokens.size(); ++k) {
+      if (tokens[k].kind != TokenKind::kWord || word(k + 1) == "(") continue;
+      if (k > 0 && (word(k - 1) == "." || word(k - 1) == "\\")) continue;
+      std::size_t behind = k + 1;
+      if (word(behind) == "{") {
+        while (behind < tokens.size() && word(behind) != "}") ++behind;
+        ++behind;
+      }
+      const int dots = (word(behind) == "." ? 1 : 0) + (word(behind) == "." && word(behind + 2) == "." ? 1 : 0);
+      note_reading({m, routine}, std::string(word(k)), dots, line, by);
+    }
+  }
+
+  void note_reading(const Scope& at, const std::string& spelled, int dots, int line, const std::string& by) {
+    Expression name;
+    name.kind = Kind::kName;
+    name.name = in_lower_case(spelled);
+    const auto found = meaning_->find(name.name, at);
+    if (!found || found->declaration->type == "num") return;
+    const bool is_parameter = found->declaration->storage == Storage::kParameter;
+    const std::vector<const Scope*> ways =
+        is_parameter ? meaning_->scopes_of(at.module, at.routine) : std::vector<const Scope*>{&at};
+    for (const Scope* scope : ways) {
+      const Told<std::vector<Data>> all = meaning_->data_of(name, *scope);
+      if (!all) continue;
+      for (const Data& data : *all) {
+        if (data.declared != nullptr && data.declared->value) add_reading(data, at, spelled, dots, line, by);
+      }
+    }
+  }
+
+  void add_reading(const Data& data, const Scope& at, const std::string& spelled, int dots, int line,
+                   const std::string& by) {
+    const Expression& value = *data.declared->value;
+    const std::size_t file = data.scope->module;
+    const auto site = sites_.lower_bound({file, value.begin});
+    if (site == sites_.end() || site->first.first != file || site->first.second >= value.end) return;
+    const bool is_target = data.declared->type == "robtarget" || data.declared->type == "jointtarget";
+    const bool numbers = dots > (is_target ? 0 : 1);
+    if (numbers && !moves_) {
+      read_.emplace(data.declared, meaning_->place_of(at.module, line));
+      return;
+    }
+    if (calls_routine_) return;  // what becomes of it is told there
+    program_.readings.push_back({file, {value.begin, value.end}, spelled, at.module, line, by, moves_});
+  }
+
   /// Declared targets that nothing moves to.
   void list_unused() {
     for (std::size_t m = 0; m < modules_.size(); ++m) {
@@ -652,7 +923,7 @@ class Reader {
         const auto site = sites_.lower_bound({m, value.begin});
         const bool used = site != sites_.end() && site->first.first == m && site->first.second < value.end;
         if (used || named_.contains(declared.name)) continue;
-        program_.left.push_back({declared.name, m, declared.line, "", "no motion in these files goes to it"});
+        program_.left.push_back({declared.spelled, m, declared.line, "", "no motion in these files goes to it"});
       }
     }
   }
@@ -674,7 +945,12 @@ class Reader {
   std::set<std::string> named_;
   std::map<const Expression*, std::size_t> tool_at_, frame_at_;  ///< of Program::tools and frames, by what says them
   std::string open_displacement_;
-  std::map<const Instruction*, std::string> displaced_;
+  std::vector<std::string> displacements_ = std::vector<std::string>(1);
+  std::vector<Load> loads_ = std::vector<Load>(1);
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
+  State state_;  ///< of the motion that is read
+  bool calls_routine_ = false, moves_ = false;
+  std::map<const Declaration*, std::string> read_;  ///< where numbers of a target are read
 };
 
 }  // namespace

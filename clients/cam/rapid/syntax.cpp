@@ -81,6 +81,7 @@ class Parser {
       return declaration();
     }
     if (first == "endproc" || first == "endfunc" || first == "endtrap") {
+      turn(Step::Kind::kEnd);
       routine_ = -1;
       ++at_;
     } else if (first == "if" || first == "elseif") {
@@ -88,20 +89,48 @@ class Parser {
     } else if (first == "for") {
       loop();
     } else if (first == "while") {
+      turn(Step::Kind::kWhile);
+      const std::size_t begin = at_;
       while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
+      note_condition(begin);
       ++at_;
     } else if (first == "test") {
+      turn(Step::Kind::kSwitch);
+      const std::size_t begin = at_;
       while (!at_end() && word() != "case" && word() != "default" && word() != "endtest" && !is_sign(";")) ++at_;
+      note_condition(begin);
     } else if (first == "case") {
+      turn(Step::Kind::kCase);
+      const std::size_t begin = at_;
       while (!at_end() && !is_sign(":") && !is_sign(";")) ++at_;
+      note_condition(begin);
       ++at_;
     } else if (kSingle.contains(first) || is_sign(":", 1)) {
+      note_single(first);
       at_ += is_sign(":", 1) ? 2 : 1;
     } else if (first == "alias") {
       skip_statement();
     } else {
       simple_statement();
     }
+  }
+
+  void turn(Step::Kind kind, std::string label = {}) {
+    module_.turns.push_back({{kind, std::move(label)}, module_.instructions.size()});
+  }
+  void note_single(const std::string& first) {
+    if (first.starts_with("end"))
+      turn(Step::Kind::kEnd);
+    else if (first == "else" || first == "default")
+      turn(Step::Kind::kElse);
+    else if (first == "error" || first == "undo" || first == "backward")
+      turn(Step::Kind::kReturn);
+    else
+      turn(Step::Kind::kLabel, first);
+  }
+  /// From the token `begin` to where the reading is.
+  void note_condition(std::size_t begin) {
+    module_.conditions.push_back({tokens_[begin].begin, token().begin, routine_, tokens_[begin].line});
   }
 
   /// `%%%` heads of module files, `%"name"%;`, or rubbish.
@@ -147,6 +176,7 @@ class Parser {
     if (kind != "const" && kind != "pers" && kind != "var") return skip_statement();
     declared.storage = kind == "const" ? Storage::kConst : kind == "pers" ? Storage::kPers : Storage::kVar;
     declared.type = take_word();
+    declared.spelled = std::string(bytes());
     declared.name = take_word();
     if (is_sign("{")) {
       declared.is_array = true;
@@ -167,6 +197,7 @@ class Parser {
     routine.name = take_word();
     routine.local = local;
     routine_ = static_cast<int>(module_.routines.size());
+    turn(Step::Kind::kRoutine, std::to_string(routine_));
     if (take("(")) parameters(routine);
     module_.routines.push_back(std::move(routine));
   }
@@ -205,7 +236,10 @@ class Parser {
   void condition() {
     ++at_;
     const std::size_t begin = at_;
+    const bool another = at_ > 1 && word_at(at_ - 1) == "elseif";
     while (!at_end() && !is_sign(";") && word() != "then") ++at_;
+    note_condition(begin);
+    turn(another ? Step::Kind::kCase : Step::Kind::kIf);
     if (word() == "then") {
       ++at_;
       return;
@@ -214,8 +248,13 @@ class Parser {
     for (at_ = begin; at_ < end; ++at_) {
       const bool two_words = token().kind == TokenKind::kWord && at_ > begin &&
                              (tokens_[at_ - 1].kind != TokenKind::kSign || is_closing(at_ - 1));
-      if (two_words && !is_operator(word()) && !is_operator(word_at(at_ - 1))) return simple_statement();
+      if (two_words && !is_operator(word()) && !is_operator(word_at(at_ - 1))) {
+        module_.conditions.back().end = token().begin;
+        simple_statement();
+        return turn(Step::Kind::kEnd);
+      }
     }
+    turn(Step::Kind::kEnd);
     at_ = end;
     take(";");
   }
@@ -243,7 +282,10 @@ class Parser {
     counter.name = take_word();
     counter.end = last_end();
     if (!counter.name.empty()) module_.declarations.push_back(std::move(counter));
+    turn(Step::Kind::kWhile);
+    const std::size_t begin = at_;
     while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
+    note_condition(begin);
     ++at_;
   }
 
@@ -253,12 +295,14 @@ class Parser {
     const int line = token().line;
     Expression target = primary(0);
     if (take(":=")) {
+      const std::size_t value_begin = token().begin;
       Expression value = expression();
-      if (is_sign(";")) module_.assignments.push_back({std::move(target), std::move(value), routine_, line});
       // A value that is not understood changes its target all the same.
-      else
-        module_.assignments.push_back({std::move(target), {}, routine_, line});
-      return skip_statement();
+      if (!is_sign(";")) value = {};
+      module_.assignments.push_back({std::move(target), std::move(value), routine_, line, value_begin, 0});
+      skip_statement();
+      module_.assignments.back().end = last_end();
+      return;
     }
     at_ = begin;
     instruction();
@@ -276,7 +320,8 @@ class Parser {
       Expression argument;
       if (take("\\")) {
         const std::string label = take_word();
-        if (take(":=")) argument = expression();
+        // `\WObj?w` hands on what the caller gives.
+        if (take(":=") || take("?")) argument = expression();
         argument.label = label.empty() ? "?" : label;
       } else {
         argument = expression();

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/rapid/tokens.h"
 
 /// What a RAPID module says, as far as targets need it. The whole language is not read: a statement that is not
@@ -68,6 +69,7 @@ enum class Storage { kConst, kPers, kVar, kParameter, kLoop };
 
 struct Declaration {
   std::string name, type;
+  std::string spelled = {};  ///< the name as it stands there
   Storage storage = Storage::kVar;
   bool local = false;  ///< to its module
   int routine = -1;    ///< of the module; -1: of the module itself
@@ -82,6 +84,20 @@ struct Assignment {
   Expression target, value;
   int routine = -1;
   int line = 0;
+  std::size_t begin = 0, end = 0;  ///< of the value
+};
+
+/// What an IF, WHILE, TEST or FOR looks at.
+struct Condition {
+  std::size_t begin = 0, end = 0;
+  int routine = -1;
+  int line = 0;
+};
+
+/// A word that decides the order of instructions.
+struct Turn {
+  Step step;
+  std::size_t before = 0;  ///< which instruction of the module
 };
 
 /// `MoveL p10,v100,fine,tool1\WObj:=wobj1;`, or a call of a procedure.
@@ -113,6 +129,8 @@ struct Module {
   std::vector<Instruction> instructions;
   std::vector<Routine> routines;
   std::vector<Record> records;
+  std::vector<Condition> conditions;
+  std::vector<Turn> turns;  ///< routines are named by their number
 };
 
 /// Never fails: what is not understood is not there.

@@ -5,6 +5,7 @@
 #include <set>
 #include <tl/expected.hpp>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -36,6 +37,23 @@ struct Variable {
   std::string changed;
 };
 
+/// What `set_payload` said.
+struct Load {
+  std::string name;
+  std::optional<StatedLoad> load;
+  std::string why_not;
+};
+
+/// What is set when a motion comes.
+struct State {
+  std::size_t tool = 0, load = 0;  ///< load 0: not said
+  bool operator==(const State&) const = default;
+};
+
+bool is_motion(const Piece& piece) {
+  return piece.is("movel") || piece.is("movej") || piece.is("movep") || piece.is("movec");
+}
+
 class Script {
  public:
   Script(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
@@ -48,21 +66,28 @@ class Script {
 
   void read() {
     program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
-    tool_ = unknown_tool();
+    const std::size_t tool = unknown_tool();
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_assignment(at);
-    for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
-      if (pieces_[at].kind != Piece::Kind::kWord || !pieces_[at + 1].is("(")) continue;
-      if (pieces_[at].is("set_tcp")) set_tool(at);
-      if (pieces_[at].is("movel") || pieces_[at].is("movej") || pieces_[at].is("movep") || pieces_[at].is("movec"))
+    find_steps();
+    const std::vector<State> states = states_before(
+        next_of(steps_), {0}, State{tool, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
+        [&](State& state, const State& other) { join(state, other); });
+    for (std::size_t s = 0; s < steps_.size(); ++s) {
+      const std::size_t at = step_at_[s];
+      if (is_motion(pieces_[at])) {
+        tool_ = tool_carrying(states[s]);
         motion(at);
+      }
       if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
         leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
     }
+    for (std::size_t at = 0; at < pieces_.size(); ++at) note_reading(at);
   }
 
   std::string describe(const Site& site, ProgramTarget& target) const {
     const Value& value = values_.at(site.begin);
     target.line = value.line;
+    if (const auto read = read_.find(site.begin); read != read_.end()) return read->second;
     if (value.kind == Value::Kind::kJoints) {
       if (options_.keep_joints) return "joint targets are kept (--keep-joints)";
       target.coordinates = Coordinates::kJointRadians;
@@ -78,6 +103,163 @@ class Script {
   }
 
  private:
+  /// The words that decide the order, and the functions that move the robot or set something.
+  void find_steps() {
+    using Kind = Step::Kind;
+    static const std::map<std::string_view, Kind> kWords = {
+        {"if", Kind::kIf},      {"elif", Kind::kCase},  {"else", Kind::kElse},         {"while", Kind::kWhile},
+        {"end", Kind::kEnd},    {"break", Kind::kExit}, {"continue", Kind::kContinue}, {"return", Kind::kReturn},
+        {"halt", Kind::kReturn}};
+    const auto defines = [](const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); };
+    std::set<std::string> functions;
+    for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
+      if (defines(pieces_[at])) functions.emplace(pieces_[at + 1].text);
+    }
+    const auto add = [&](Step step, std::size_t at) {
+      steps_.push_back(std::move(step));
+      step_at_.push_back(at);
+    };
+    for (std::size_t at = 0; at < pieces_.size(); ++at) {
+      if (pieces_[at].kind != Piece::Kind::kWord) continue;
+      const bool is_call = at + 1 < pieces_.size() && pieces_[at + 1].is("(");
+      if (defines(pieces_[at]) && at + 1 < pieces_.size()) {
+        add({Kind::kRoutine, std::string(pieces_[at + 1].text)}, at);
+        ++at;  // not a call of it
+      } else if (const auto word = kWords.find(pieces_[at].text); word != kWords.end()) {
+        add({word->second}, at);
+      } else if (is_call) {
+        const std::string name(pieces_[at].text);
+        const bool known = functions.contains(name);
+        add({known ? Kind::kCall : Kind::kPlain, known ? name : ""}, at);
+      }
+    }
+  }
+
+  void set(std::size_t at, State& state) {
+    if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
+    if (pieces_[at].is("set_tcp")) state.tool = tool_set(at);
+    if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") || pieces_[at].is("set_payload_mass") ||
+        pieces_[at].is("set_payload_cog"))
+      state.load = load_set(at, state.load);
+  }
+
+  void join(State& state, const State& other) {
+    const std::string why = "a branch or a loop of the script decides it";
+    if (state.tool != other.tool) {
+      ProgramTool tool;
+      tool.name = "tcp";
+      tool.why_not = "set_tcp: " + why;
+      state.tool = known_tool(std::move(tool));
+    }
+    if (state.load != other.load) state.load = known_load({"set_payload", std::nullopt, "set_payload: " + why});
+  }
+
+  std::size_t known_load(Load load) {
+    for (std::size_t k = 1; k < loads_.size(); ++k) {
+      const Load& known = loads_[k];
+      const bool same = known.load.has_value() == load.load.has_value() &&
+                        (!load.load || (known.load->mass == load.load->mass && known.load->p_F == load.load->p_F &&
+                                        known.load->has_centre == load.load->has_centre));
+      if (same && known.why_not == load.why_not) return k;
+    }
+    loads_.push_back(std::move(load));
+    return loads_.size() - 1;
+  }
+
+  /// `set_payload(40, [0, 0, 0.1])`: all that the flange carries, kg and m.
+  std::size_t load_set(std::size_t at, std::size_t before) {
+    const std::string where =
+        fmt::format("{} ({} line {})", pieces_[at].text, program_.files[index_].name, pieces_[at].line);
+    Load load{where, std::nullopt, ""};
+    StatedLoad stated;
+    stated.has_centre = false;
+    const std::optional<StatedLoad>& known = loads_[before].load;
+    std::size_t next = at + 2;
+    bool constant = true;
+    if (pieces_[at].is("set_payload_cog")) {
+      if (!known) return before;
+      stated = *known;
+    } else {
+      if (known && pieces_[at].is("set_payload_mass")) stated = *known;
+      constant = next + 1 < pieces_.size() && pieces_[next].kind == Piece::Kind::kNumber &&
+                 (pieces_[next + 1].is(",") || pieces_[next + 1].is(")"));
+      if (constant) stated.mass = read_number(pieces_[next].text).value_or(WrittenNumber{}).value;
+      next += 2;
+    }
+    if (constant && !pieces_[at].is("set_payload_mass") && next < pieces_.size() && pieces_[next - 1].text != ")") {
+      std::vector<double> centre;
+      constant = pieces_[next].is("[");
+      for (++next; constant && next < pieces_.size() && !pieces_[next].is("]"); ++next) {
+        if (pieces_[next].kind == Piece::Kind::kNumber)
+          centre.push_back(read_number(pieces_[next].text).value_or(WrittenNumber{}).value);
+        else if (!pieces_[next].is(","))
+          constant = false;
+      }
+      constant = constant && centre.size() == 3;
+      if (constant) stated.p_F = Vector3(centre[0], centre[1], centre[2]);
+      stated.has_centre = true;
+    }
+    if (constant)
+      load.load = stated;
+    else
+      load.why_not = where + " is not constant";
+    return known_load(std::move(load));
+  }
+
+  std::size_t known_tool(ProgramTool tool) {
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      const ProgramTool& known = program_.tools[k];
+      const bool same_pose = known.X_FT && tool.X_FT && known.X_FT->isApprox(*tool.X_FT, 1e-12);
+      const bool both_unknown = !known.X_FT && !tool.X_FT && known.why_not == tool.why_not && !tool.why_not.empty();
+      if ((same_pose || both_unknown) && known.carries == tool.carries && known.why_not == tool.why_not) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
+  }
+
+  /// The tool as a motion has it.
+  std::size_t tool_carrying(const State& state) {
+    if (state.load == 0) return state.tool;
+    const auto [entry, is_new] = carrying_.try_emplace({state.tool, state.load}, 0);
+    if (!is_new) return entry->second;
+    const Load& load = loads_[state.load];
+    ProgramTool tool = program_.tools[state.tool];
+    tool.carries = load.name;
+    tool.load = load.load;
+    if (tool.why_not.empty()) tool.why_not = load.why_not;
+    return entry->second = known_tool(std::move(tool));
+  }
+
+  /// What else reads a target that is written anew: `b = hole`, `if hole[2] > 0.5:`.
+  void note_reading(std::size_t at) {
+    if (pieces_[at].kind != Piece::Kind::kWord) return;
+    const auto variable = variables_.find(std::string(pieces_[at].text));
+    if (variable == variables_.end() || !variable->second.changed.empty()) return;
+    const Value& value = variable->second.value;
+    if (!values_.contains(value.begin) || value.numbers.empty()) return;
+    const bool set_here =
+        at + 1 < pieces_.size() && pieces_[at + 1].is("=") && !pieces_[std::min(at + 2, pieces_.size() - 1)].is("=");
+    const bool gone_to = at > 1 && pieces_[at - 1].is("(") && is_motion(pieces_[at - 2]);
+    if (set_here || gone_to) return;
+    std::size_t first = at;
+    while (first > 0 && pieces_[first - 1].line == pieces_[at].line) --first;
+    const bool moves = is_motion(pieces_[first]);
+    if (at + 1 < pieces_.size() && pieces_[at + 1].is("[") && !moves) {
+      read_.emplace(value.begin, fmt::format("its numbers are read elsewhere too ({} line {})",
+                                             program_.files[index_].name, pieces_[at].line));
+      return;
+    }
+    if (pieces_[first].is("global") || pieces_[first].is("local")) ++first;
+    const bool assigns = first + 1 < at && pieces_[first + 1].is("=");
+    program_.readings.push_back({index_,
+                                 {value.begin, value.end},
+                                 std::string(pieces_[at].text),
+                                 index_,
+                                 pieces_[at].line,
+                                 assigns ? std::string(pieces_[first].text) : "",
+                                 moves});
+  }
+
   std::size_t unknown_tool() {
     ProgramTool tool;
     tool.name = "tcp";
@@ -187,7 +369,7 @@ class Script {
     return *left * *right;
   }
 
-  void set_tool(std::size_t at) {
+  std::size_t tool_set(std::size_t at) {
     std::size_t next = at + 2;
     const Told<Pose> X_FT = pose_of_value(value_at(next), 0);
     ProgramTool tool;
@@ -199,24 +381,18 @@ class Script {
       tool.X_FT = *X_FT;
     else
       tool.why_not = fmt::format("set_tcp (line {}): {}", tool.line, X_FT.error());
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      const ProgramTool& known = program_.tools[k];
-      if (known.X_FT && tool.X_FT && known.X_FT->isApprox(*tool.X_FT, 1e-12)) {
-        tool_ = k;
-        return;
-      }
-    }
-    program_.tools.push_back(std::move(tool));
-    tool_ = program_.tools.size() - 1;
+    return known_tool(std::move(tool));
   }
 
   void leave(const Piece& motion, const std::string& name, const std::string& why) {
+    if (is_motion(motion)) program_.moves.back().left_some = true;
     program_.left.push_back({name, index_, motion.line, std::string(motion.text), why});
   }
 
   void motion(std::size_t at) {
     if (program_.frames.empty()) program_.frames.push_back({"base", Pose::Identity(), ""});
     program_.moves.push_back({index_, pieces_[at].line, {}, false});
+    program_.moves.back().is_arc = pieces_[at].is("movec");
     std::size_t next = at + 2;
     const int count = pieces_[at].is("movec") ? 2 : 1;
     for (int k = 0; k < count; ++k) {
@@ -294,6 +470,11 @@ class Script {
   const ReadOptions& options_;
   const std::string& text_;
   std::vector<Piece> pieces_;
+  std::vector<Step> steps_;
+  std::vector<std::size_t> step_at_;  ///< the piece of each
+  std::vector<Load> loads_ = std::vector<Load>(1);
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
+  std::map<std::size_t, std::string> read_;  ///< why the numbers at a place must stay
   std::size_t tool_ = 0;
   std::map<std::string, Variable> variables_;
   std::map<std::size_t, Value> values_;
