@@ -50,7 +50,7 @@ const std::vector<Mistake>& mistakes() {
       {"a port that is none", {"status", "--port", "abc"}, 2, "", "--port"},
       {"a port out of range", {"status", "--port", "99999"}, 2, "", "--port"},
       {"a domain out of range", {"status", "--domain", "300"}, 2, "", "--domain"},
-      {"a host that is not this one", {"status", "--host", "192.0.2.1", "--timeout", "0.3"}, 2, "", "", 0, ""},
+      {"a host that is not this one", {"status", "--host", "192.0.2.1", "--timeout", "0.3"}, 2, "", "--host", 0, "127.0.0.1"},
       {"an unknown criterion",
        {"plan", "--cell", "${CELL}", "--count", "5", "--criterion", "lsh", "-o", "p"},
        2,

@@ -81,6 +81,8 @@ class Udp {
 };
 
 Found network(const std::string& host) {
+  if (const Status usable = check_host(host); !usable)
+    return {"network", State::kBad, usable.error().message, usable.error().next};
   Udp udp;
   const int why = udp.bind(host, 0);
   if (why != 0) {

@@ -1,10 +1,17 @@
 #include "clients/cli/terminal/options.h"
 
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
+#include "server/base/plain_text.h"
 #include "server/robot/cell.h"
 
 namespace trammel::cli {
@@ -44,7 +51,27 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options) 
   add_service_options(command, options, "Said or not: this command always asks a running trammeld");
 }
 
+Status check_host(const std::string& host) {
+  std::vector<std::string> own;
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return {};
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in place{};
+    std::memcpy(&place, one->ifa_addr, sizeof place);
+    std::array<char, INET_ADDRSTRLEN> text{};
+    if (::inet_ntop(AF_INET, &place.sin_addr, text.data(), text.size()) != nullptr) own.emplace_back(text.data());
+  }
+  ::freeifaddrs(all);
+  if (std::find(own.begin(), own.end(), host) != own.end()) return {};
+  return failure(ErrorCode::kUsage, "--host '{}': no interface of this host has this address", shown_short(host))
+      .of("--host")
+      .with_text(shown_short(host))
+      .next(fmt::format("it has {}", fmt::join(own, ", ")));
+}
+
 Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
+  if (const Status usable = check_host(options.host); !usable) return tl::make_unexpected(usable.error());
   client::SessionOptions session;
   session.address = options.host;
   session.domain = options.domain;

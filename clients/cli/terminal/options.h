@@ -29,6 +29,8 @@ struct ServiceOptions {
 void add_service_options(CLI::App& command, ServiceOptions& options);
 /// Of commands that only a service can carry out: `--service` may be said and changes nothing.
 void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
+/// kUsage for a host that is no address of an interface of this host: DDS would hear nothing on it.
+[[nodiscard]] Status check_host(const std::string& host);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 
 /// A number above 0.
