@@ -116,6 +116,8 @@ class Judge {
     return comparison_.batch().measurements[static_cast<std::size_t>(pose)].pose_id;
   }
 
+  /// What the best alternative is to be held against: where the tracker stands elsewhere too, that alone.
+  [[nodiscard]] Fit without_the_cause(const Tried& none, const Alternative& best) const;
   [[nodiscard]] Triage told(const Tried& none) const;
   [[nodiscard]] std::string sentence(const Triage& triage) const;
 
@@ -123,6 +125,14 @@ class Judge {
   const Alternatives& alternatives_;
   std::vector<Tried> tried_;  // that explain the batch
 };
+
+Fit Judge::without_the_cause(const Tried& none, const Alternative& best) const {
+  if (!best.tracker_elsewhere) return none.fit;
+  for (const Alternative& one : alternatives_.from(0, "")) {
+    if (batch_triage::moves_base(record_of(one.cause))) return comparison_.fit(one);
+  }
+  return none.fit;
+}
 
 Triage Judge::told(const Tried& none) const {
   Triage triage;
@@ -140,8 +150,9 @@ Triage Judge::told(const Tried& none) const {
     triage.cause = best.alternative.cause;
     triage.tracker_elsewhere = best.alternative.tracker_elsewhere;
     triage.learn = !best.alternative.harmful;
-    triage.effect_rms = std::sqrt((none.fit.residual - best.fit.residual).squaredNorm() / comparison_.poses());
-    triage.effect_rotation_rms = std::sqrt((none.fit.turn - best.fit.turn).squaredNorm() / comparison_.poses());
+    const Fit before = without_the_cause(none, best.alternative);
+    triage.effect_rms = std::sqrt((before.residual - best.fit.residual).squaredNorm() / comparison_.poses());
+    triage.effect_rotation_rms = std::sqrt((before.turn - best.fit.turn).squaredNorm() / comparison_.poses());
     for (std::size_t k = 1; k < tried_.size(); ++k) {
       if (tried_[k].fit.score > best.fit.score + kDoubt || tried_[k].alternative.cause.cause.empty()) continue;
       triage.could_also_be.push_back(tried_[k].alternative.cause);
@@ -187,7 +198,10 @@ std::string Judge::sentence(const Triage& triage) const {
     return fmt::format("as the model in force expects it but for single poses: {}", fmt::join(triage.outliers, ", "));
   }
   std::string text = triage.cause.pose_id.empty() ? "" : fmt::format("from pose {} on ", triage.cause.pose_id);
-  text += fmt::format("{} ({})", what_happened(triage.cause), how_much(triage));
+  text += what_happened(triage.cause);
+  // How far poses lie apart as two set-ups see them says nothing of the robot.
+  const bool set_up_anew = triage.cause.pose_id.empty() && batch_triage::moves_base(record_of(triage.cause));
+  if (!set_up_anew) text += fmt::format(" ({})", how_much(triage));
   if (triage.tracker_elsewhere) text += ", and the tracker stands elsewhere";
   for (const Cause& other : triage.could_also_be) {
     text +=

@@ -71,6 +71,7 @@ TEST_F(TriageTest, ATrackerSetUpElsewhereIsHarmlessHoweverFar) {
     EXPECT_TRUE(moved.cause.pose_id.empty());
     EXPECT_TRUE(moved.learn);
     EXPECT_LT(moved.misfit_after, 1.3);
+    EXPECT_EQ(moved.sentence.find(" mm"), std::string::npos) << "two set-ups apart is no error: " << moved.sentence;
   }
 }
 
@@ -87,6 +88,9 @@ TEST_F(TriageTest, AnotherToolWhileTheTrackerStandsElsewhereIsToldAsBoth) {
   EXPECT_EQ(tool.cause.cause, "tool_changed") << tool.sentence;
   EXPECT_TRUE(tool.tracker_elsewhere);
   EXPECT_FALSE(tool.learn);
+  // sqrt(14) mm, of which the set-up took a part: how far the tracker moved is not in it.
+  EXPECT_GT(tool.effect_rms, 1e-3) << tool.sentence;
+  EXPECT_LT(tool.effect_rms, 4e-3) << tool.sentence;
 }
 
 TEST_F(TriageTest, AnotherPayloadIsToldAndKeptApart) {

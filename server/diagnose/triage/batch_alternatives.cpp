@@ -14,12 +14,6 @@ bool is_of_the_arm(const CauseRecord& record) {
   return record.lasting == Lasting::kAlways && (record.scope == Scope::kArm || record.scope == Scope::kJoint);
 }
 
-/// Whether it is told by the base standing elsewhere.
-bool moves_base(const CauseRecord& record) {
-  const causes::Rival* whole = whole_of(record);
-  return whole != nullptr && cause_spelled(whole->cause).part == Part::kBase;
-}
-
 /// The source that a step of `joint` is when it acts at all poses: that of the whole, or the step itself where it is
 /// but one of the whole's numbers.
 std::string as_a_whole(const CauseRecord& record, int joint) {
@@ -61,6 +55,11 @@ bool set_free(Alternative& one, const std::string& spec, std::vector<bool>& set)
 }
 
 }  // namespace
+
+bool moves_base(const CauseRecord& record) {
+  const causes::Rival* whole = whole_of(record);
+  return whole != nullptr && cause_spelled(whole->cause).part == Part::kBase;
+}
 
 Alternative Alternatives::none() const { return started({}, physics_); }
 

@@ -7,6 +7,9 @@
 
 namespace trammel::batch_triage {
 
+/// Whether the cause is told by the base standing elsewhere, as the tracker sees it.
+[[nodiscard]] bool moves_base(const CauseRecord& record);
+
 /// The alternatives that a model and a batch allow.
 class Alternatives {
  public:
