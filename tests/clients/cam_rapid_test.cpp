@@ -272,8 +272,8 @@ TEST(Rapid, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
 
 TEST(Rapid, ATargetWhoseNumbersAreReadElsewhereStaysUnlessItIsSplit) {
   for (const std::string& reading :
-       {"    h:=pA.trans.y;\n", "    IF pA.trans.x=0 Stop;\n", "    IF pA.trans.x=0 THEN\n    ENDIF\n",
-        "    look pA.trans;\n", "    height pA;\n"}) {
+       std::vector<std::string>{"    h:=pA.trans.y;\n", "    IF pA.trans.x=0 Stop;\n",
+                                "    IF pA.trans.x=0 THEN\n    ENDIF\n", "    look pA.trans;\n", "    height pA;\n"}) {
     const std::string text =
         program(target("pA", "0,125,400") + "  VAR num h;\n",
                 reading + move_l("pA") + "  ENDPROC\n  PROC height(robtarget p)\n    h:=p.trans.z;\n");
