@@ -33,7 +33,8 @@ class Finding {
     find_joints();
     if (doubts_ > 0)
       found_.notes.push_back(fmt::format(
-          "{} targets: what the program says of the configuration contradicts itself, see their messages", doubts_));
+          "{} targets: what the program says of the configuration contradicts itself; the branch is followed",
+          doubts_));
     return std::move(found_);
   }
 
