@@ -24,7 +24,7 @@ void add_service_options(CLI::App& command, ServiceOptions& options, const std::
   command.add_flag("--service", options.service, help)->group("Service");
   command
       .add_option("--host", options.host,
-                  "IPv4 address that the service listens on, one of this host's (its key address; 127.0.0.1 is usual)")
+                  "IPv4 address that the service listens on: `address` in its server file, 127.0.0.1 as shipped")
       ->capture_default_str()
       ->group("Service");
   command.add_option("--port", options.ports, "UDP port of the service on this host; once for each replica")
