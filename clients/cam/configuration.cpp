@@ -16,15 +16,18 @@ constexpr double kNoBranch = 1e9;
 constexpr int kBranches = 8;
 constexpr double kOpen = 0.01;       // rad: a wrist that is open more decides joints 4 and 6
 constexpr double kStretched = 1e-9;  // rad: a wrist that is open less is stretched
+// rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that is off by less is of
+// the branch that was meant. Controllers do not ask for more.
+constexpr double kNextQuarter = kPi / 4;
 
-/// Where the branch that is said has joints outside the quarter turns that are said, which joints and how. A stretched
-/// wrist leaves joints 4 and 6 open.
+/// Where the branch that is said has joints far outside the quarter turns that are said, which joints and how. A
+/// stretched wrist leaves joints 4 and 6 open.
 std::string contradiction(const Configuration& said, const JointVector& q) {
   std::vector<std::string> joints;
   for (std::size_t j = 0; said.conf && j < said.near.size(); ++j) {
     const double value = q(static_cast<Eigen::Index>(j));
     const bool open = j < 3 || std::abs(q(4)) > kOpen;
-    if (!said.near[j] || !open || std::abs(value - *said.near[j]) <= kPi / 4 + 0.02) continue;
+    if (!said.near[j] || !open || std::abs(value - *said.near[j]) <= kPi / 4 + kNextQuarter) continue;
     joints.push_back(fmt::format("joint {} at {:.1f} deg and not at {:.0f} to {:.0f} deg", j + 1, to_deg(value),
                                  to_deg(*said.near[j] - kPi / 4), to_deg(*said.near[j] + kPi / 4)));
   }

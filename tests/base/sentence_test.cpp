@@ -56,11 +56,17 @@ std::string of_batch(const std::string& text) { return said(parse_batch(text, "l
 
 TEST(Sentence, OfBatches) {
   const std::string header = "q1_deg,x_mm,y_mm,z_mm\n";
-  EXPECT_EQ(of_batch(""), "lt-07.csv: empty file, expected a header line with column names");
+  EXPECT_EQ(of_batch(""),
+            "lt-07.csv: empty file, expected a header line with column names; trammel help formats says which columns");
   EXPECT_EQ(of_batch(header), "lt-07.csv: no measurements below the header, at least 1 is needed");
-  EXPECT_EQ(of_batch("q1_deg,x_mm,y_mm\n1,2,3\n"), "lt-07.csv: missing column z_mm; the header has: q1_deg,x_mm,y_mm");
-  EXPECT_EQ(of_batch(header + "1,2,3\n"), "lt-07.csv row 2: 3 values, the header has 4 columns");
-  EXPECT_EQ(of_batch(header + "1,2,3,4\n1,1.5mm,3,4\n"), "lt-07.csv row 3: x_mm is '1.5mm', expected a number");
+  EXPECT_EQ(of_batch("q1_deg,x_mm,y_mm\n1,2,3\n"),
+            "lt-07.csv: missing column z_mm; the header has: q1_deg,x_mm,y_mm; trammel help formats tells them all");
+  EXPECT_EQ(of_batch(header + "1,2,3\n"),
+            "lt-07.csv row 2: 3 values, the header has 4 columns; a value that is not known stays empty between its "
+            "separators");
+  EXPECT_EQ(of_batch(header + "1,2,3,4\n1,1.5mm,3,4\n"),
+            "lt-07.csv row 3: x_mm is '1.5mm', expected a number; write it with digits alone: the unit stands in the "
+            "column's name");
   EXPECT_EQ(of_batch(header + "nan,2,3,4\n"), "lt-07.csv row 2: q1_deg is nan, expected a finite number");
   EXPECT_EQ(of_batch(header + "1,2,3e7,4\n"), "lt-07.csv row 2: y_mm is 3e+07, limit 1e+06");
   EXPECT_EQ(of_batch("q1_deg,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,4,1,0,0,0.1\n"),
@@ -70,7 +76,9 @@ TEST(Sentence, OfBatches) {
   EXPECT_EQ(of_batch("Main p1 1 2 3\n"),
             "lt-07.csv: measured points without the joints that were commanded; join them with the plan by pose_id "
             "first: trammel convert --points POINTS --joints PLAN -o BATCH");
-  EXPECT_EQ(of_batch("J1,X,Y,Z\n1,2,c,4\n"), "lt-07.csv row 2: Y is 'c', expected a number");
+  EXPECT_EQ(
+      of_batch("J1,X,Y,Z\n1,2,c,4\n"),
+      "lt-07.csv row 2: Y is 'c', expected a number; write it with digits alone: the unit stands in the column's name");
 }
 
 TEST(Sentence, OfWhatTheCellDoesNotTake) {

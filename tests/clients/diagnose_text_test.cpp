@@ -37,6 +37,7 @@ TEST(DiagnoseText, TellsWhenAStepMayHaveBegunAndOnceWhatACauseNeeds) {
 
 TEST(DiagnoseText, SaysWhatWouldNotHaveBeenNamedForCertainAndWhatIsNoNoise) {
   Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  diagnosis.instrument = 11e-6;
   EXPECT_NE(diagnosis_text(diagnosis_json(diagnosis)).find("150 poses, noise of one measurement 13 um per axis"),
             std::string::npos);
   diagnosis.instrument = 2e-6;

@@ -146,6 +146,9 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"import", "  trammel import --cell cell-7 --model cell-7.model"},
     {"audit", "  trammel audit --cell cell-7"},
     {"history", "  trammel history --cell cell-7 -o history.html"},
+    {"backup",
+     "  trammel backup --store data/trammel.db -o monday.db\n"
+     "  trammel backup --check monday.db"},
     {"help", "  trammel help\n  trammel help formats\n  trammel help train"},
     {"doctor", "  trammel doctor\n  trammel doctor --port 17501 --store data/trammel.db --json -"},
     {"completion",

@@ -299,12 +299,18 @@ std::string meant_by(const std::string& column, const std::vector<std::string>& 
   std::vector<std::string> names;
   for (const std::string& name : columns) names.push_back(lower_case(name));
   const auto spelled = [&](const std::string& name) -> const std::string& {
-    return columns[static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin())];
+    return *std::find_if(columns.begin(), columns.end(),
+                         [&](const std::string& one) { return lower_case(one) == name; });
   };
   const auto stem = [](const std::string& name) { return name.substr(0, name.find_first_of("_ ([")); };
   for (const std::string& name : names) {
     if (stem(name) == stem(column) && column.find('_') != std::string::npos) return spelled(name);
   }
+  // `x_mm` and `y_mm`, `q1_deg` and `q2_deg` are near to each other and mean different things.
+  constexpr std::size_t kTellsNothing = 2;
+  std::erase_if(names, [&](const std::string& name) {
+    return stem(name) != stem(column) && (stem(name).size() <= kTellsNothing || stem(column).size() <= kTellsNothing);
+  });
   const std::string near = near_miss(column, names);
   return near.empty() ? "" : spelled(near);
 }

@@ -1,7 +1,10 @@
 #include "server/trainer/acceptance/fits_cell.h"
 
-#include <algorithm>
+#include <fmt/ranges.h>
+
 #include <array>
+#include <string>
+#include <vector>
 
 namespace trammel {
 
@@ -19,8 +22,8 @@ bool same_robot(const Chain& a, const Chain& b) {
   return true;
 }
 
-/// Whether the tools and payloads that the model was trained with are still what the cell says they are.
-bool same_tools(const CompensatedModel& model, const Cell& cell) {
+/// The tools and payloads that the model was trained with and that are no longer what the cell says they are.
+std::vector<std::string> other_tools(const CompensatedModel& model, const Cell& cell) {
   const auto same_pose = [](const std::optional<Pose>& a, const std::optional<Pose>& b) {
     return a.has_value() == b.has_value() && (!a || a->matrix() == b->matrix());
   };
@@ -30,13 +33,15 @@ bool same_tools(const CompensatedModel& model, const Cell& cell) {
     return now != present.end() && now->second.mass == known.at(name).mass &&
            now->second.p_FoCog_F == known.at(name).p_FoCog_F;
   };
-  const auto& trained_with = model.parts().trained_with;
-  return std::all_of(trained_with.begin(), trained_with.end(), [&](const auto& pair) {
-    const auto& [tool, payload] = pair;
+  std::vector<std::string> others;
+  for (const auto& [tool, payload] : model.parts().trained_with) {
     const auto now = cell.tools.find(tool);
-    return now != cell.tools.end() && same_pose(now->second, model.cell().tools.at(tool)) &&
-           same_payload(model.cell().payloads, cell.payloads, payload);
-  });
+    if (now == cell.tools.end() || !same_pose(now->second, model.cell().tools.at(tool)))
+      others.push_back(fmt::format("tool {}", tool));
+    if (!same_payload(model.cell().payloads, cell.payloads, payload))
+      others.push_back(fmt::format("payload {}", payload));
+  }
+  return others;
 }
 
 }  // namespace
@@ -45,9 +50,11 @@ Status check_fits_cell(const CompensatedModel& model, const Cell& cell, const st
   if (!same_robot(model.cell().robot, cell.robot)) {
     return refused("{} was trained for another robot than cell {} has", which, cell.name).of("robot");
   }
-  if (!same_tools(model, cell)) {
-    return refused("{} was trained with other tools or payloads than cell {} has under these names", which, cell.name)
-        .of("tools");
+  if (const std::vector<std::string> others = other_tools(model, cell); !others.empty()) {
+    return refused("{} was trained with other tools or payloads than cell {} has under these names: {}", which,
+                   cell.name, fmt::join(others, ", "))
+        .of("tools")
+        .with_text(others.front());
   }
   return {};
 }
