@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kUnitLength = 1e-3;   // how far a quaternion may be from length 1, as in files
 constexpr double kHottest = 1000;      // degrees Celsius, either side of zero
-constexpr double kFarthest_mm = 1e6;   // of a position, as in files
+constexpr double kFarthestMm = 1e6;    // of a position, as in files
 constexpr double kLargestJoint = 1e6;  // deg, of a rail mm
 
 bool is_rail(const Chain& robot, int joint) { return robot.joint(joint).type == JointType::kPrismatic; }
@@ -46,8 +46,8 @@ api::Pose to_api(const Pose& X_AB) {
 Result<Pose> from_api(const api::Pose& X_AB) {
   const Vector3 p_mm(X_AB.xyz_mm[0], X_AB.xyz_mm[1], X_AB.xyz_mm[2]);
   for (const double mm : X_AB.xyz_mm) {
-    if (!(std::abs(mm) <= kFarthest_mm))
-      return refused("position is {} mm, limit {:.0f}", mm, kFarthest_mm).of("xyz_mm").beyond(mm, kFarthest_mm);
+    if (!(std::abs(mm) <= kFarthestMm))
+      return refused("position is {} mm, limit {:.0f}", mm, kFarthestMm).of("xyz_mm").beyond(mm, kFarthestMm);
   }
   const Eigen::Quaterniond R(X_AB.q_wxyz[0], X_AB.q_wxyz[1], X_AB.q_wxyz[2], X_AB.q_wxyz[3]);
   if (!(std::abs(R.norm() - 1) <= kUnitLength)) {

@@ -406,7 +406,9 @@ class Reader {
   }
 
   void read_motions() {
-    const auto [steps, places] = this->steps();
+    const auto found = this->steps();
+    const auto& steps = std::get<0>(found);
+    const auto& places = std::get<1>(found);
     const std::vector<State> states = states_before(
         next_of(steps, true), entries_of(steps), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
         [&](State& state, const State& other) { join(state, other); });
