@@ -343,6 +343,25 @@ TEST(CoupledPosterior, ServesFromNearPosesWhatAllSay) {
   }
 }
 
+TEST(CoupledPosterior, NearPosesTakeFromTheColumnsWhatAllTakeOfThem) {
+  struct Limit {
+    double signal_over_noise, share;  // of the functions' own variance, far below that of a measurement
+  };
+  for (const Limit& limit : {Limit{0.1, 0.04}, Limit{0.3, 0.1}}) {
+    const ServedCase served(limit.signal_over_noise);
+    const CoupledPosterior near = served.posterior(VarianceForm::kServed);
+    const CoupledPosterior all = served.posterior(VarianceForm::kExact);
+    ASSERT_EQ(near.outputs_from_near_points(), 3) << limit.signal_over_noise;
+    const MatrixXd targets = turns(150, 74);
+    for (const auto& target : targets.rowwise()) {
+      const MatrixXd H = arm_columns(served.blocks, target);
+      const Eigen::Array3d a = predict_one(near, target, H).covariance.diagonal();
+      const Eigen::Array3d b = predict_one(all, target, H).covariance.diagonal();
+      EXPECT_LT(((a - b) / b).abs().maxCoeff(), limit.share) << limit.signal_over_noise;
+    }
+  }
+}
+
 TEST(CoupledPosterior, TakesNearPosesWhereTheyAreEnoughAndOnlyThere) {
   EXPECT_EQ(ServedCase(0.1).posterior(VarianceForm::kServed).outputs_from_near_points(), 3);
   EXPECT_EQ(ServedCase(5.0).posterior(VarianceForm::kServed).outputs_from_near_points(), 0);
