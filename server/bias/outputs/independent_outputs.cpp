@@ -37,15 +37,16 @@ class IndependentOutputs final : public BiasOutputs {
     return mean;
   }
 
-  std::vector<OutputPrediction> predict(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
-    const MatrixXd means = mean(q, features);
+  std::vector<OutputPrediction> predict(const MatrixXd& q,
+                                        const std::vector<BiasFeatures>& /*features*/) const override {
+    VectorXd means(q.rows());
     std::vector<OutputPrediction> predictions(static_cast<std::size_t>(q.rows()),
                                               {VectorXd(count()), MatrixXd::Zero(count(), count()), 0.0});
     for (Index d = 0; d < count(); ++d) {
-      const std::vector<PosteriorVariance> variance = at(d).variance(q);
+      const std::vector<PosteriorVariance> variance = at(d).variance(q, means.data());
       for (std::size_t i = 0; i < predictions.size(); ++i) {
         OutputPrediction& prediction = predictions[i];
-        prediction.mean[d] = means(static_cast<Index>(i), d);
+        prediction.mean[d] = means[static_cast<Index>(i)];
         prediction.covariance(d, d) = variance[i].posterior;
         if (d < kOfOneUnit)
           prediction.prior_share = std::max(prediction.prior_share, variance[i].posterior / variance[i].prior);

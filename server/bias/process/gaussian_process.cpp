@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -287,12 +288,14 @@ bool GaussianProcess::near_is_enough(Index count, const VectorXd& most_of_points
   for (Index i = 0; i < size_; i += (size_ + kLeftOutPoints - 1) / kLeftOutPoints) {
     const FeatureBlock point = rows_of(*features_, i, 1);
     kernel_->diagonal(parameters_, point, &prior);
-    if (near.left_of(point, prior, i) > most_of_points[i]) return false;
+    AlignedMatrix covariance = near.covariance_with(point);
+    covariance(i, 0) = -std::numeric_limits<double>::infinity();
+    if (near.left_of(covariance, prior) > most_of_points[i]) return false;
   }
   for (Index i = 0; i < asked.rows; ++i) {
     const FeatureBlock target = {asked.data + i, 1, asked.ld};
     kernel_->diagonal(parameters_, target, &prior);
-    if (near.left_of(target, prior) > most[i]) return false;
+    if (near.left_of(near.covariance_with(target), prior) > most[i]) return false;
   }
   return true;
 }
@@ -333,7 +336,8 @@ void GaussianProcess::mean(const MatrixXd& q, double* out) const {
                         out);
 }
 
-std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std::vector<NearWeights>* near) const {
+std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std::vector<NearWeights>* near,
+                                                         double* mean) const {
   const MatrixXd targets = target_features(*kernel_, parameters_, q);
   VectorXd posterior(q.rows());
   VectorXd prior(q.rows());
@@ -344,9 +348,14 @@ std::vector<PosteriorVariance> GaussianProcess::variance(const MatrixXd& q, std:
     const NearPoints points = near_points(near_);
     for (Index i = 0; i < q.rows(); ++i) {
       NearWeights* weights = near == nullptr ? nullptr : &(*near)[static_cast<std::size_t>(i)];
-      posterior[i] = points.left_of(rows_of(targets, i, 1), prior[i], -1, weights);
+      const AlignedMatrix covariance = points.covariance_with(rows_of(targets, i, 1));
+      posterior[i] = points.left_of(covariance, prior[i], weights);
+      // Fused: a product of its own would be denormal for far points, and slow.
+      if (mean != nullptr)
+        numerics().transposed_product(size_, 1, covariance.data(), size_, 1, weights_.data(), size_, mean + i, 1);
     }
   } else {
+    if (mean != nullptr) this->mean(q, mean);
     const VarianceTable& table = compressed_ ? *compressed_ : exact_;
     table.shares(*kernel_, parameters_, asked, posterior.data(), prior.data());
   }

@@ -124,9 +124,11 @@ class GaussianProcess {
   /// Posterior mean at `count` joint vectors (rows of `q`), m.
   void mean(const Eigen::MatrixXd& q, double* out) const;
 
-  /// `near`: the points that each variance was computed from, where near ones are enough; else it becomes empty.
+  /// `near`: the points that each variance was computed from, where near ones are enough; else it becomes empty. `mean`
+  /// takes the posterior mean, too, equal to mean() but for rounding: cheaper than asking for both.
   [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q,
-                                                        std::vector<NearWeights>* near = nullptr) const;
+                                                        std::vector<NearWeights>* near = nullptr,
+                                                        double* mean = nullptr) const;
 
   /// Whether variances are computed from near points.
   [[nodiscard]] bool is_near_enough() const { return near_ > 0; }

@@ -110,8 +110,7 @@ LocalExperts::Committee LocalExperts::committee(const MatrixXd& q) const {
   VectorXd prior(count);
   VectorXd mean(count);
   for (const GaussianProcess& expert : experts_) {
-    expert.mean(q, mean.data());
-    const std::vector<PosteriorVariance> variance = expert.variance(q);
+    const std::vector<PosteriorVariance> variance = expert.variance(q, nullptr, mean.data());
     for (Index i = 0; i < count; ++i) {
       const PosteriorVariance& at = variance[static_cast<std::size_t>(i)];
       const double posterior = std::max(at.posterior, kKnownExactly * at.prior);
@@ -131,9 +130,10 @@ void LocalExperts::mean(const MatrixXd& q, double* out) const {
   Eigen::Map<VectorXd>(out, q.rows()) = committee(q).mean;
 }
 
-std::vector<PosteriorVariance> LocalExperts::variance(const MatrixXd& q) const {
-  if (experts_.size() == 1) return experts_.front().variance(q);
+std::vector<PosteriorVariance> LocalExperts::variance(const MatrixXd& q, double* mean) const {
+  if (experts_.size() == 1) return experts_.front().variance(q, nullptr, mean);
   const Committee joined = committee(q);
+  if (mean != nullptr) Eigen::Map<VectorXd>(mean, q.rows()) = joined.mean;
   std::vector<PosteriorVariance> variances;
   for (Index i = 0; i < q.rows(); ++i) variances.push_back({joined.posterior[i], joined.prior[i]});
   return variances;

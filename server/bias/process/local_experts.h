@@ -36,7 +36,8 @@ class LocalExperts {
   }
 
   void mean(const Eigen::MatrixXd& q, double* out) const;
-  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q) const;
+  /// `mean` takes the mean, too, which is cheaper than asking for both.
+  [[nodiscard]] std::vector<PosteriorVariance> variance(const Eigen::MatrixXd& q, double* mean = nullptr) const;
 
   [[nodiscard]] double signal_variance() const { return experts_.front().signal_variance(); }
   [[nodiscard]] double noise_variance() const { return experts_.front().noise_variance(); }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "server/numerics/aligned_matrix.h"
@@ -16,28 +15,35 @@ using Eigen::VectorXd;
 using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, NearPoints::kMost, NearPoints::kMost>;
 using Few = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, NearPoints::kMost, 1>;
 
-constexpr Index kChunksOfEach = 4;
+constexpr Index kLanesOfEach = 4;
 
-/// At least `count` of `k` are as large: the `count`-th largest of the largest of each chunk.
-double least_of_largest(const double* k, Index size, Index count) {
-  const Index chunk = std::max<Index>(1, size / (kChunksOfEach * count));
-  std::vector<double> most;
-  most.reserve(static_cast<std::size_t>(size / chunk + 1));
-  for (Index i = 0; i < size; i += chunk) most.push_back(*std::max_element(k + i, k + std::min(size, i + chunk)));
-  const auto last = most.begin() + (count - 1);
-  std::nth_element(most.begin(), last, most.end(), std::greater<>());
-  return *last;
+/// The largest of each lane: lane c of `lanes` holds k[c], k[c + lanes], ... They are compared side by side.
+Eigen::ArrayXd largest_of_lanes(const Eigen::Map<const Eigen::ArrayXd>& k, Index lanes) {
+  Eigen::ArrayXd most = k.head(lanes);
+  Index first = lanes;
+  for (; first + lanes <= k.size(); first += lanes) most = most.max(k.segment(first, lanes));
+  const Index rest = k.size() - first;
+  most.head(rest) = most.head(rest).max(k.tail(rest));
+  return most;
 }
 
-/// The places of the `count` largest of `k`, rising; of equal ones the first.
-std::vector<Index> largest(const double* k, Index size, Index count) {
-  const double least = least_of_largest(k, size, count);
+/// The places of the `count` largest of `k`, rising; of equal ones the first. At least `count` are as large as the
+/// `count`-th largest of the lanes, and only lanes with a large one are looked into.
+std::vector<Index> largest(const Eigen::Map<const Eigen::ArrayXd>& k, Index count) {
+  const Index lanes = std::min(k.size(), kLanesOfEach * count);
+  const Eigen::ArrayXd most = largest_of_lanes(k, lanes);
+  Eigen::ArrayXd sorted = most;
+  std::nth_element(sorted.data(), sorted.data() + (count - 1), sorted.data() + lanes, std::greater<>());
+  const double least = sorted[count - 1];
   std::vector<Index> found;
   found.reserve(static_cast<std::size_t>(3 * count));
-  for (Index i = 0; i < size; ++i) {
-    if (k[i] >= least) found.push_back(i);
+  for (Index lane = 0; lane < lanes; ++lane) {
+    if (most[lane] < least) continue;
+    for (Index i = lane; i < k.size(); i += lanes) {
+      if (k[i] >= least) found.push_back(i);
+    }
   }
-  const auto larger = [k](Index a, Index b) { return k[a] != k[b] ? k[a] > k[b] : a < b; };
+  const auto larger = [&k](Index a, Index b) { return k[a] != k[b] ? k[a] > k[b] : a < b; };
   std::nth_element(found.begin(), found.begin() + (count - 1), found.end(), larger);
   found.resize(static_cast<std::size_t>(count));
   std::sort(found.begin(), found.end());
@@ -46,18 +52,20 @@ std::vector<Index> largest(const double* k, Index size, Index count) {
 
 }  // namespace
 
-double NearPoints::left_of(const FeatureBlock& target, double prior, Index left_out, NearWeights* weights) const {
-  const Index size = noise.size();
-  AlignedMatrix cross(features.rows(), 1);
-  kernel.tile(parameters, rows_of(features, 0, size), target, cross.data(), cross.rows());
-  if (left_out >= 0) cross(left_out, 0) = -std::numeric_limits<double>::infinity();
-  std::vector<Index> found = largest(cross.data(), size, count);
+AlignedMatrix NearPoints::covariance_with(const FeatureBlock& target) const {
+  AlignedMatrix covariance(features.rows(), 1);
+  kernel.tile(parameters, rows_of(features, 0, noise.size()), target, covariance.data(), covariance.rows());
+  return covariance;
+}
+
+double NearPoints::left_of(const AlignedMatrix& covariance, double prior, NearWeights* weights) const {
+  std::vector<Index> found = largest(Eigen::Map<const Eigen::ArrayXd>(covariance.data(), noise.size()), count);
 
   AlignedMatrix near(padded_rows(count), features.cols());
   Few known(count);
   for (Index i = 0; i < count; ++i) {
     const Index point = found[static_cast<std::size_t>(i)];
-    known[i] = cross(point, 0);
+    known[i] = covariance(point, 0);
     near.map().row(i) = features.map().row(point);
   }
   AlignedMatrix between(near.rows(), count);

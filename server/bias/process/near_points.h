@@ -25,10 +25,13 @@ struct NearPoints {
   const Eigen::VectorXd& noise;   ///< of each point, relative to σ_f²
   Eigen::Index count;             ///< of near ones; at most kMost, and fewer than there are points
 
-  /// In units of σ_f². `target`: one row of features, `prior` its variance without data. Without the point `left_out`,
-  /// if there is one. Tells the points and their weights, too, where it is asked for them.
-  [[nodiscard]] double left_of(const FeatureBlock& target, double prior, Eigen::Index left_out = -1,
-                               NearWeights* weights = nullptr) const;
+  /// The covariance of a target (one row of features) with each point, a padded column in units of σ_f².
+  [[nodiscard]] AlignedMatrix covariance_with(const FeatureBlock& target) const;
+
+  /// The variance that is left of `prior`, that of a target without data, in units of σ_f². `covariance`: the target's
+  /// with each point; minus infinity takes a point out. Tells the points and their weights, too, where it is asked for
+  /// them.
+  [[nodiscard]] double left_of(const AlignedMatrix& covariance, double prior, NearWeights* weights = nullptr) const;
 };
 
 }  // namespace trammel
