@@ -6,7 +6,6 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include <mutex>
 #include <sstream>
 
+#include "idl/quiet_library.h"
 #include "server/base/line_output.h"
 
 namespace trammel::wire {
@@ -38,6 +38,7 @@ Duration_t to_duration(std::chrono::milliseconds time) {
 class LibraryErrors final : public dds::LogConsumer {
  public:
   void Consume(const dds::Log::Entry& entry) override {
+    if (QuietLibrary::lives()) return;
     std::ostringstream line;
     print_timestamp(line, entry, false);
     print_header(line, entry, false);
@@ -73,11 +74,11 @@ Status check_address(const std::string& address) {
   if (inet_pton(AF_INET, address.c_str(), &name.sin_addr) != 1) {
     return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address);
   }
-  const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const bool bound = probe >= 0 && bind(probe, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
-  if (probe >= 0) close(probe);
-  if (!bound)
-    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address);
+  const std::vector<std::string> own = own_addresses();
+  if (std::find(own.begin(), own.end(), address) == own.end()) {
+    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address)
+        .next(fmt::format("it has {}", fmt::join(own, ", ")));
+  }
   return {};
 }
 
@@ -85,6 +86,23 @@ rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
   rtps::Locator_t result;
   rtps::IPLocator::createLocator(LOCATOR_KIND_UDPv4, address, port, result);
   return result;
+}
+
+/// The builtin plugins of DDS-Security. The governance says what is signed and encrypted.
+void set_security(dds::PropertyPolicyQos& properties, const Security& security) {
+  const auto say = [&](const std::string& name, const std::string& value) {
+    properties.properties().emplace_back("dds.sec." + name, value);
+  };
+  const auto file = [&](const char* name) { return "file://" + security.folder + "/" + name; };
+  say("auth.plugin", "builtin.PKI-DH");
+  say("auth.builtin.PKI-DH.identity_ca", file("identity_ca.cert.pem"));
+  say("auth.builtin.PKI-DH.identity_certificate", file("cert.pem"));
+  say("auth.builtin.PKI-DH.private_key", file("key.pem"));
+  say("access.plugin", "builtin.Access-Permissions");
+  say("access.builtin.Access-Permissions.permissions_ca", file("permissions_ca.cert.pem"));
+  say("access.builtin.Access-Permissions.governance", file("governance.p7s"));
+  say("access.builtin.Access-Permissions.permissions", file("permissions.p7s"));
+  say("crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
 template <typename Qos>
@@ -152,11 +170,17 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   builtin.metatrafficUnicastLocatorList.push_back(locator(options.address, options.listen_port));
   for (const std::uint16_t port : options.peer_ports)
     builtin.initialPeersList.push_back(locator(options.address, port));
+  for (const HostPort& peer : options.peers) builtin.initialPeersList.push_back(locator(peer.address, peer.port));
+  if (options.security) set_security(qos.properties(), *options.security);
   if (options.heard_of_itself) builtin.initialPeersList.push_back(locator(options.address, options.listen_port));
 
   dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, discovery, dds::StatusMask::none());
   if (participant == nullptr) {
+    if (options.security) {
+      return refused("DDS-Security refuses what is in it for domain {}: see the errors of the library", options.domain)
+          .in(options.security->folder);
+    }
     return failure(ErrorCode::kInternal, "cannot create a DDS participant on {} in domain {}", options.address,
                    options.domain);
   }

@@ -16,12 +16,15 @@
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "idl/domain_gate.h"
 #include "idl/safe_type.h"
+#include "idl/security.h"
 #include "idl/topics.h"
+#include "server/base/host_port.h"
 #include "server/base/result.h"
 
 /// How samples travel: one participant set-up and one set of QoS for the server and all clients.
@@ -39,6 +42,8 @@ struct ParticipantOptions {
   std::shared_ptr<HeardOfItself> heard_of_itself = {};
   /// Counts what the guard drops.
   std::shared_ptr<DropCounts> dropped = std::make_shared<DropCounts>();
+  std::vector<HostPort> peers = {};       ///< where else it looks for others: on other hosts, too
+  std::optional<Security> security = {};  ///< who it is, and what it may do; empty: everybody is believed
 };
 
 struct ParticipantDeleter {

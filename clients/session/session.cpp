@@ -1,6 +1,7 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "clients/session/parts.h"
 #include "clients/session/server_watch.h"
 #include "idl/limits.h"
+#include "idl/quiet_library.h"
 
 namespace trammel::client {
 namespace {
@@ -51,11 +53,40 @@ bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == 
 template <typename Caller>
 Status open_caller(std::unique_ptr<Caller>& caller, wire::dds::DomainParticipant& participant,
                    wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, const std::string& partition,
-                   ServerWatch& watch) {
+                   ServerWatch& watch, bool may_be_forbidden) {
+  std::optional<wire::QuietLibrary> quiet;
+  if (may_be_forbidden) quiet.emplace();
   auto opened = Caller::open(participant, publisher, subscriber, partition, watch);
+  if (!opened && may_be_forbidden) return {};
   if (!opened) return tl::make_unexpected(opened.error());
   caller = std::move(*opened);
   return {};
+}
+
+/// The same options with every server as a place, and the address of this host that leads there.
+Result<SessionOptions> completed(SessionOptions options) {
+  if (options.servers.empty()) {
+    for (const std::uint16_t port : options.server_ports) options.servers.push_back({options.address, port});
+    return options;
+  }
+  return own_address_towards(options.servers.front().address).map([&](std::string address) {
+    options.address = std::move(address);
+    return options;
+  });
+}
+
+Result<wire::ParticipantPtr> participant_of(const SessionOptions& options) {
+  wire::ParticipantOptions how;
+  how.name = "trammel client";
+  how.domain = options.domain;
+  how.address = options.address;
+  how.peers = options.servers;
+  if (!options.security.empty()) {
+    auto security = wire::read_security(options.security);
+    if (!security) return tl::make_unexpected(security.error());
+    how.security = std::move(*security);
+  }
+  return wire::make_participant(how);
 }
 
 }  // namespace
@@ -79,9 +110,9 @@ struct Session::Participant {
 
   /// For error messages: how long it looked, on which ports, in which domain.
   [[nodiscard]] std::string where_it_looked() const {
-    std::string ports;
-    for (const std::uint16_t port : options.server_ports) ports += fmt::format(" {}:{}", options.address, port);
-    return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), ports, options.domain);
+    std::string places;
+    for (const HostPort& place : options.servers) places += " " + to_string(place);
+    return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), places, options.domain);
   }
 
   /// An error reply of the server is an error here, and one of no server says where it was looked for.
@@ -99,12 +130,13 @@ struct Session::Participant {
   /// Sends one request. A server that is busy has not done it and is asked again when it says, until the deadline; a
   /// change keeps its id.
   template <typename Operation>
-  [[nodiscard]] Result<typename Operation::Reply::type> call(Caller<Operation>& caller,
+  [[nodiscard]] Result<typename Operation::Reply::type> call(const std::unique_ptr<Caller<Operation>>& caller,
                                                              const typename Operation::Request::type& request,
                                                              const Route& route) {
+    if (!caller) return not_allowed(Operation::kName);
     const auto until = deadline();
     while (true) {
-      auto reply = caller.call(request, route, until);
+      auto reply = caller->call(request, route, until);
       const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
       const auto again = Clock::now() + std::chrono::milliseconds(
                                             is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
@@ -120,7 +152,7 @@ struct Session::Participant {
     request.action(action);
     request.change(to_wire(change));
     request.reason(change.reason);
-    return call<wire::ManageModels>(*manage_models, request, {cell, {}, true});
+    return call<wire::ManageModels>(manage_models, request, {cell, {}, true});
   }
 
   [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -129,7 +161,7 @@ struct Session::Participant {
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
     request.reason(change.reason);
-    const auto reply = call<wire::ReleaseBatches>(*release_batches, request, {cell, {}, true});
+    const auto reply = call<wire::ReleaseBatches>(release_batches, request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
@@ -139,13 +171,13 @@ struct Session::Participant {
                                                    wire::ReadKind what, wire::ReadModelsRequest request = {}) {
     request.about().cell(cell);
     request.what(what);
-    return call<wire::ReadModels>(*read_models, request, {cell, server, false});
+    return call<wire::ReadModels>(read_models, request, {cell, server, false});
   }
 
   /// From every server.
   [[nodiscard]] Result<std::vector<wire::ReadModelsReply>> read_all(const std::string& cell, wire::ReadKind what,
                                                                     const wire::ReadModelsRequest& asked = {}) {
-    const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
+    const auto known = watch->wait_for_servers(options.servers.size(), deadline());
     if (known.empty()) return tl::make_unexpected(no_server());
     std::vector<wire::ReadModelsReply> replies;
     for (const KnownServer& server : known) {
@@ -154,6 +186,12 @@ struct Session::Participant {
       replies.push_back(std::move(*reply));
     }
     return replies;
+  }
+
+  [[nodiscard]] Failure not_allowed(const char* operation) const {
+    return refused("these permissions do not allow {}", operation)
+        .in(options.security)
+        .next("whoever issues permissions gives a role that may; see deploy/security/README.md");
   }
 
   [[nodiscard]] Error no_server() const {
@@ -173,7 +211,7 @@ struct Session::Participant {
 
   /// The server that has the job, and its present state.
   [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
-    const auto known = watch->wait_for_servers(options.server_ports.size(), deadline());
+    const auto known = watch->wait_for_servers(options.servers.size(), deadline());
     Error last = no_server();
     for (const KnownServer& server : known) {
       auto found = job(server.id(), number);
@@ -185,9 +223,9 @@ struct Session::Participant {
 
   /// Sends `items` in parts, all to be answered by one model.
   template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
-  [[nodiscard]] Result<Answer<Item>> call_in_parts(Caller<Operation>& caller, const CallContext& context,
-                                                   const std::vector<Wire>& items, const ShareListener& progress,
-                                                   const Put& put, const Get& get) {
+  [[nodiscard]] Result<Answer<Item>> call_in_parts(const std::unique_ptr<Caller<Operation>>& caller,
+                                                   const CallContext& context, const std::vector<Wire>& items,
+                                                   const ShareListener& progress, const Put& put, const Get& get) {
     const AskPart<Item> ask = [&](std::size_t first, std::size_t count) -> Result<Answer<Item>> {
       typename Operation::Request::type request;
       request.about(to_wire(context));
@@ -209,11 +247,16 @@ struct Session::Participant {
   }
 };
 
-Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
+Result<std::string> check_security(const std::string& folder) {
+  return wire::read_security(folder).map([](const wire::Security& security) { return security.subject; });
+}
+
+Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
   auto inside = std::make_unique<Participant>();
-  inside->options = options;
-  auto participant =
-      wire::make_participant({"trammel client", options.domain, options.address, 0, options.server_ports});
+  auto options = completed(asked);
+  if (!options) return tl::make_unexpected(options.error());
+  inside->options = *std::move(options);
+  auto participant = participant_of(inside->options);
   if (!participant) return tl::make_unexpected(participant.error());
   inside->participant = std::move(*participant);
 
@@ -227,10 +270,12 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options) {
   auto watch = ServerWatch::open(*inside->participant, *states);
   if (!watch) return tl::make_unexpected(watch.error());
   inside->watch = std::move(*watch);
+  const bool secured = !inside->options.security.empty();
   const auto open_all = [&](auto&... callers) {
     Status opened;
-    ((opened =
-          opened ? open_caller(callers, *inside->participant, *requests, *replies, partition, *inside->watch) : opened),
+    ((opened = opened
+                   ? open_caller(callers, *inside->participant, *requests, *replies, partition, *inside->watch, secured)
+                   : opened),
      ...);
     return opened;
   };
@@ -261,7 +306,7 @@ Result<Answer<PredictedError>> Session::predict_error_at(const CallContext& cont
   items.reserve(poses.size());
   for (const CommandedJoints& pose : poses) items.push_back(to_wire(pose));
   return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      *participant_->predict_error, context, items, progress,
+      participant_->predict_error, context, items, progress,
       [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
       [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
 }
@@ -273,7 +318,7 @@ Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& cont
   items.reserve(targets.size());
   for (const TargetMm& target : targets) items.push_back(to_wire(target));
   return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
-      *participant_->correct_target, context, items, progress,
+      participant_->correct_target, context, items, progress,
       [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
       [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
 }
@@ -286,8 +331,8 @@ Result<std::int64_t> Session::submit_measurements(const std::string& cell, const
   request.about().cell(cell);
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::SubmitMeasurements>(*participant_->submit_measurements,
-                                                                  std::move(request), {cell, {}, true});
+  const auto reply = participant_->call<wire::SubmitMeasurements>(participant_->submit_measurements, std::move(request),
+                                                                  {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -300,7 +345,7 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   request.batch_ids(batch_ids);
   request.level(level);
   request.bias(bias);
-  const auto reply = participant_->call<wire::Train>(*participant_->train, std::move(request), {cell, {}, true});
+  const auto reply = participant_->call<wire::Train>(participant_->train, std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -325,8 +370,8 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
   const Route route{cell, {}, true};
   if (apply) {
-    const auto reply = participant_->call<wire::Train>(*participant_->train,
-                                                       training_of_diagnosis(cell, batch_id, csv, change), route);
+    const auto reply =
+        participant_->call<wire::Train>(participant_->train, training_of_diagnosis(cell, batch_id, csv, change), route);
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
@@ -335,7 +380,7 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   request.change_id(change_id(change));
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::Diagnose>(*participant_->diagnose, std::move(request), route);
+  const auto reply = participant_->call<wire::Diagnose>(participant_->diagnose, std::move(request), route);
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -350,7 +395,7 @@ Result<std::int64_t> Session::check_health(const std::string& cell, const std::s
   request.csv(csv);
   request.tolerance_mm(tolerance_mm);
   const auto reply =
-      participant_->call<wire::CheckHealth>(*participant_->check_health, std::move(request), Route{cell, {}, true});
+      participant_->call<wire::CheckHealth>(participant_->check_health, std::move(request), Route{cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -486,7 +531,7 @@ Result<int> Session::import_model(const std::string& cell, const std::string& te
 
 Result<std::vector<ServerStatus>> Session::servers() {
   const auto& options = participant_->options;
-  const auto known = participant_->watch->wait_for_servers(options.server_ports.size(), participant_->deadline());
+  const auto known = participant_->watch->wait_for_servers(options.servers.size(), participant_->deadline());
   if (known.empty()) return tl::make_unexpected(participant_->no_server());
   std::vector<ServerStatus> servers;
   for (const KnownServer& server : known) servers.push_back(from_wire(server.status));

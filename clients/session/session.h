@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/session/session_types.h"
+#include "server/base/host_port.h"
 #include "server/base/result.h"
 
 /// The DDS client that other programs link. No Fast DDS type appears here.
@@ -19,7 +20,17 @@ struct SessionOptions {
   std::vector<std::uint16_t> server_ports = {17500};  ///< on `address`, one per replica
   std::chrono::milliseconds timeout{5000};  ///< of one request, discovery included; a long call is many requests
   std::string address = "127.0.0.1";        ///< IPv4 that the servers listen on, one of this host's; else kUsage
+  /// Servers anywhere. Where there are some, `server_ports` and `address` are not looked at, and the interface is the
+  /// one that leads to the first of them.
+  std::vector<HostPort> servers = {};
+  /// Folder with the certificate, key and permissions that DDS-Security asks for (deploy/security/README.md); empty:
+  /// without. What the permissions do not allow is kRefused.
+  std::string security = {};
 };
+
+/// The subject of the certificate in a folder of SessionOptions::security. Refuses what a session would refuse there,
+/// with the reason.
+[[nodiscard]] Result<std::string> check_security(const std::string& folder);
 
 /// One DDS participant with its own reply partition. Thread-safe; calls from several threads overlap. Errors:
 /// kUnreachable when no server answered in time, else the error of the server. A request without an answer is sent once

@@ -44,6 +44,8 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("server", present.dds.server_id, file.dds.server_id, &plan.later);
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
   leave("dds: peer_ports", present.dds.peer_ports, file.dds.peer_ports, &plan.later);
+  leave("dds: peers", present.dds.peers, file.dds.peers, &plan.later);
+  leave("dds: security", present.dds.security, file.dds.security, &plan.later);
   leave("dds: compute_workers", present.dds.compute_workers, file.dds.compute_workers, &plan.later);
   leave("dds: max_clients", present.dds.max_clients, file.dds.max_clients, &plan.later);
   leave("trainer: max_poses", present.trainer.max_poses, file.trainer.max_poses, &plan.later);

@@ -46,7 +46,8 @@ std::string server_id(const YamlMap& map, const std::string& key) {
   return id;
 }
 
-/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed.
+/// Reads an IPv4 address. Refuses others than loopback unless the network is allowed, and unless it is said who may do
+/// what there, or that everybody may do everything.
 std::string address(const YamlMap& map, const std::string& otherwise) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
@@ -57,6 +58,12 @@ std::string address(const YamlMap& map, const std::string& otherwise) {
   if (!loopback && !map.boolean("allow_network", false)) {
     map.refuse("address",
                refused("{} leaves this host", text).with_text(text).next("say allow_network: true if that is meant"));
+  }
+  if (!loopback && map.is_null("security") && !map.boolean("without_security", false)) {
+    map.refuse("address", refused("whoever reaches {} could change models", text)
+                              .with_text(text)
+                              .next("name certificates (security: FOLDER, see deploy/security/README.md), or say "
+                                    "without_security: true if that is meant"));
   }
   return text;
 }
@@ -78,15 +85,31 @@ std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
   return ports;
 }
 
-void read_dds(const YamlMap& map, DdsOptions& dds) {
-  map.only({"domain", "address", "allow_network", "port", "peer_ports", "compute_workers", "max_clients",
-            "client_requests", "client_mb", "queued_requests", "queued_mb", "cell_share"});
+std::vector<HostPort> peers(const YamlMap& map) {
+  std::vector<HostPort> places;
+  if (!map.has("peers")) return places;
+  for (const std::string& text : map.texts("peers")) {
+    const auto place = parse_host_port(text, DdsOptions{}.port);
+    if (!place) map.refuse("peers", refused("{}", place.error().message).with_text(text));
+    places.push_back(*place);
+  }
+  return places;
+}
+
+void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOptions& dds) {
+  map.only({"domain", "address", "allow_network", "without_security", "security", "port", "peer_ports", "peers",
+            "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests", "queued_mb",
+            "cell_share"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
   map.attempt([&] { dds.address = address(map, dds.address); });
   map.attempt([&] { dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535)); });
   map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
+  map.attempt([&] { dds.peers = peers(map); });
+  map.attempt([&] {
+    if (!map.is_null("security")) dds.security = (folder / map.text("security")).string();
+  });
   map.attempt([&] { dds.compute_workers = integer_within(map, "compute_workers", dds.compute_workers, 1, 64); });
   map.attempt([&] { dds.max_clients = integer_within(map, "max_clients", dds.max_clients, 1, 10000); });
   map.attempt([&] { dds.client_requests = integer_within(map, "client_requests", dds.client_requests, 1, 10000); });
@@ -195,7 +218,7 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
         static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
   });
   map.attempt([&] {
-    if (map.has("dds")) read_dds(map.map("dds"), config.dds);
+    if (map.has("dds")) read_dds(map.map("dds"), folder, config.dds);
   });
   map.attempt([&] {
     if (map.has("trainer")) read_trainer(map.map("trainer"), config.trainer);

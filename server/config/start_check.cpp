@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/text_file.h"
+#include "server/dds/dds_service.h"
 #include "server/dds/port_lock.h"
 #include "server/http/http_server.h"
 #include "server/store/store_check.h"
@@ -70,6 +71,8 @@ StartCheck check_start(const ServerReading& server, const std::string& path) {
     const Status http = was_read(server, "http") ? check_http_options(config.http) : Status();
     if (!http) wrong(http.error().code == ErrorCode::kConflict ? "http: port" : "http: address", http.error());
   }
+  const Status security = was_read(server, "dds") ? check_security(config.dds.security) : Status();
+  if (!security) wrong("dds: security", security.error());
   if (!config.log.file.empty()) {
     if (const Status log = check_writable(config.log.file); !log) wrong("log: file", log.error());
   }

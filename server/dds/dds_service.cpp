@@ -108,6 +108,11 @@ class ThreadName {
   std::array<char, 16> before_{};
 };
 
+Result<std::optional<wire::Security>> security_of(const std::string& folder) {
+  if (folder.empty()) return std::nullopt;
+  return wire::read_security(folder).map([](wire::Security security) { return std::optional(std::move(security)); });
+}
+
 }  // namespace
 
 class DdsService::Running {
@@ -125,9 +130,12 @@ class DdsService::Running {
     auto events = std::make_unique<ServiceEvents>();
     const auto heard = std::make_shared<wire::HeardOfItself>();
     const auto dropped = std::make_shared<wire::DropCounts>();
-    auto participant = wire::make_participant({"trammel server " + options.server_id, options.domain, options.address,
-                                               options.port, options.peer_ports, heard, dropped},
-                                              events.get());
+    const auto security = security_of(options.security);
+    if (!security) return tl::make_unexpected(security.error());
+    auto participant =
+        wire::make_participant({"trammel server " + options.server_id, options.domain, options.address, options.port,
+                                options.peer_ports, heard, dropped, options.peers, *security},
+                               events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
     if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
@@ -201,6 +209,7 @@ class DdsService::Running {
     now.misdirected = core_.counts.misdirected;
     now.unreadable = *core_.unreadable;
     now.lost = core_.counts.lost;
+    now.strangers = events_->strangers().count;
     for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
       const auto reason = static_cast<wire::Dropped>(i);
       now.dropped_packets[wire::name_of(reason)] = dropped_->of(reason);
@@ -272,6 +281,7 @@ class DdsService::Running {
       }
       ++status_steps_;
       if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
+      if (const auto refused = strangers_.due(events_->strangers(), Clock::now())) packet_listener_(*refused);
       const bool clients_wait = channels_.tend();
       ++status_steps_;
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
@@ -341,11 +351,16 @@ class DdsService::Running {
   std::atomic<std::uint64_t> status_steps_{0};
   std::shared_ptr<const wire::DropCounts> dropped_;
   std::optional<PacketReport> packets_;  // of the status thread
+  StrangerReport strangers_;             // likewise
   PacketListener packet_listener_;
   std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
 };
+
+Status check_security(const std::string& folder) {
+  return security_of(folder).map([](const auto&) {});
+}
 
 DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry)
     : options_(std::move(options)), trainer_(trainer), store_(store), registry_(registry) {}

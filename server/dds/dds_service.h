@@ -15,6 +15,9 @@
 
 namespace trammel {
 
+/// What start() would refuse in the folder of certificates and permissions (idl/security.h); nothing where it is empty.
+[[nodiscard]] Status check_security(const std::string& folder);
+
 /// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
 /// requests (schedule/lane.h: DdsOptions::compute_workers for each of PredictError and CorrectTarget, some for what
 /// reads and some for what changes), one that sends replies which had to wait, and one that publishes its status every
@@ -26,8 +29,8 @@ class DdsService {
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
-  /// Called with a sentence for the log when packets have been dropped (idl/guard), at most once a minute, in a thread
-  /// of the service. Set it before start().
+  /// Called with a sentence for the log when packets have been dropped (idl/guard) or participants refused, each at
+  /// most once a minute, in a thread of the service. Set it before start().
   void set_packet_listener(std::function<void(const std::string& dropped)> listener);
   /// Called when a request was to change something, or was refused, in the thread that answers it. Set it before
   /// start().

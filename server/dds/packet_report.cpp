@@ -19,4 +19,13 @@ std::optional<std::string> PacketReport::due(Time now) {
   return "packets were dropped unread: " + reasons;
 }
 
+std::optional<std::string> StrangerReport::due(const Strangers& strangers, PacketReport::Time now) {
+  if (strangers.count == told_ || (told_at_ && now - *told_at_ < PacketReport::kAtMostEvery)) return std::nullopt;
+  const std::uint64_t more = strangers.count - told_;
+  told_ = strangers.count;
+  told_at_ = now;
+  return fmt::format("participants without the right certificate or permissions were refused: {} tries, the last of {}",
+                     more, strangers.last);
+}
+
 }  // namespace trammel

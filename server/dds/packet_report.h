@@ -8,6 +8,7 @@
 #include <string>
 
 #include "idl/guard/dropped.h"
+#include "server/dds/service_events.h"
 
 namespace trammel {
 
@@ -26,6 +27,17 @@ class PacketReport {
   std::shared_ptr<const wire::DropCounts> counts_;
   std::array<std::uint64_t, wire::kDroppedReasons> told_{};
   std::optional<Time> told_at_;
+};
+
+/// Says how many participants were refused, at most once a minute. Not thread-safe.
+class StrangerReport {
+ public:
+  /// What is new since the last report; empty when nothing is, or when the last report is too young.
+  [[nodiscard]] std::optional<std::string> due(const Strangers& strangers, PacketReport::Time now);
+
+ private:
+  std::uint64_t told_ = 0;
+  std::optional<PacketReport::Time> told_at_;
 };
 
 }  // namespace trammel

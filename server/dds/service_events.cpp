@@ -1,5 +1,6 @@
 #include "server/dds/service_events.h"
 
+#include <sstream>
 #include <utility>
 
 namespace trammel {
@@ -65,6 +66,22 @@ void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
     left_.insert(wire::participant_of(info.info.m_guid));
   }
   changed_.notify_one();
+}
+
+Strangers ServiceEvents::strangers() const {
+  const MutexLock lock(mutex_);
+  return strangers_;
+}
+
+void ServiceEvents::onParticipantAuthentication(wire::dds::DomainParticipant*,
+                                                eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::ParticipantAuthenticationInfo;
+  if (info.status == Info::AUTHORIZED_PARTICIPANT) return;
+  std::ostringstream guid;
+  guid << info.guid.guidPrefix;
+  const MutexLock lock(mutex_);
+  ++strangers_.count;
+  strangers_.last = guid.str();
 }
 
 }  // namespace trammel

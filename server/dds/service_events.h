@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <set>
 #include <stop_token>
@@ -17,6 +18,12 @@ namespace trammel {
 struct ReaderEvent {
   enum class Kind { kFound, kLost, kLeft } kind;
   ReplyReader reader;
+};
+
+/// Participants that DDS-Security refused: no certificate, one of another authority, one that was revoked.
+struct Strangers {
+  std::uint64_t count = 0;  ///< of tries: one participant tries again and again
+  std::string last;         ///< the GUID of the last one
 };
 
 /// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
@@ -36,18 +43,23 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   /// Waits until something has happened, at most `limit`.
   [[nodiscard]] News wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
+  [[nodiscard]] Strangers strangers() const;
+
  private:
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
   void on_participant_discovery(wire::dds::DomainParticipant* participant,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
+  void onParticipantAuthentication(wire::dds::DomainParticipant* participant,
+                                   eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
 
-  Mutex mutex_;
+  mutable Mutex mutex_;
   Condition changed_;
   bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;
   bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::vector<ReaderEvent> readers_ TRAMMEL_GUARDED_BY(mutex_);
   std::set<std::string> left_ TRAMMEL_GUARDED_BY(mutex_);  // participants
+  Strangers strangers_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

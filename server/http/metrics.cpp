@@ -43,6 +43,8 @@ void add_requests(MetricFamilies& out, const ServiceFigures& service) {
   out.gauge("trammel_requests_waiting_bytes", "Memory that these take.", number(service.waiting_bytes));
   out.gauge("trammel_clients", "Clients with a reply channel.", number(service.clients));
   out.counter("trammel_replies_unheard_total", "Replies that nobody listened to any more.", number(service.unheard));
+  out.counter("trammel_participants_refused_total",
+              "Participants without the right certificate or permissions, each try.", number(service.strangers));
   out.counter("trammel_requests_misdirected_total", "Requests whose reply would have gone to another client.",
               number(service.misdirected));
   out.counter("trammel_requests_unreadable_total", "Requests of which not even the header could be read.",

@@ -29,6 +29,7 @@ struct ServiceFigures {
   std::size_t waiting_bytes = 0;                         ///< memory of the requests that wait or are worked on
   std::size_t clients = 0;                               ///< with a reply channel
   std::uint64_t unheard = 0;                             ///< replies that were dropped because nobody listened
+  std::uint64_t strangers = 0;                           ///< handshakes of participants without the right certificate
   std::uint64_t misdirected = 0;                         ///< requests whose reply would have gone to another client
   std::uint64_t unreadable = 0;                          ///< requests of which not even the header could be read
   std::uint64_t lost = 0;                                ///< requests that DDS lost before the service saw them

@@ -172,7 +172,19 @@ TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
   EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), at(5, "dds: address").text("192.168.1.5"));
   EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), at(5, "dds: address").text("0.0.0.0"));
   EXPECT_EQ(refusal_for("dds: {address: localhost}\n"), at(5, "dds: address").text("localhost"));
-  EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true}\n").dds.address, "192.168.1.5");
+  EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5, allow_network: true}\n"),
+            at(5, "dds: address").text("192.168.1.5"));
+  EXPECT_EQ(read("dds: {address: 192.168.1.5, allow_network: true, without_security: true}\n").dds.address,
+            "192.168.1.5");
+  const ServerConfig secured = read("dds: {address: 192.168.1.5, allow_network: true, security: keys}\n");
+  EXPECT_EQ(secured.dds.address, "192.168.1.5");
+  EXPECT_EQ(secured.dds.security, folder_.file("keys"));
+}
+
+TEST_F(ServerConfigTest, ReplicasElsewhereAreNamedWithTheirPortOrHaveTheUsualOne) {
+  const std::vector<HostPort> expected = {{"10.1.0.4", 17500}, {"10.1.0.5", 17502}};
+  EXPECT_EQ(read("dds: {peers: [10.1.0.4, '10.1.0.5:17502']}\n").dds.peers, expected);
+  EXPECT_EQ(refusal_for("dds: {peers: ['10.1.0.5:80']}\n"), at(5, "dds: peers").text("10.1.0.5:80"));
 }
 
 TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {

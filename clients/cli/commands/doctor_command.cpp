@@ -81,8 +81,9 @@ class Udp {
 };
 
 Found network(const std::string& host) {
-  if (const Status usable = check_host(host); !usable)
-    return {"network", State::kBad, usable.error().message, usable.error().next};
+  const auto own = own_address_towards(host);
+  if (!own) return {"network", State::kBad, own.error().message, own.error().next};
+  if (*own != host) return {"network", State::kGood, fmt::format("{} is reached from {}", host, *own), ""};
   Udp udp;
   const int why = udp.bind(host, 0);
   if (why != 0) {
@@ -132,9 +133,15 @@ Found version_of(const client::ServerStatus& server) {
           ""};
 }
 
-void look_at_servers(const ServiceOptions& options, std::vector<Found>& found) {
-  const bool any = std::any_of(options.ports.begin(), options.ports.end(),
-                               [&](std::uint16_t one) { return held_by_server(options.host, one); });
+bool is_of_this_host(const HostPort& place) {
+  const std::vector<std::string> own = own_addresses();
+  return std::find(own.begin(), own.end(), place.address) != own.end();
+}
+
+void look_at_servers(const ServiceOptions& options, const std::vector<HostPort>& places, std::vector<Found>& found) {
+  const bool any = std::any_of(places.begin(), places.end(), [](const HostPort& place) {
+    return !is_of_this_host(place) || held_by_server(place.address, place.port);
+  });
   if (!any) return;  // the ports say so
   const auto session = open_session(options);
   const auto servers =
@@ -145,6 +152,18 @@ void look_at_servers(const ServiceOptions& options, std::vector<Found>& found) {
     return;
   }
   for (const client::ServerStatus& server : *servers) found.push_back(version_of(server));
+}
+
+Found certificates(const std::string& folder, const std::vector<HostPort>& places) {
+  const bool all_here = std::all_of(places.begin(), places.end(), is_of_this_host);
+  if (folder.empty() && all_here)
+    return {"certificates", State::kGood, "none are used: traffic stays on this host", ""};
+  if (folder.empty())
+    return {"certificates", State::kNote, "none are used, and traffic leaves this host",
+            "is the service without security? else name your folder by --security"};
+  const auto subject = client::check_security(folder);
+  if (!subject) return {"certificates", State::kBad, sentence(subject.error()), subject.error().next};
+  return {"certificates", State::kGood, "of " + shown(*subject), ""};
 }
 
 Found clock() {
@@ -225,9 +244,17 @@ std::string as_text(const std::vector<Found>& found) {
 
 Result<Extent> examine(const DoctorArguments& arguments) {
   const ServiceOptions& service = arguments.service;
-  std::vector<Found> found = {{"version", State::kGood, TRAMMEL_VERSION, ""}, network(service.host)};
-  for (const std::uint16_t number : service.ports) found.push_back(port(service.host, number));
-  look_at_servers(service, found);
+  const auto places = places_of(service);
+  if (!places) return tl::make_unexpected(places.error());
+  std::vector<Found> found = {{"version", State::kGood, TRAMMEL_VERSION, ""}};
+  std::set<std::string> hosts;
+  for (const HostPort& place : *places) {
+    if (hosts.insert(place.address).second) found.push_back(network(place.address));
+  }
+  for (const HostPort& place : *places) {
+    if (is_of_this_host(place)) found.push_back(port(place.address, place.port));
+  }
+  look_at_servers(service, *places, found);
   found.push_back(clock());
   std::vector<fs::path> folders = {"."};
   if (!arguments.store.empty()) {
@@ -235,7 +262,7 @@ Result<Extent> examine(const DoctorArguments& arguments) {
     if (fs::path(arguments.store).has_parent_path()) folders.push_back(fs::path(arguments.store).parent_path());
   }
   found.push_back(leftovers(folders));
-  found.push_back({"certificates", State::kGood, "none are used: traffic stays on this host", ""});
+  found.push_back(certificates(service.security, *places));
   tell(as_text(found), {arguments.json});
   nlohmann::ordered_json checks = nlohmann::ordered_json::array();
   for (const Found& one : found)

@@ -1,15 +1,9 @@
 #include "clients/cli/terminal/options.h"
 
-#include <arpa/inet.h>
-#include <ifaddrs.h>
-#include <netinet/in.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 
 #include "server/base/plain_text.h"
 #include "server/robot/cell.h"
@@ -23,17 +17,27 @@ constexpr double kLongestTimeout = 3600;  // s
 void add_service_options(CLI::App& command, ServiceOptions& options, const std::string& help) {
   command.add_flag("--service", options.service, help)->group("Service");
   command
-      .add_option("--host", options.host,
-                  "IPv4 address that the service listens on: `address` in its server file, 127.0.0.1 as shipped")
+      .add_option(
+          "--host", options.hosts,
+          "Where the service runs: a name or IPv4 address, with :PORT behind it or not; once for each replica on "
+          "another host")
+      ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
-  command.add_option("--port", options.ports, "UDP port of the service on this host; once for each replica")
+  command
+      .add_option("--port", options.ports,
+                  "UDP port of the service on each host that is named without one; once for each replica")
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
   command.add_option("--domain", options.domain, "DDS domain of the service; servers of other domains are not heard")
       ->check(CLI::Range(0, 232))
       ->capture_default_str()
+      ->group("Service");
+  command
+      .add_option("--security", options.security,
+                  "Folder with the certificate, key and permissions that a secured service asks for")
+      ->type_name("FOLDER")
       ->group("Service");
   command.add_option("--timeout", options.timeout_s, "Longest wait for one answer, finding the service included, s")
       ->check(CLI::Range(0.01, kLongestTimeout))
@@ -51,31 +55,27 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options) 
   add_service_options(command, options, "Said or not: this command always asks a running trammeld");
 }
 
-Status check_host(const std::string& host) {
-  std::vector<std::string> own;
-  ifaddrs* all = nullptr;
-  if (::getifaddrs(&all) != 0) return {};
-  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
-    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
-    sockaddr_in place{};
-    std::memcpy(&place, one->ifa_addr, sizeof place);
-    std::array<char, INET_ADDRSTRLEN> text{};
-    if (::inet_ntop(AF_INET, &place.sin_addr, text.data(), text.size()) != nullptr) own.emplace_back(text.data());
+Result<std::vector<HostPort>> places_of(const ServiceOptions& options) {
+  std::vector<HostPort> places;
+  for (const std::string& host : options.hosts) {
+    const bool has_port = host.find(':') != std::string::npos;
+    const std::size_t count = has_port ? 1 : options.ports.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      auto place = parse_host_port(host, options.ports[i]);
+      if (!place) return Failure(std::move(place.error())).of("--host").next("name it as --host line-3:17500");
+      places.push_back(*std::move(place));
+    }
   }
-  ::freeifaddrs(all);
-  if (std::find(own.begin(), own.end(), host) != own.end()) return {};
-  return failure(ErrorCode::kUsage, "--host '{}': no interface of this host has this address", shown_short(host))
-      .of("--host")
-      .with_text(shown_short(host))
-      .next(fmt::format("it has {}", fmt::join(own, ", ")));
+  return places;
 }
 
 Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
-  if (const Status usable = check_host(options.host); !usable) return tl::make_unexpected(usable.error());
+  auto places = places_of(options);
+  if (!places) return tl::make_unexpected(places.error());
   client::SessionOptions session;
-  session.address = options.host;
+  session.servers = *std::move(places);
+  session.security = options.security;
   session.domain = options.domain;
-  session.server_ports = options.ports;
   session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
   return client::Session::open(session);
 }

@@ -1,0 +1,175 @@
+#include "idl/security.h"
+
+#include <openssl/bio.h>
+#include <openssl/pem.h>
+#include <openssl/pkcs7.h>
+#include <openssl/x509.h>
+#include <openssl/x509_vfy.h>
+#include <sys/stat.h>
+
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "server/base/text_file.h"
+
+namespace trammel::wire {
+namespace {
+
+template <auto kFree>
+struct Free {
+  template <typename T>
+  void operator()(T* thing) const {
+    kFree(thing);
+  }
+};
+using Bio = std::unique_ptr<BIO, Free<BIO_free_all>>;
+using Certificate = std::unique_ptr<X509, Free<X509_free>>;
+using RevocationList = std::unique_ptr<X509_CRL, Free<X509_CRL_free>>;
+using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
+using Signed = std::unique_ptr<PKCS7, Free<PKCS7_free>>;
+using Authorities = std::unique_ptr<X509_STORE, Free<X509_STORE_free>>;
+using Verification = std::unique_ptr<X509_STORE_CTX, Free<X509_STORE_CTX_free>>;
+
+Bio bio_of(const std::string& text) { return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size()))); }
+
+std::string text_of(BIO* bio) {
+  char* data = nullptr;
+  const long size = BIO_get_mem_data(bio, &data);
+  return {data, static_cast<std::size_t>(size)};
+}
+
+/// One participant's folder.
+class Folder {
+ public:
+  explicit Folder(std::string path) : path_(std::move(path)) {}
+
+  [[nodiscard]] std::string path(const char* name) const { return path_ + "/" + name; }
+  [[nodiscard]] Result<std::string> text(const char* name) const { return read_text_file(path(name)); }
+  [[nodiscard]] Failure wrong(const char* name, const std::string& why) const {
+    return refused("{}", why).in(path(name));
+  }
+  [[nodiscard]] Result<Certificate> certificate(const char* name) const {
+    const auto pem = text(name);
+    if (!pem) return tl::make_unexpected(pem.error());
+    Certificate certificate(PEM_read_bio_X509(bio_of(*pem).get(), nullptr, nullptr, nullptr));
+    if (!certificate) return wrong(name, "no certificate in PEM form");
+    return certificate;
+  }
+
+ private:
+  std::string path_;
+};
+
+std::string subject_of(const X509& certificate) {
+  const Bio out(BIO_new(BIO_s_mem()));
+  X509_NAME_print_ex(out.get(), X509_get_subject_name(&certificate), 0, XN_FLAG_RFC2253);
+  return text_of(out.get());
+}
+
+/// The authority of identities with the revocation lists behind it.
+Result<Authorities> identity_authority(const Folder& folder) {
+  constexpr const char* kName = "identity_ca.cert.pem";
+  const auto pem = folder.text(kName);
+  if (!pem) return tl::make_unexpected(pem.error());
+  const Bio bio = bio_of(*pem);
+  const Certificate certificate(PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr));
+  if (!certificate) return folder.wrong(kName, "no certificate in PEM form");
+  Authorities authorities(X509_STORE_new());
+  X509_STORE_add_cert(authorities.get(), certificate.get());
+  while (const RevocationList list{PEM_read_bio_X509_CRL(bio.get(), nullptr, nullptr, nullptr)}) {
+    X509_STORE_add_crl(authorities.get(), list.get());
+    X509_STORE_set_flags(authorities.get(), X509_V_FLAG_CRL_CHECK);
+  }
+  return authorities;
+}
+
+Status check_certificate(const Folder& folder, X509& certificate) {
+  const auto authorities = identity_authority(folder);
+  if (!authorities) return tl::make_unexpected(authorities.error());
+  const Verification verification(X509_STORE_CTX_new());
+  X509_STORE_CTX_init(verification.get(), authorities->get(), &certificate, nullptr);
+  if (X509_verify_cert(verification.get()) == 1) return {};
+  return folder.wrong("cert.pem", X509_verify_cert_error_string(X509_STORE_CTX_get_error(verification.get())))
+      .next("ask whoever issues certificates for a new one; see deploy/security/README.md");
+}
+
+Status check_key(const Folder& folder, const X509& certificate) {
+  struct stat file {};
+  if (::stat(folder.path("key.pem").c_str(), &file) == 0 && (file.st_mode & (S_IRWXG | S_IRWXO) & ~S_IRGRP) != 0) {
+    return folder.wrong("key.pem", "others than its owner and group may read or change it")
+        .next("chmod 640 " + folder.path("key.pem"));
+  }
+  const auto pem = folder.text("key.pem");
+  if (!pem) return tl::make_unexpected(pem.error());
+  const Key key(PEM_read_bio_PrivateKey(bio_of(*pem).get(), nullptr, nullptr, nullptr));
+  if (!key) return folder.wrong("key.pem", "no private key in PEM form, or one with a password");
+  if (X509_check_private_key(&certificate, key.get()) != 1) return folder.wrong("key.pem", "not the key of cert.pem");
+  return {};
+}
+
+/// What was signed by the authority of the permissions.
+Result<std::string> signed_text(const Folder& folder, const char* name, X509& authority) {
+  const auto smime = folder.text(name);
+  if (!smime) return tl::make_unexpected(smime.error());
+  BIO* content = nullptr;
+  const Signed parsed(SMIME_read_PKCS7(bio_of(*smime).get(), &content));
+  const Bio given(content);
+  if (!parsed || !given) return folder.wrong(name, "no signed rules in S/MIME form");
+  Authorities authorities(X509_STORE_new());
+  X509_STORE_add_cert(authorities.get(), &authority);
+  const Bio out(BIO_new(BIO_s_mem()));
+  if (PKCS7_verify(parsed.get(), nullptr, authorities.get(), given.get(), out.get(), PKCS7_TEXT) != 1)
+    return folder.wrong(name, "changed since it was signed, or not signed by permissions_ca.cert.pem");
+  return text_of(out.get());
+}
+
+/// The text between <tag> and </tag>, of the first one; empty: there is none.
+std::string element(const std::string& xml, const std::string& tag) {
+  const std::size_t open = xml.find("<" + tag + ">");
+  if (open == std::string::npos) return {};
+  const std::size_t begin = open + tag.size() + 2;
+  const std::size_t end = xml.find("</" + tag + ">", begin);
+  return end == std::string::npos ? std::string() : xml.substr(begin, end - begin);
+}
+
+/// `2026-11-22T10:00:00` (UTC, a Z or nothing behind it) as Unix time.
+std::optional<std::time_t> unix_time(const std::string& text) {
+  std::tm parts{};
+  if (::strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts) == nullptr) return std::nullopt;
+  return ::timegm(&parts);
+}
+
+Status check_permissions(const Folder& folder, const std::string& subject, const std::string& xml) {
+  constexpr const char* kName = "permissions.p7s";
+  if (const std::string theirs = element(xml, "subject_name"); theirs != subject)
+    return folder.wrong(kName, fmt::format("for {}, and cert.pem is of {}", theirs, subject));
+  const auto from = unix_time(element(xml, "not_before")), to = unix_time(element(xml, "not_after"));
+  const std::time_t now = std::time(nullptr);
+  if (from && now < *from) return folder.wrong(kName, "not valid before " + element(xml, "not_before"));
+  if (to && now > *to) return folder.wrong(kName, "expired on " + element(xml, "not_after"));
+  return {};
+}
+
+}  // namespace
+
+Result<Security> read_security(const std::string& path) {
+  const Folder folder(path);
+  const auto certificate = folder.certificate("cert.pem");
+  if (!certificate) return tl::make_unexpected(certificate.error());
+  if (const Status fine = check_certificate(folder, **certificate); !fine) return tl::make_unexpected(fine.error());
+  if (const Status fine = check_key(folder, **certificate); !fine) return tl::make_unexpected(fine.error());
+  const auto authority = folder.certificate("permissions_ca.cert.pem");
+  if (!authority) return tl::make_unexpected(authority.error());
+  const auto governance = signed_text(folder, "governance.p7s", **authority);
+  if (!governance) return tl::make_unexpected(governance.error());
+  const auto permissions = signed_text(folder, "permissions.p7s", **authority);
+  if (!permissions) return tl::make_unexpected(permissions.error());
+  const std::string subject = subject_of(**certificate);
+  if (const Status fine = check_permissions(folder, subject, *permissions); !fine)
+    return tl::make_unexpected(fine.error());
+  return Security{path, subject};
+}
+
+}  // namespace trammel::wire

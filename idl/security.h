@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "server/base/result.h"
+
+/// DDS-Security: who a participant is, and what it may do. A folder holds what one participant needs, under the names
+/// that ROS 2 gives these files: `identity_ca.cert.pem` (behind it revocation lists, where there are some), `cert.pem`,
+/// `key.pem`, `permissions_ca.cert.pem`, `governance.p7s`, `permissions.p7s`.
+namespace trammel::wire {
+
+struct Security {
+  std::string folder;
+  std::string subject;  ///< of the certificate, as RFC 2253 writes it: `CN=line-3,O=Trammel`
+};
+
+/// Looks at the files before the library does, which gives no reasons. Refuses (kRefused) a file that is missing or
+/// cannot be read, a key that others may read, a certificate that has expired, is not valid yet, is not of this
+/// authority, was revoked or has another key, and rules that were not signed by the authority of the permissions, or
+/// whose permissions are for another subject, have expired or are not valid yet.
+[[nodiscard]] Result<Security> read_security(const std::string& folder);
+
+}  // namespace trammel::wire

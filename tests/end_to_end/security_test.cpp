@@ -1,0 +1,252 @@
+// Who may do what: a daemon and clients with certificates and permissions as deploy/security/keys makes them.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <set>
+
+#include "server/base/text_file.h"
+#include "tests/support/daemon.h"
+#include "tests/support/http_client.h"
+#include "tests/support/virtual_cell.h"
+
+namespace trammel {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::seconds;
+constexpr seconds kLimit{30};
+constexpr std::chrono::milliseconds kInVain{2500};  // a participant that is refused tries again once a second
+
+/// Authorities and participants, made once for all tests of this process.
+class Keys {
+ public:
+  Keys() { keys({"init", folder_.path().string()}); }
+
+  /// The folder of a participant, made at its first use.
+  std::string of(const std::string& role, const std::string& name, const std::string& days = "30") {
+    const std::string path = folder_.file("participants/" + name);
+    if (!fs::exists(path)) keys({"issue", folder_.path().string(), role, name, "--days", days});
+    return path;
+  }
+  void revoke(const std::string& name) { keys({"revoke", folder_.path().string(), name}); }
+  [[nodiscard]] std::string authority() const { return folder_.file("authority"); }
+
+  static void keys(std::vector<std::string> words) {
+    words.insert(words.begin(), TRAMMEL_SOURCE_DIR "/deploy/security/keys");
+    const auto done = test::run(words);
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+  }
+
+ private:
+  test::TemporaryFolder folder_;
+};
+
+Keys& keys() {
+  static Keys all;
+  return all;
+}
+
+class SecurityTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string text = test::read_file(daemon_.config_path());
+    ASSERT_TRUE(write_text_file(daemon_.config_path(), text + "dds: {security: " + keys().of("replica", "line-3") +
+                                                           "}\nhttp: {port: " + std::to_string(http()) + "}\n"));
+  }
+  [[nodiscard]] std::uint16_t http() const { return static_cast<std::uint16_t>(daemon_.port() + 1); }
+  [[nodiscard]] Result<std::unique_ptr<client::Session>> session(const std::string& folder) {
+    client::SessionOptions options = daemon_.session_options();
+    options.security = folder;
+    return client::Session::open(options);
+  }
+  /// Nobody answers such a client.
+  void expect_nobody(const std::string& folder) {
+    client::SessionOptions options = daemon_.session_options();
+    options.security = folder;
+    options.timeout = kInVain;
+    const auto opened = client::Session::open(options);
+    ASSERT_TRUE(opened) << opened.error().message;
+    const auto servers = (*opened)->servers();
+    ASSERT_FALSE(servers);
+    EXPECT_EQ(servers.error().code, ErrorCode::kUnreachable);
+  }
+  [[nodiscard]] int refused_handshakes() const {
+    const std::string text = test::http_get(http(), "/metrics").body;
+    const std::string name = "\ntrammel_participants_refused_total ";
+    return std::stoi(text.substr(text.find(name) + name.size()));
+  }
+
+  test::Daemon daemon_;
+};
+
+/// What calls are about.
+client::CallContext cell_7() {
+  client::CallContext context;
+  context.cell = "cell-7";
+  return context;
+}
+
+using Calls = std::map<std::string, std::function<Error(client::Session&)>>;
+
+/// What came of a call; an error of no code where it was done.
+template <typename Value>
+Error said(const Result<Value>& result) {
+  return result ? Error{} : result.error();
+}
+
+const Calls& calls() {
+  static const Calls all = {
+      {"PredictError",
+       [](client::Session& s) {
+         return said(s.predict_error(cell_7(), {{0, 0, 0, 0, 0, 0}}));
+       }},
+      {"CorrectTarget", [](client::Session& s) { return said(s.correct_targets(cell_7(), {client::TargetMm{}})); }},
+      {"ReadModels", [](client::Session& s) { return said(s.models("cell-7")); }},
+      {"SubmitMeasurements", [](client::Session& s) { return said(s.submit_measurements("cell-7", "", "no csv")); }},
+      {"Diagnose", [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", false)); }},
+      {"CheckHealth", [](client::Session& s) { return said(s.check_health("cell-7", "none", "", 0.1)); }},
+      {"Train", [](client::Session& s) { return said(s.train("cell-7", {"none"}, "", "")); }},
+      {"activate", [](client::Session& s) { return said(s.activate("cell-7", 77)); }},
+      {"rollback", [](client::Session& s) { return said(s.rollback("cell-7")); }},
+      {"import", [](client::Session& s) { return said(s.import_model("cell-7", "no model")); }},
+      {"release", [](client::Session& s) { return said(s.release("cell-7", "none").map([] { return 0; })); }},
+      {"discard", [](client::Session& s) { return said(s.discard("cell-7", "none").map([] { return 0; })); }},
+      {"apply a diagnosis", [](client::Session& s) { return said(s.diagnose("cell-7", "none", "", true)); }},
+  };
+  return all;
+}
+
+const std::map<std::string, std::set<std::string>> kMay = {
+    {"observer", {"ReadModels"}},
+    {"cam", {"ReadModels", "PredictError", "CorrectTarget"}},
+    {"metrologist", {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth"}},
+    {"engineer",
+     {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth", "Train",
+      "activate", "rollback", "import", "release", "discard", "apply a diagnosis"}},
+};
+
+TEST_F(SecurityTest, EachRoleMayDoWhatItsPermissionsSayAndNothingElse) {
+  daemon_.start();
+  for (const auto& [role, may] : kMay) {
+    const auto opened = session(keys().of(role, role + "-1"));
+    ASSERT_TRUE(opened) << opened.error().message;
+    ASSERT_TRUE((*opened)->servers()) << role;
+    for (const auto& [operation, call] : calls()) {
+      const Error error = call(**opened);
+      const bool forbidden = error.message.starts_with("these permissions do not allow");
+      EXPECT_EQ(forbidden, !may.contains(operation)) << role << ", " << operation << ": " << error.message;
+      EXPECT_NE(error.code, ErrorCode::kUnreachable) << role << ", " << operation << ": " << error.message;
+    }
+  }
+}
+
+TEST_F(SecurityTest, WhoHasNoRightCertificateIsRefusedAndCounted) {
+  const std::string revoked = keys().of("engineer", "left-the-plant");
+  keys().revoke("left-the-plant");
+  daemon_.start();
+  EXPECT_EQ(refused_handshakes(), 0);
+  {
+    SCOPED_TRACE("none");
+    expect_nobody("");
+    EXPECT_GT(refused_handshakes(), 0);
+  }
+  {
+    SCOPED_TRACE("of another plant");
+    Keys others;
+    const int before = refused_handshakes();
+    expect_nobody(others.of("engineer", "stranger"));
+    EXPECT_GT(refused_handshakes(), before);
+  }
+  {
+    SCOPED_TRACE("revoked, by one who does not take the news");
+    const int before = refused_handshakes();
+    fs::copy_file(keys().authority() + "/identity_ca.cert.pem", revoked + "/identity_ca.cert.pem",
+                  fs::copy_options::overwrite_existing);
+    expect_nobody(revoked);
+    EXPECT_GT(refused_handshakes(), before);
+  }
+  {
+    SCOPED_TRACE("permissions that somebody signed himself");
+    Keys others;
+    const std::string mine = others.of("engineer", "cam-2"), given = keys().of("cam", "cam-2");
+    for (const char* file : {"permissions_ca.cert.pem", "governance.p7s", "permissions.p7s"})
+      fs::copy_file(mine + "/" + file, given + "/" + file, fs::copy_options::overwrite_existing);
+    expect_nobody(given);
+  }
+  const auto opened = session(keys().of("cam", "cam-1"));
+  ASSERT_TRUE(opened) << opened.error().message;
+  EXPECT_TRUE((*opened)->servers());
+}
+
+TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
+  const std::string good = keys().of("cam", "cam-1");
+  const auto spoiled = [&](const std::string& name, const std::function<void(const std::string& folder)>& spoil) {
+    const std::string copy = keys().authority() + "/" + name;
+    fs::copy(good, copy);
+    spoil(copy);
+    const auto subject = client::check_security(copy);
+    return subject ? Error{} : subject.error();
+  };
+  const auto expect = [](const Error& error, const std::string& file, const std::string& word) {
+    EXPECT_TRUE(error.file.ends_with(file)) << error.file << ": " << error.message;
+    EXPECT_NE(error.message.find(word), std::string::npos) << error.message;
+  };
+  expect(spoiled("a", [](const std::string& f) { fs::remove(f + "/governance.p7s"); }), "governance.p7s", "");
+  expect(spoiled("b", [](const std::string& f) { fs::permissions(f + "/key.pem", fs::perms(0644)); }), "key.pem",
+         "read");
+  expect(spoiled("c",
+                 [](const std::string& f) {
+                   std::string text = test::read_file(f + "/permissions.p7s");
+                   text.replace(text.find("ReadModels"), 10, "TrainTrain");
+                   ASSERT_TRUE(write_text_file(f + "/permissions.p7s", text));
+                 }),
+         "permissions.p7s", "signed");
+  expect(spoiled("d",
+                 [](const std::string& f) {
+                   fs::copy_file(keys().of("engineer", "engineer-1") + "/permissions.p7s", f + "/permissions.p7s",
+                                 fs::copy_options::overwrite_existing);
+                 }),
+         "permissions.p7s", "engineer-1");
+  expect(spoiled("e",
+                 [](const std::string& f) {
+                   fs::copy_file(keys().of("engineer", "engineer-1") + "/key.pem", f + "/key.pem",
+                                 fs::copy_options::overwrite_existing);
+                 }),
+         "key.pem", "key");
+  Keys others;
+  expect(spoiled("f",
+                 [&](const std::string& f) {
+                   fs::copy_file(others.authority() + "/identity_ca.cert.pem", f + "/identity_ca.cert.pem",
+                                 fs::copy_options::overwrite_existing);
+                 }),
+         "cert.pem", "");
+  keys().of("engineer", "gone");
+  keys().revoke("gone");
+  const auto gone = client::check_security(keys().of("engineer", "gone"));
+  ASSERT_FALSE(gone);
+  expect(gone.error(), "cert.pem", "revoked");
+  EXPECT_EQ(client::check_security(good).value(), "CN=cam-1,O=Trammel");
+}
+
+TEST(SecurityOfTheServerFile, AnAddressThatOthersReachNeedsCertificatesOrASecondWord) {
+  const test::Daemon daemon;
+  const std::string text = test::read_file(daemon.config_path());
+  const auto check = [&](const std::string& dds) {
+    EXPECT_TRUE(write_text_file(daemon.config_path(), text + "dds: {" + dds + "}\n"));
+    return test::run({test::trammeld_path(), "--config", daemon.config_path(), "--check"});
+  };
+  const auto once = check("address: 192.0.2.1, allow_network: true");
+  EXPECT_EQ(once.exit_code, 3);
+  EXPECT_NE((once.out + once.err).find("without_security"), std::string::npos) << once.out << once.err;
+  const auto twice = check("address: 192.0.2.1, allow_network: true, without_security: true");
+  EXPECT_EQ((twice.out + twice.err).find("without_security"), std::string::npos) << twice.out << twice.err;
+  const auto bad = check("security: nowhere");
+  EXPECT_EQ(bad.exit_code, 3);
+  EXPECT_NE((bad.out + bad.err).find("nowhere"), std::string::npos) << bad.out << bad.err;
+}
+
+}  // namespace
+}  // namespace trammel
