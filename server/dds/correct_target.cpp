@@ -58,22 +58,34 @@ wire::CorrectedTarget to_wire(const Correction& correction, const Chain& chain) 
   return item;
 }
 
+void count_in(WorkFigures& work, const Correction& correction) {
+  const bool outside = correction.status == CorrectionStatus::kOutOfDomain;
+  if (outside || correction.status == CorrectionStatus::kOk) {
+    work.answered(!outside, correction.stddev);
+  } else {
+    ++work.left;
+  }
+}
+
 /// Its targets are known, its model is taken.
 class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetReply> {
  public:
-  PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent)
-      : subject_(std::move(subject)), targets_(std::move(targets)), recent_(recent) {
+  PortionedCorrections(Subject subject, std::vector<Target> targets, RecentPoses& recent, WorkCounts& work)
+      : subject_(std::move(subject)), targets_(std::move(targets)), recent_(recent), work_(work) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
     reply_.corrections().resize(targets_.size());
   }
   std::size_t items() const override { return targets_.size(); }
   void compute(std::size_t first, std::size_t count) override {
     const CompensatedModel& model = subject_.served->model;
+    WorkFigures work;
     for (std::size_t i = first; i < first + count; ++i) {
       const Correction correction = model.correct(targets_[i], subject_.tool, subject_.payload);
       reply_.corrections()[i] = to_wire(correction, model.cell().robot);
+      count_in(work, correction);
       if (i == first && correction.q.size() > 0) remember(correction.q);  // one of each portion stands for it
     }
+    work_.add(subject_.served->cell, work);
   }
   wire::CorrectTargetReply take() override { return std::move(reply_); }
 
@@ -90,6 +102,7 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
 
   const std::vector<Target> targets_;
   RecentPoses& recent_;  // of the trainer, which outlives every request
+  WorkCounts& work_;
   wire::CorrectTargetReply reply_;
 };
 
@@ -108,7 +121,8 @@ Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& 
     if (!target) return tl::make_unexpected(target.error());
     targets.push_back(*target);
   }
-  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets), trainer_.recent_poses());
+  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets), trainer_.recent_poses(),
+                                                work_);
 }
 
 Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {

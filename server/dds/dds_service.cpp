@@ -209,6 +209,7 @@ class DdsService::Running {
     now.misdirected = core_.counts.misdirected;
     now.unreadable = *core_.unreadable;
     now.lost = core_.counts.lost;
+    now.work = handlers_.work().all();
     now.strangers = events_->strangers().count;
     for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
       const auto reason = static_cast<wire::Dropped>(i);

@@ -9,6 +9,7 @@
 #include "idl/valid.h"
 #include "server/base/mutex.h"
 #include "server/dds/portioned_answer.h"
+#include "server/metrics/work_counts.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
@@ -49,6 +50,9 @@ class Handlers {
  public:
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
+
+  /// What the cells were asked for since the start.
+  [[nodiscard]] const WorkCounts& work() const { return work_; }
 
   using Predictions = std::unique_ptr<PortionedAnswer<wire::PredictErrorReply>>;
   using Corrections = std::unique_ptr<PortionedAnswer<wire::CorrectTargetReply>>;
@@ -93,6 +97,7 @@ class Handlers {
   Store& store_;
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
+  WorkCounts work_;  // requests refer to it, and end before it
 };
 
 /// Computes all of an answer in one thread.

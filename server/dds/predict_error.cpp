@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -63,23 +64,28 @@ Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subjec
 /// Its poses are checked, its model is taken.
 class PortionedPredictions final : public PortionedAnswer<wire::PredictErrorReply> {
  public:
-  PortionedPredictions(Subject subject, std::vector<PoseContext> poses)
-      : subject_(std::move(subject)), poses_(std::move(poses)) {
+  PortionedPredictions(Subject subject, std::vector<PoseContext> poses, WorkCounts& work)
+      : subject_(std::move(subject)), poses_(std::move(poses)), work_(work) {
     reply_.model(trammel::to_wire(*subject_.served, subject_.in_force, unix_now_s()));
     reply_.predictions().resize(poses_.size());
   }
   std::size_t items() const override { return poses_.size(); }
   void compute(std::size_t first, std::size_t count) override {
     const CompensatedModel& model = subject_.served->model;
+    WorkFigures work;
     for (std::size_t i = first; i < first + count; ++i) {
-      reply_.predictions()[i] = to_wire(model.predict_all({poses_[i]}).front());
+      const ErrorPrediction prediction = model.predict_all({poses_[i]}).front();
+      reply_.predictions()[i] = to_wire(prediction);
+      work.answered(prediction.in_domain, prediction.true_stddev_B.norm() / std::sqrt(3.0));
     }
+    work_.add(subject_.served->cell, work);
   }
   wire::PredictErrorReply take() override { return std::move(reply_); }
 
  private:
   const Subject subject_;
   const std::vector<PoseContext> poses_;
+  WorkCounts& work_;
   wire::PredictErrorReply reply_;
 };
 
@@ -99,7 +105,7 @@ Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& r
   const std::size_t told = std::min<std::size_t>(poses.size(), kPosesTold);
   for (std::size_t i = poses.size() - told; i < poses.size(); ++i)
     trainer_.recent_poses().add(request.about().cell(), poses[i]);
-  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses));
+  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses), work_);
 }
 
 Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {

@@ -23,18 +23,16 @@ void MetricFamilies::counter(const char* name, const char* help, double value, c
   add(name, help, prometheus::MetricType::Counter, labels).counter.value = value;
 }
 
-void MetricFamilies::histogram(const char* name, const char* help, const LatencyHistogram::Counts& counts,
-                               const MetricLabels& labels) {
+void MetricFamilies::histogram(const char* name, const char* help, std::span<const double> bounds,
+                               std::span<const std::uint64_t> in_class, double sum, const MetricLabels& labels) {
   auto& histogram = add(name, help, prometheus::MetricType::Histogram, labels).histogram;
   std::uint64_t below = 0;
-  for (std::size_t i = 0; i < counts.in_class.size(); ++i) {
-    below += counts.in_class[i];
-    const bool is_last = i == LatencyHistogram::kBounds.size();
-    histogram.bucket.push_back(
-        {below, is_last ? std::numeric_limits<double>::infinity() : LatencyHistogram::kBounds[i]});
+  for (std::size_t i = 0; i < in_class.size(); ++i) {
+    below += in_class[i];
+    histogram.bucket.push_back({below, i == bounds.size() ? std::numeric_limits<double>::infinity() : bounds[i]});
   }
   histogram.sample_count = below;
-  histogram.sample_sum = counts.sum;
+  histogram.sample_sum = sum;
 }
 
 std::string MetricFamilies::text() const { return prometheus::TextSerializer().Serialize(families_); }

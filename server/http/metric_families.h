@@ -2,12 +2,12 @@
 
 #include <prometheus/metric_family.h>
 
+#include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "server/metrics/latency_histogram.h"
 
 namespace trammel {
 
@@ -18,8 +18,9 @@ class MetricFamilies {
  public:
   void gauge(const char* name, const char* help, double value, const MetricLabels& labels = {});
   void counter(const char* name, const char* help, double value, const MetricLabels& labels = {});
-  void histogram(const char* name, const char* help, const LatencyHistogram::Counts& counts,
-                 const MetricLabels& labels = {});
+  /// `in_class`: how many are in each class, `bounds` their upper bounds; one more class holds what is above the last.
+  void histogram(const char* name, const char* help, std::span<const double> bounds,
+                 std::span<const std::uint64_t> in_class, double sum, const MetricLabels& labels = {});
 
   /// In Prometheus' text format.
   [[nodiscard]] std::string text() const;

@@ -28,7 +28,7 @@ void add_process(MetricFamilies& out) {
 void add_requests(MetricFamilies& out, const ServiceFigures& service) {
   for (const OperationFigures& one : service.operations) {
     out.histogram("trammel_request_seconds", "From the arrival of a request that was worked on to its reply.",
-                  one.latency, {{"operation", one.operation}});
+                  LatencyHistogram::kBounds, one.latency.in_class, one.latency.sum, {{"operation", one.operation}});
   }
   for (const OperationFigures& one : service.operations) {
     for (const auto& [result, count] : one.by_result) {
@@ -53,6 +53,22 @@ void add_requests(MetricFamilies& out, const ServiceFigures& service) {
   for (const auto& [reason, count] : service.dropped_packets) {
     out.counter("trammel_packets_dropped_total", "Packets that were dropped unread.", number(count),
                 {{"reason", reason}});
+  }
+}
+
+void add_work(MetricFamilies& out, const std::map<std::string, WorkFigures>& work) {
+  constexpr const char* kHelp = "Poses that were asked for, by whether the model knows the arm there.";
+  for (const auto& [cell, of] : work) {
+    out.counter("trammel_poses_asked_total", kHelp, number(of.inside), {{"cell", cell}, {"domain", "inside"}});
+    out.counter("trammel_poses_asked_total", kHelp, number(of.outside), {{"cell", cell}, {"domain", "outside"}});
+  }
+  for (const auto& [cell, of] : work) {
+    out.counter("trammel_targets_left_total", "Targets that were left as they were.", number(of.left),
+                {{"cell", cell}});
+  }
+  for (const auto& [cell, of] : work) {
+    out.histogram("trammel_promised_stddev_mm", "Standard deviation of the true error that the answers promised.",
+                  WorkFigures::kBounds, of.in_class, of.sum_mm, {{"cell", cell}});
   }
 }
 
@@ -136,7 +152,9 @@ std::string Metrics::text(ServerPhase phase, std::uint64_t shed) {
   out.gauge("trammel_serving", "1: it is neither starting nor stopping.", phase == ServerPhase::kServing ? 1 : 0);
   if (phase != ServerPhase::kServing) return out.text();
   out.gauge("trammel_healthy", "1: every part of it moves.", server_.movement().still.empty() ? 1 : 0);
-  add_requests(out, server_.figures());
+  const ServiceFigures service = server_.figures();
+  add_requests(out, service);
+  add_work(out, service.work);
   std::map<std::string, std::uint64_t> ended;
   {
     const MutexLock lock(mutex_);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/metrics/latency_histogram.h"
+#include "server/metrics/work_counts.h"
 
 /// What a service tells those who watch it: plain values, read at one moment.
 namespace trammel {
@@ -34,6 +35,7 @@ struct ServiceFigures {
   std::uint64_t unreadable = 0;                          ///< requests of which not even the header could be read
   std::uint64_t lost = 0;                                ///< requests that DDS lost before the service saw them
   std::map<std::string, std::uint64_t> dropped_packets;  ///< by reason
+  std::map<std::string, WorkFigures> work;               ///< by cell
 };
 
 /// Whether the threads of a service do their work.

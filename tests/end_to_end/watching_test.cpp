@@ -73,6 +73,12 @@ TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
   EXPECT_GE(metric("trammel_requests_total{operation=\"PredictError\",result=\"not_found\"}"), 1);
   EXPECT_GE(metric("trammel_requests_total{operation=\"PredictError\",result=\"ok\"}"), 1);
   EXPECT_GE(metric("trammel_request_seconds_count{operation=\"SubmitMeasurements\"}"), 1);
+  EXPECT_EQ(metric("trammel_poses_asked_total{cell=\"cell-7\",domain=\"inside\"}") +
+                metric("trammel_poses_asked_total{cell=\"cell-7\",domain=\"outside\"}"),
+            3);
+  EXPECT_EQ(metric("trammel_promised_stddev_mm_count{cell=\"cell-7\"}"), 3);
+  EXPECT_GT(metric("trammel_promised_stddev_mm_sum{cell=\"cell-7\"}"), 0);
+  EXPECT_EQ(metric("trammel_targets_left_total{cell=\"cell-7\"}"), 0);
   EXPECT_EQ(metric("trammel_jobs_ended_total{verdict=\"in_force\"}"), 1);
   EXPECT_EQ(metric("trammel_cell_ready{cell=\"cell-7\",state=\"served\"}"), 1);
   EXPECT_GT(metric("trammel_store_bytes"), 10000);

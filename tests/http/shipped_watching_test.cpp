@@ -33,6 +33,7 @@ std::set<std::string> names_told() {
   server.figures.operations = {{"PredictError", latency.counts(), {{"ok", 1}}}};
   server.figures.queues = {{"reads", 0}};
   server.figures.dropped_packets = {{"fragment", 0}};
+  server.figures.work = {{"cell-7", {}}};
   // Of a batch whose rows have no times the age of the data is not known.
   const Watched watched = server.watched();
   Metrics metrics(watched);
