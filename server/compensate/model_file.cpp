@@ -136,6 +136,14 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
   }
 }
 
+Result<std::string> undamaged_hash(const std::string& text, const std::string& where) {
+  return json_members(text, where).and_then([&](const Members& members) -> Result<std::string> {
+    if (const Status fine = check_undamaged(members, where); !fine) return tl::make_unexpected(fine.error());
+    const std::string_view quoted = members.at("hash");
+    return std::string(quoted.substr(1, quoted.size() - 2));
+  });
+}
+
 Result<CompensatedModel> load_model(const std::string& path) {
   return read_text_file(path).and_then([&](const std::string& text) { return deserialize(text, path); });
 }

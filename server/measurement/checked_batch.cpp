@@ -1,9 +1,13 @@
 #include "server/measurement/checked_batch.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <numeric>
+#include <set>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "server/base/check.h"
 #include "server/measurement/pose_check.h"
@@ -69,6 +73,50 @@ std::vector<std::string> session_names(const MeasurementBatch& next) {
   std::vector<std::string> names;
   for (const std::string& session : next.sessions) names.push_back(next.id + "/" + session);
   return names;
+}
+
+/// What two rows have in common only if they are one measurement: all digits of joints and position, and what was on
+/// the arm.
+using Fingerprint = std::tuple<std::vector<double>, std::array<double, 3>, std::string, std::string>;
+
+Fingerprint fingerprint_of(const Measurement& m) {
+  return {std::vector<double>(m.context.q.begin(), m.context.q.end()),
+          {m.p_W.x(), m.p_W.y(), m.p_W.z()},
+          m.context.tool,
+          m.context.payload};
+}
+
+/// Whether each row of `batch` is one that `met` has; adds those that it has not.
+std::vector<bool> copied_rows(const MeasurementBatch& batch, std::set<Fingerprint>& met) {
+  std::vector<bool> copied;
+  std::vector<Fingerprint> own;
+  for (const Measurement& m : batch.measurements) {
+    own.push_back(fingerprint_of(m));
+    copied.push_back(m.p_W.allFinite() && met.contains(own.back()));
+  }
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (batch.measurements[i].p_W.allFinite()) met.insert(std::move(own[i]));
+  }
+  return copied;
+}
+
+/// The batch without the rows of `left_out`, and without sessions of which no row is left.
+MeasurementBatch without_rows(const MeasurementBatch& batch, const std::vector<bool>& left_out) {
+  MeasurementBatch rest = batch;
+  rest.measurements.clear();
+  rest.sessions.clear();
+  int last = -1;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    if (left_out[i]) continue;
+    Measurement m = batch.measurements[i];
+    if (has_sessions(batch) && m.session != last) {
+      last = m.session;
+      rest.sessions.push_back(batch.sessions[static_cast<std::size_t>(last)]);
+    }
+    m.session = rest.sessions.empty() ? 0 : static_cast<int>(rest.sessions.size()) - 1;
+    rest.measurements.push_back(std::move(m));
+  }
+  return rest;
 }
 
 /// Appends the measurements of `next` after those of `all`, as sessions of their own.
@@ -166,10 +214,16 @@ CheckedBatch joined(std::vector<CheckedBatch> batches) {
   }
   MeasurementBatch all;
   std::vector<bool> is_held_out;
+  std::set<Fingerprint> met;
   for (const CheckedBatch& batch : batches) {
-    append(all, batch.rows());
-    const std::vector<bool>& flags = batch.content_->is_held_out;
-    is_held_out.insert(is_held_out.end(), flags.begin(), flags.end());
+    const std::vector<bool> copied = copied_rows(batch.rows(), met);
+    const auto copies = static_cast<int>(std::count(copied.begin(), copied.end(), true));
+    all.copies += copies;
+    if (static_cast<std::size_t>(copies) == batch.size()) continue;
+    append(all, copies == 0 ? batch.rows() : without_rows(batch.rows(), copied));
+    for (std::size_t i = 0; i < copied.size(); ++i) {
+      if (!copied[i]) is_held_out.push_back(batch.content_->is_held_out[i]);
+    }
   }
   std::string hash = batch_hash(all);
   return CheckedBatch(std::move(all), std::move(is_held_out), std::move(hash));

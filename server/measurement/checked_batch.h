@@ -64,8 +64,9 @@ class CheckedBatch {
 
 /// Joins batches of one cell into one, in the order of time where the instruments' clocks say it, else in their order.
 /// Each batch is a session, or as many as it has, because the tracker may have been set up anew. The ids are joined by
-/// plus signs, pose ids become `batch/pose`, extra columns are dropped. Held-out rows stay held out. A single batch is
-/// returned unchanged.
+/// plus signs, pose ids become `batch/pose`, extra columns are dropped. Held-out rows stay held out. A row that an
+/// earlier batch has to the last digit is the same measurement under another name: it counts once, and `copies` counts
+/// it. A single batch is returned unchanged.
 [[nodiscard]] CheckedBatch joined(std::vector<CheckedBatch> batches);
 
 }  // namespace trammel

@@ -41,6 +41,7 @@ struct MeasurementBatch {
   /// Names of its sessions in the order of time, whose rows stand together; empty: the whole batch is one. A session
   /// has a frame W of its own, because the tracker was set up anew.
   std::vector<std::string> sessions = {};
+  int copies = 0;        ///< rows that were left out: an earlier batch has them, see joined()
   bool as_then = false;  ///< its poses are placed by their index among those of a model: what began later had not begun
 };
 

@@ -36,6 +36,9 @@ constexpr double kCertainBase = from_deg(1);
 constexpr double kToolStddev = 5e-3;  // of a tool as it is mounted
 constexpr double kToolSigmas = 4;
 constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell is that near
+// Stated uncertainties.
+constexpr std::size_t kFewestForSigma = 20;  // poses: below that an arm follows noise
+constexpr double kNotThatGood = 0.25;        // of the stated deviation: honest noise leaves at least 0.8 of it
 // Angles.
 constexpr double kOtherTurn = from_deg(0.5);  // by which orientations decide between readings
 constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
@@ -96,6 +99,7 @@ class Look {
     if (given_->base_turn_stddev < kCertainBase) seen.X_WB = given_->X_WB;
     seen.doubt = of_some_rows();
     if (!seen.doubt) seen.doubt = of_zero();
+    if (!seen.doubt) seen.doubt = of_sigma();
     if (seen.doubt) return seen;
     seen.doubt = of_tool();
     seen.of_tool = seen.doubt.has_value();
@@ -108,6 +112,7 @@ class Look {
   [[nodiscard]] Error of_reading() const;
   [[nodiscard]] std::optional<Error> of_some_rows();
   [[nodiscard]] std::optional<Error> of_zero() const;
+  [[nodiscard]] std::optional<Error> of_sigma() const;
   [[nodiscard]] std::optional<Error> of_tool() const;
   [[nodiscard]] Error of_tool_at(const std::string& tool, const Vector3& p_FT) const;
 
@@ -245,6 +250,21 @@ std::optional<Error> Look::of_zero() const {
         .value();
   }
   return std::nullopt;
+}
+
+/// Positions that are far better than they say: their deviations are in another unit.
+std::optional<Error> Look::of_sigma() const {
+  if (table_.size() < kFewestForSigma) return std::nullopt;
+  std::vector<double> stated;
+  for (const Measurement* m : table_.from) stated.push_back(m->sigma.value_or(cell_.tracker.sigma));
+  const double sigma = reading::median(stated);
+  if (given_->off > kNotThatGood * sigma) return std::nullopt;
+  return refused("the positions follow the joints to {}, and are said to be uncertain by {}", mm(given_->off),
+                 mm(sigma))
+      .of("sigma_mm")
+      .beyond(to_mm(sigma), to_mm(given_->off / kNotThatGood))
+      .next("is sigma_mm in another unit?")
+      .value();
 }
 
 /// A measured point that is not that of the tool.

@@ -101,12 +101,19 @@ Pose read_pose(const YamlMap& map) {
 
 namespace {
 
+constexpr double kWorstSigma = 5e-3;  // m; no instrument for robots is worse
+
 Tracker read_tracker(const YamlMap& map) {
   map.only({"sigma_mm", "sigma_deg", "xyz_mm", "aperture_deg", "target_normal"});
   Tracker tracker;
   tracker.sigma = from_mm(map.number("sigma_mm", to_mm(tracker.sigma)));
   tracker.sigma_rotation = from_deg(map.number("sigma_deg", to_deg(tracker.sigma_rotation)));
   if (tracker.sigma <= 0) map.refuse("sigma_mm", refused("must be above 0").beyond(to_mm(tracker.sigma), 0));
+  if (tracker.sigma > kWorstSigma) {
+    map.refuse("sigma_mm", refused("{:g}, limit {:g}", to_mm(tracker.sigma), to_mm(kWorstSigma))
+                               .beyond(to_mm(tracker.sigma), to_mm(kWorstSigma))
+                               .next("in micrometres? write it in mm"));
+  }
   if (tracker.sigma_rotation <= 0)
     map.refuse("sigma_deg", refused("must be above 0").beyond(to_deg(tracker.sigma_rotation), 0));
   if (!map.is_null("xyz_mm")) tracker.p_W = read_vector(map, "xyz_mm") * from_mm(1);

@@ -10,6 +10,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "server/base/hash.h"
+#include "server/compensate/model_file.h"
 #include "server/store/audit.h"
 #include "server/store/audit_rows.h"
 #include "server/store/file_header.h"
@@ -67,10 +69,54 @@ Status check_trail(SQLite::Database& database, StoreCopy& copy) {
   return {};
 }
 
+Failure damaged(const std::string& what, const std::string& path) {
+  return failure(ErrorCode::kInternal, "damaged: {}", what).in(path).next("take an older copy");
+}
+
+Status check_size(SQLite::Database& database, const std::string& path) {
+  const std::int64_t expected = count(database, "PRAGMA page_size") * count(database, "PRAGMA page_count");
+  std::error_code error;
+  const auto size = static_cast<std::int64_t>(fs::file_size(path, error));
+  if (!error && size == expected) return {};
+  return damaged(fmt::format("{} bytes, and its pages are {}", size, expected), path);
+}
+
+/// Every batch is what was accepted; of one that was pruned the text is gone.
+Status check_batches(SQLite::Database& database, const std::string& path) {
+  SQLite::Statement rows(database, "SELECT cell, id, csv, hash FROM batches WHERE csv <> ''");
+  while (rows.executeStep()) {
+    if (sha256_hex(rows.getColumn(2).getString()) == rows.getColumn(3).getString()) continue;
+    return damaged(fmt::format("batch {} of cell {} is not what was accepted", rows.getColumn(1).getString(),
+                               rows.getColumn(0).getString()),
+                   path);
+  }
+  return {};
+}
+
+/// Every model is what was stored, by its own hashes and by that beside it.
+Status check_models(SQLite::Database& database, const std::string& path) {
+  SQLite::Statement rows(database, "SELECT cell, version, hash, content FROM models WHERE content <> ''");
+  while (rows.executeStep()) {
+    const std::string name =
+        fmt::format("version {} of cell {}", rows.getColumn(1).getInt(), rows.getColumn(0).getString());
+    const auto hash = undamaged_hash(rows.getColumn(3).getString(), name);
+    if (!hash) return damaged(fmt::format("{}: {}", name, hash.error().message), path);
+    if (*hash != rows.getColumn(2).getString()) return damaged(name + " is not the model that was stored", path);
+  }
+  return {};
+}
+
+Status check_texts(SQLite::Database& database, const std::string& path) {
+  const Status batches = check_batches(database, path);
+  return batches ? check_models(database, path) : batches;
+}
+
 Result<StoreCopy> checked(SQLite::Database& database, const std::string& path) {
   if (const Status ours = check_is_store(database, path); !ours) return tl::make_unexpected(ours.error());
   const std::string pages = database.execAndGet("PRAGMA integrity_check(1)").getString();
   if (pages != "ok") return failure(ErrorCode::kInternal, "damaged: {}", pages).in(path);
+  if (const Status whole = check_size(database, path); !whole) return tl::make_unexpected(whole.error());
+  if (const Status whole = check_texts(database, path); !whole) return tl::make_unexpected(whole.error());
   StoreCopy copy;
   if (const auto mark = mark_of(database)) copy.identity = mark->identity;
   copy.models = count(database, "SELECT COUNT(*) FROM models");

@@ -25,8 +25,8 @@ struct StoreCopy {
 [[nodiscard]] Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
                                               const std::function<void(double)>& progress = nullptr);
 
-/// Whether a store that nobody has open is whole: its pages, and its audit trail row by row. Changes nothing. Refuses
-/// (kInternal) what is damaged.
+/// Whether a store that nobody has open is whole: its size and pages, its audit trail row by row, and every batch and
+/// model by its hash. Changes nothing. Refuses (kInternal) what is damaged.
 [[nodiscard]] Result<StoreCopy> check_store_copy(const std::string& path);
 
 }  // namespace trammel

@@ -57,6 +57,19 @@ TEST(BatchCheck, RobotsAsTheyAreDeliveredAreNotDoubtedHoweverBadlyTheyWereMaster
   }
 }
 
+TEST(BatchCheck, PositionsThatSayTheyAreFarWorseThanTheyAreAreDoubted) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    FirstBatch first = test::first_batch(seed, test::Robots::kOfSixJoints);
+    first.poses = std::max(first.poses, 30);
+    const auto cell = test::new_cell(first);
+    MeasurementBatch batch = test::measured_first(first, *cell);
+    for (Measurement& m : batch.measurements) m.sigma = 5e-3;
+    const auto said = test::said_of(std::move(batch), *cell);
+    ASSERT_TRUE(said) << first.robot << ", seed " << seed;
+    EXPECT_EQ(said->field, "sigma_mm") << sentence(*said);
+  }
+}
+
 TEST(BatchCheck, AToolOfAnotherNameIsNamed) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   Pose probe = *cell->tools.at("spindle");

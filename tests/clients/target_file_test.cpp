@@ -32,6 +32,15 @@ TEST(TargetFile, ReadsPosesWithABranch) {
   EXPECT_TRUE(target.X_BT.linear().isApprox(Vector3(1, -1, -1).asDiagonal().toDenseMatrix()));
 }
 
+TEST(TargetFile, RefusesWhatWasCorrectedAlready) {
+  const std::string header = "conf," + kPose + ",status,error_before_mm,error_after_mm,model_id\n";
+  const auto again = parse_targets_csv(header + "3,1000,-200,1500,0,1,0,0,ok,0.7,0.01,m1\n", "t.csv");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().field, "model_id");
+  EXPECT_NE(again.error().message.find("m1"), std::string::npos) << again.error().message;
+  EXPECT_TRUE(parse_targets_csv("conf," + kPose + ",status\n3,1000,-200,1500,0,1,0,0,ok\n", "t.csv"));
+}
+
 TEST(TargetFile, ReadsPosesWithASeed) {
   const auto file = parse_targets_csv(kPose + ",q1_deg,q2_deg\n1,2,3,1,0,0,0,90,-45\n", "t.csv");
   ASSERT_TRUE(file) << file.error().message;

@@ -14,8 +14,8 @@ namespace {
 static_assert(!std::is_default_constructible_v<CheckedBatch>);
 static_assert(!std::is_constructible_v<CheckedBatch, MeasurementBatch>, "what is not checked cannot become one");
 
-MeasurementBatch measured(int poses, const std::string& id = "lt-07") {
-  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, 3);
+MeasurementBatch measured(int poses, const std::string& id = "lt-07", std::uint64_t seed = 3) {
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed);
   batch.id = id;
   return batch;
 }
@@ -103,7 +103,8 @@ TEST(CheckedBatch, KnowsTheVelocitiesOfAContinuousPath) {
 }
 
 TEST(CheckedBatch, BatchesThatAreLearnedFromTogetherKeepWhatIsHeldOutOfEach) {
-  const CheckedBatch one = checked(measured(20, "a"), drawn(0.2, 7)), other = checked(measured(30, "b"), drawn(0.1, 7));
+  const CheckedBatch one = checked(measured(20, "a"), drawn(0.2, 7)),
+                     other = checked(measured(30, "b", 4), drawn(0.1, 7));
   const CheckedBatch both = joined({one, other});
   EXPECT_EQ(both.id(), "a+b");
   EXPECT_EQ(both.size(), 50U);
@@ -111,6 +112,23 @@ TEST(CheckedBatch, BatchesThatAreLearnedFromTogetherKeepWhatIsHeldOutOfEach) {
   EXPECT_EQ(both.rows().measurements[20].pose_id, "b/" + other.rows().measurements[0].pose_id);
   EXPECT_EQ(both.rows().measurements[49].context.index, 49);
   EXPECT_EQ(joined({one}).id(), "a");
+}
+
+TEST(CheckedBatch, TheSameMeasurementsUnderTwoNamesCountOnce) {
+  const CheckedBatch first = checked(measured(20, "a"), drawn(0.2, 7));
+  MeasurementBatch renamed = measured(20, "b");
+  for (Measurement& m : renamed.measurements) m.pose_id = "again-" + m.pose_id;
+  renamed.measurements[7].p_W.x() += 1e-9;
+  const CheckedBatch both = joined({first, checked(renamed), checked(measured(30, "c", 4))});
+  EXPECT_EQ(both.size(), 20U + 1U + 30U) << "one row was measured again";
+  EXPECT_EQ(both.rows().copies, 19);
+  EXPECT_EQ(both.rows().measurements[20].pose_id, "b/again-" + measured(20).measurements[7].pose_id);
+  EXPECT_EQ(both.held_out().measurements.size(), 4U) << "none of them is learned from under its other name";
+  EXPECT_EQ(both.rows().sessions.size(), 3U);
+
+  const CheckedBatch copied = joined({first, checked(measured(20, "b"))});
+  EXPECT_EQ(copied.size(), 20U);
+  EXPECT_EQ(copied.rows().sessions.size(), 1U) << "the other file is no session";
 }
 
 }  // namespace

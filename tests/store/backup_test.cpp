@@ -150,6 +150,24 @@ TEST_F(BackupTest, ACopyThatWasChangedAfterwardsIsNotWhole) {
   std::string bytes = test::read_file(copy_);
   std::ofstream(copy_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
   EXPECT_FALSE(check_store_copy(copy_)) << "half of it is missing";
+  std::ofstream(copy_, std::ios::binary) << bytes.substr(0, bytes.size() - 1);
+  EXPECT_FALSE(check_store_copy(copy_)) << "its last byte is missing";
+}
+
+TEST_F(BackupTest, ABatchOrAModelOfWhichADigitWasChangedIsNamed) {
+  train("lt-07");
+  ASSERT_TRUE(back_up());
+  const std::string good = test::read_file(copy_);
+  const auto changed = [&](const std::string& sql) {
+    std::ofstream(copy_, std::ios::binary) << good;
+    SQLite::Database(copy_, SQLite::OPEN_READWRITE).exec(sql);
+    const auto copy = check_store_copy(copy_);
+    return copy ? std::string() : copy.error().message;
+  };
+  EXPECT_EQ(changed("UPDATE batches SET poses = poses"), "");
+  EXPECT_NE(changed("UPDATE batches SET csv = replace(csv, 'lt-07', 'lt-08')").find("batch lt-07"), std::string::npos);
+  EXPECT_NE(changed("UPDATE models SET content = replace(content, '\"values\":[1', '\"values\":[2')").find("version 1"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -54,7 +54,8 @@ void add_store_backup_command(CLI::App& app, Action& chosen) {
       "backup", "Copy a store as it is at one moment, also while a service writes it, and check the copy");
   command->add_option("--store", arguments->store, "The store's file, on this host");
   command->add_option("-o,--output", arguments->output, "The copy; refused where there is such a file");
-  command->add_option("--check", arguments->check, "Only check this copy: its pages, its audit trail row by row");
+  command->add_option("--check", arguments->check,
+                      "Only check this copy: pages, audit trail, batches and models by their hashes");
   command->add_option("--json", arguments->json, "Write what the copy holds as JSON (- = standard output)");
   command->footer(
       "To go back to a copy: stop the service, put the copy in the store's place, start the service. Models that were\n"

@@ -1,5 +1,6 @@
 #include "clients/cli/files/batch_files.h"
 
+#include <cstdio>
 #include <map>
 
 #include "server/measurement/files/batch_file.h"
@@ -34,7 +35,13 @@ Result<CheckedBatch> read_checked_batches(const std::vector<std::string>& paths,
     if (!one) return one;
     checked.push_back(std::move(*one));
   }
-  return joined(std::move(checked));
+  CheckedBatch all = joined(std::move(checked));
+  if (const int copies = all.rows().copies; copies > 0) {
+    fmt::print(stderr,
+               "{} measurements stand in several of these files, to the last digit: each counts once, in the first\n",
+               copies);
+  }
+  return all;
 }
 
 }  // namespace trammel::cli

@@ -79,11 +79,24 @@ Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& 
   return {};
 }
 
+/// A file that `correct` wrote: to correct it again would send the tool away by the correction once more.
+Status check_not_corrected(const CsvTable& table) {
+  for (const char* column : {"status", "error_before_mm", "error_after_mm", "model_id"}) {
+    if (!table.find(column)) return {};
+  }
+  const std::string model = table.size() == 0 ? "" : table.field(0, *table.find("model_id"));
+  return refused("it is corrected already{}", model.empty() ? "" : ", by model " + model)
+      .in(table.where())
+      .of("model_id")
+      .next("correct the file that it was made from");
+}
+
 }  // namespace
 
 Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where) {
   const Result<CsvTable> table = CsvTable::parse(text, where);
   if (!table) return tl::make_unexpected(table.error());
+  if (const Status fresh = check_not_corrected(*table); !fresh) return tl::make_unexpected(fresh.error());
   const Result<TargetColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
   if (table->size() == 0) return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);

@@ -13,8 +13,8 @@ namespace trammel {
 
 namespace {
 
-constexpr double kPositionLimitMm = 1e6;  // beyond the range of any tracker
-constexpr double kSigmaLimitMm = 1e3;
+constexpr double kPositionLimitMm = 1e6;            // beyond the range of any tracker
+constexpr double kSigmaLimitMm = 5;                 // no instrument is worse, and micrometres read as millimetres are
 constexpr std::size_t kMostMeasurements = 100'000;  // of one file: five times what one training takes
 
 const std::vector<std::string> kPositionColumns = {"x_mm", "y_mm", "z_mm"};
