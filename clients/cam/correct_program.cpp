@@ -232,15 +232,19 @@ class Correcting {
       row.message = left.why;
     }
     tell_readings();
-    std::stable_sort(result_.rows.begin(), result_.rows.end(), [](const ReceiptRow& a, const ReceiptRow& b) {
+    const auto by_place = [](const ReceiptRow& a, const ReceiptRow& b) {
       return std::tie(a.file, a.line) < std::tie(b.file, b.line);
-    });
+    };
+    // A row is large, and those of a long program mostly stand as they shall.
+    if (!std::is_sorted(result_.rows.begin(), result_.rows.end(), by_place))
+      std::stable_sort(result_.rows.begin(), result_.rows.end(), by_place);
     for (std::size_t f = 0; f < program_.files.size(); ++f) write_file(f);
     return std::move(result_);
   }
 
   /// What is left as it stands moves all the same where it is made of a target that is corrected.
   void tell_readings() {
+    if (program_.readings.empty()) return;
     std::set<std::pair<std::size_t, std::size_t>> written;
     for (std::size_t t = 0; t < program_.targets.size(); ++t) {
       if (!result_.rows[t].corrected()) continue;

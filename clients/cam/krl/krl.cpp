@@ -55,11 +55,15 @@ struct Routine {
   std::size_t file = 0, first = 0, last = 0;  ///< lines
 };
 
+constexpr double kSpeedUnknown = -1;
+
 /// What the controller has set when a motion comes.
 struct State {
   std::size_t tool = 0, frame = 0;
-  std::size_t load = 0;    ///< 0: the tool's own
-  std::string fixed_tool;  ///< why the robot does not hold the tool; empty: it does
+  std::size_t load = 0;          ///< 0: the tool's own
+  std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
+  std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
+  double speed = kSpeedUnknown;  ///< of the tool, mm/s
   auto operator<=>(const State&) const = default;
 };
 
@@ -90,6 +94,25 @@ bool is_relative(const std::string& word) {
   return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
 }
 
+/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
+/// stands; 0: the line is neither.
+std::size_t done_later(const std::vector<Token>& tokens) {
+  const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
+  if (tokens.size() < first + 2 || (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER")) return 0;
+  for (std::size_t at = first + 1; at + 1 < tokens.size(); ++at) {
+    if (tokens[at].text == "DO") return at + 1;
+  }
+  return 0;
+}
+
+bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Value& one, const Value& other) {
+    return one.kind == other.kind && one.kind != Value::Kind::kOther && one.number == other.number &&
+           one.name == other.name && one.field_names == other.field_names &&
+           is_equal(one.field_values, other.field_values);
+  });
+}
+
 class Reader {
  public:
   Reader(std::vector<SourceFile> files, const ReadOptions& options) : options_(options) {
@@ -102,8 +125,10 @@ class Reader {
 
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
+    join_globals();
     std::set<std::string> called;
     for (std::size_t r = 0; r < routines_.size(); ++r) by_name_.emplace(routines_[r].name, r);
+    find_interrupts(called);
     for (const Routine& routine : routines_) note_calls(routine, called);
     for (std::size_t r = 0; r < routines_.size(); ++r) {
       if (!called.contains(routines_[r].name)) run(r, {}, 0);
@@ -162,10 +187,15 @@ class Reader {
 
   /// A declaration or assignment: behind `DECL` and a type, or bare.
   void note_value(std::size_t f, std::size_t k) {
+    note_value(f, k, 0);
+    if (const std::size_t later = done_later(lines_[f][k].tokens); later > 0) note_value(f, k, later);
+  }
+
+  void note_value(std::size_t f, std::size_t k, std::size_t at) {
+    const bool later = at > 0;
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
                                                  "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
-    std::size_t at = 0;
     bool declared = false;
     while (at < tokens.size() &&
            (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
@@ -173,8 +203,10 @@ class Reader {
       ++at;
     }
     if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
-        tokens[at + 1].kind == TokenKind::kWord)
+        tokens[at + 1].kind == TokenKind::kWord) {
       ++at;
+      declared_[tokens[at].text].insert(stem_of(program_.files[f].name));
+    }
     if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
     std::size_t next = at;
     const std::vector<Value> name = krl::operands_at(tokens, at, &next);
@@ -185,12 +217,42 @@ class Reader {
     const std::string root = root_of(name[0].name);
     const auto key = std::pair(stem_of(program_.files[f].name), root);
     Variable& variable = variables_[key];
-    if (root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
+    if (later || root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
       variable.changed = set_at(root, f, k);
       return;
     }
     variable.values.push_back({f, k, std::move(operands)});
     if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
+  }
+
+  /// What a file sets and does not declare is another one's, or the controller's.
+  void join_globals() {
+    static const std::set<std::string> kOfTheController = {"TOOL_DATA", "BASE_DATA", "LOAD_DATA"};
+    for (auto one = variables_.begin(); one != variables_.end();) {
+      const auto& [stem, root] = one->first;
+      const std::string word = root.substr(0, root.find('['));
+      const auto known = declared_.find(word);
+      std::set<std::string> owners;
+      if (kOfTheController.contains(word))
+        owners = {""};
+      else if (known != declared_.end() && !known->second.contains(stem))
+        owners = known->second;
+      if (owners.empty() || owners.contains(stem)) {
+        ++one;
+        continue;
+      }
+      for (const std::string& owner : owners) merge(one->second, root, variables_[{owner, root}]);
+      one = variables_.erase(one);
+    }
+  }
+
+  void merge(const Variable& from, const std::string& root, Variable& into) const {
+    if (into.changed.empty()) into.changed = from.changed;
+    for (const Assigned& value : from.values) {
+      const bool same = !into.values.empty() && is_equal(into.values[0].operands, value.operands);
+      if (!into.values.empty() && !same) into.changed = set_at(root, value.file, value.line);
+      if (!same) into.values.push_back(value);
+    }
   }
 
   std::string set_at(const std::string& name, std::size_t f, std::size_t k) const {
@@ -438,7 +500,42 @@ class Reader {
   void note_calls(const Routine& routine, std::set<std::string>& called) const {
     for (std::size_t k = routine.first; k < routine.last; ++k) {
       const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
-      if (tokens.size() > 1 && tokens[1].text == "(") called.insert(tokens[0].text);
+      for (const std::size_t r : called_by(tokens)) called.insert(routines_[r].name);
+    }
+  }
+
+  /// The routines that come in between.
+  void find_interrupts(std::set<std::string>& called) {
+    for (std::size_t f = 0; f < lines_.size(); ++f) {
+      for (const Line& line : lines_[f]) {
+        const std::size_t at = done_later(line.tokens);
+        const auto routine = at == 0 ? by_name_.end() : by_name_.find(line.tokens[at].text);
+        resumes_ |= !line.tokens.empty() && line.tokens[0].text == "RESUME";
+        const auto known = [&] { return std::find(interrupts_.begin(), interrupts_.end(), routine->second); };
+        if (routine == by_name_.end() || known() != interrupts_.end()) continue;
+        called.insert(routine->first);
+        interrupts_.push_back(routine->second);
+      }
+    }
+  }
+  static std::uint64_t bit_of(std::size_t interrupt) {
+    return std::uint64_t{1} << std::min<std::size_t>(interrupt, 63);
+  }
+
+  /// What interrupts that are declared make of a state before a line.
+  void come_in(State& state, int depth) {
+    if (inside_interrupt_ || state.armed == 0) return;
+    for (bool more = true; more;) {
+      more = false;
+      for (std::size_t i = 0; i < interrupts_.size(); ++i) {
+        if ((state.armed & bit_of(i)) == 0) continue;
+        inside_interrupt_ = true;
+        const State back = end_of(interrupts_[i], state, depth + 1);
+        inside_interrupt_ = false;
+        const State was = state;
+        join(state, back, fmt::format("the interrupt routine {}", shown(routines_[interrupts_[i]].name)));
+        more |= !(state == was);
+      }
     }
   }
 
@@ -466,16 +563,21 @@ class Reader {
       std::vector<Step> steps;
       for (std::size_t k = routine.first; k < routine.last; ++k)
         steps.push_back(step_of(lines_[routine.file][k].tokens));
-      order->second = next_of(steps);
+      order->second = flow_of(steps);
+      // RESUME ends what was interrupted, wherever it was.
+      for (std::vector<std::size_t>& next : order->second.next) {
+        if (resumes_) next.push_back(steps.size());
+      }
     }
     return states_before(
-        order->second, {0}, begin,
+        order->second, begin,
         [&](std::size_t step, State& state) { set(routine.file, routine.first + step, state, depth); },
-        [&](State& state, const State& other) { join(state, other); });
+        [&](State& state, const State& other, const std::string& by) { join(state, other, by); },
+        [&](State& state) { come_in(state, depth); });
   }
 
   State end_of(std::size_t r, const State& begin, int depth) {
-    const auto key = std::pair(r, begin);
+    const auto key = std::tuple(r, begin, inside_interrupt_);
     if (const auto known = ends_.find(key); known != ends_.end()) return known->second;
     ends_[key] = begin;
     return ends_[key] = states_in(r, begin, depth).back();
@@ -483,7 +585,7 @@ class Reader {
 
   /// Its motions, and those of what it calls.
   void run(std::size_t r, const State& begin, int depth) {
-    if (!run_.emplace(r, begin).second) return;
+    if (!run_.emplace(r, begin, inside_interrupt_).second) return;
     ran_.insert(r);
     const Routine routine = routines_[r];
     const std::vector<State> states = states_in(r, begin, depth);
@@ -492,24 +594,46 @@ class Reader {
       if (tokens.empty()) continue;
       const State& state = states[k - routine.first];
       if (is_motion(tokens[0].text) || is_relative(tokens[0].text)) motion(routine.file, k, state);
-      if (const auto called = called_by(tokens); called && depth < kDeepest) run(*called, state, depth + 1);
+      if (depth >= kDeepest) continue;
+      for (const std::size_t called : called_by(tokens)) run(called, state, depth + 1);
+      run_interrupts(state, depth);
+    }
+    run_interrupts(states.back(), depth);
+  }
+
+  void run_interrupts(const State& state, int depth) {
+    for (std::size_t i = 0; i < interrupts_.size() && !inside_interrupt_; ++i) {
+      if ((state.armed & bit_of(i)) == 0) continue;
+      inside_interrupt_ = true;
+      run(interrupts_[i], state, depth + 1);
+      inside_interrupt_ = false;
     }
   }
 
-  [[nodiscard]] std::optional<std::size_t> called_by(const std::vector<Token>& tokens) const {
-    if (tokens.size() < 2 || tokens[1].text != "(") return std::nullopt;
-    const auto routine = by_name_.find(tokens[0].text);
-    return routine == by_name_.end() ? std::nullopt : std::optional(routine->second);
+  /// Procedures and functions, in their order.
+  [[nodiscard]] std::vector<std::size_t> called_by(const std::vector<Token>& tokens) const {
+    std::vector<std::size_t> called;
+    if (done_later(tokens) > 0) return called;
+    for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
+      if (tokens[at].kind != TokenKind::kWord || tokens[at + 1].text != "(") continue;
+      if (const auto routine = by_name_.find(tokens[at].text); routine != by_name_.end())
+        called.push_back(routine->second);
+    }
+    return called;
   }
 
   /// Where ways come together, what they set differently is not known.
-  void join(State& state, const State& other) {
-    const std::string why = "a branch or a loop of the program decides it";
-    if (state.tool != other.tool)
+  void join(State& state, const State& other, const std::string& by) {
+    const std::string why = by.empty() ? "a branch or a loop of the program decides it" : by + " may change it";
+    if (state.tool != other.tool && program_.tools[state.tool].why_not.empty())
       state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
-    if (state.frame != other.frame) state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
-    if (state.load != other.load) state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
-    if (state.fixed_tool != other.fixed_tool) state.fixed_tool = why;
+    if (state.frame != other.frame && program_.frames[state.frame].why_not.empty())
+      state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    if (state.load != other.load && loads_[state.load].why_not.empty())
+      state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
+    if (state.fixed_tool != other.fixed_tool && state.fixed_tool.empty()) state.fixed_tool = why;
+    state.armed |= other.armed;
+    state.speed = std::max(state.speed, other.speed);
   }
 
   /// What a line sets.
@@ -537,9 +661,36 @@ class Reader {
       apply_fdat(tokens[2].text, f, state);
     } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
       set_by_bas(tokens, f, k, state);
-    } else if (const auto called = called_by(tokens); called && depth < kDeepest) {
-      state = end_of(*called, state, depth + 1);
+    } else if (word == "$VEL") {
+      state.speed = speed_at(tokens, 0);
+    } else if (const std::size_t later = done_later(tokens); later > 0) {
+      for (std::size_t i = 0; i < interrupts_.size(); ++i) {
+        if (routines_[interrupts_[i]].name == tokens[later].text) state.armed |= bit_of(i);
+      }
     }
+    if (depth >= kDeepest) return;
+    for (const std::size_t called : called_by(tokens)) state = end_of(called, state, depth + 1);
+  }
+
+  /// `$VEL.CP=0.25`, `$VEL={CP 0.25,...}`, `$VEL=SVEL_CP(0.25, , LCPDAT1)`, m/s.
+  static double speed_at(const std::vector<Token>& tokens, std::size_t at) {
+    const auto is = [&](std::size_t ahead, std::string_view text) {
+      return at + ahead < tokens.size() && tokens[at + ahead].text == text;
+    };
+    std::size_t number = 0;
+    if (is(1, ".") && is(2, "CP") && is(3, "=")) number = at + 4;
+    if (is(1, "=") && is(2, "SVEL_CP") && is(3, "(")) number = at + 4;
+    if (is(1, "=") && is(2, "{")) {
+      number = at + 3;
+      while (number < tokens.size() && tokens[number].text != "CP" && tokens[number].text != "}") ++number;
+      ++number;
+    }
+    return number == 0 ? kSpeedUnknown : speed_of(tokens, number);
+  }
+  static double speed_of(const std::vector<Token>& tokens, std::size_t at) {
+    if (at >= tokens.size() || tokens[at].kind != TokenKind::kNumber) return kSpeedUnknown;
+    const auto number = read_number(tokens[at].text);
+    return number && number->value > 0 ? to_mm(number->value) : kSpeedUnknown;
   }
 
   /// `BAS(#TOOL,1)`, `BAS(#BASE,2)`
@@ -551,6 +702,10 @@ class Reader {
       state.load = 0;
       state.tool = constant ? tool_numbered(number, f)
                             : add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+    } else if (tokens[3].text == "CP_PARAMS" || tokens[3].text == "VEL_CP") {
+      state.speed = speed_of(tokens, 5);
+    } else if (tokens[3].text == "INITMOV") {
+      state.speed = kSpeedUnknown;
     } else if (tokens[3].text == "BASE") {
       state.frame = constant ? base_numbered(number, f) : add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
     }
@@ -559,7 +714,8 @@ class Reader {
   /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion alone.
   void apply_with(std::size_t f, std::size_t k, State& state) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
-    for (std::size_t at = 0; at + 2 < tokens.size(); ++at) {
+    for (std::size_t at = 1; at + 2 < tokens.size(); ++at) {
+      if (tokens[at].text == "$VEL") state.speed = speed_at(tokens, at);
       if (tokens[at + 1].text != "=" || (tokens[at].text != "$TOOL" && tokens[at].text != "$BASE")) continue;
       const bool by_fdat =
           at + 4 < tokens.size() && tokens[at + 3].text == "(" && tokens[at + 4].kind == TokenKind::kWord;
@@ -595,6 +751,8 @@ class Reader {
     program_.moves[move].is_arc = word == "CIRC" || word == "SCIRC";
     if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
     apply_with(f, k, state);
+    if (state.speed > program_.moves[move].speed_mm_s.value_or(0) && word.find("PTP") == std::string::npos)
+      program_.moves[move].speed_mm_s = state.speed;
     state.tool = tool_carrying(state.tool, state.load);
     std::size_t next = 1;
     const int count = word == "CIRC" || word == "SCIRC" ? 2 : 1;
@@ -848,10 +1006,14 @@ class Reader {
   std::map<std::pair<std::string, std::string>, Variable> variables_;
   std::map<std::string, std::string> tool_names_;
   std::vector<Load> loads_ = std::vector<Load>(1);
-  std::map<std::string, std::size_t> by_name_;                           ///< routines
-  std::map<std::size_t, std::vector<std::vector<std::size_t>>> orders_;  ///< of the lines of each routine
-  std::map<std::pair<std::size_t, State>, State> ends_;
-  std::set<std::pair<std::size_t, State>> run_;
+  std::map<std::string, std::size_t> by_name_;  ///< routines
+  std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine
+  std::map<std::tuple<std::size_t, State, bool>, State> ends_;
+  std::vector<std::size_t> interrupts_;  ///< routines that come in between
+  bool resumes_ = false;                 ///< an interrupt may end what it came in
+  bool inside_interrupt_ = false;
+  std::map<std::string, std::set<std::string>> declared_;  ///< in which files each word is
+  std::set<std::tuple<std::size_t, State, bool>> run_;
   std::set<std::size_t> ran_;
   std::map<std::pair<std::size_t, std::size_t>, std::string> read_;  ///< why the numbers at a place must stay
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;

@@ -368,8 +368,11 @@ class Reader {
   }
 
   Step step_of(std::size_t module, const Instruction& instruction) const {
-    static const std::set<std::string> kReturns = {"return", "raise", "exit", "exitcycle", "retry", "trynext"};
+    static const std::set<std::string> kReturns = {"return", "raise", "exit", "exitcycle"};
+    static const std::set<std::string> kGoesBack = {"retry", "trynext", "startmoveretry"};
     if (is_motion(instruction.name)) return {};
+    if (kGoesBack.contains(instruction.name)) return {Step::Kind::kGoBack};
+    if (instruction.name == "gripload" || instruction.name == "pdispoff") return {Step::Kind::kPlain, "", true};
     if (kReturns.contains(instruction.name)) return {Step::Kind::kReturn};
     if (instruction.name == "goto" && !instruction.arguments.empty())
       return {Step::Kind::kJump, instruction.arguments[0].name};
@@ -396,12 +399,13 @@ class Reader {
     state.displaced = static_cast<std::size_t>(known - displacements_.begin());
     if (known == displacements_.end()) displacements_.push_back(why);
   }
-  void join(State& state, const State& other) {
+  void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
-    if (state.load == other.load) return;
+    if (state.load == other.load || !loads_[state.load].why_not.empty()) return;
     Load load;
     load.name = "GripLoad";
-    load.why_not = "GripLoad: a branch, a loop or a caller decides what the robot carries";
+    load.why_not = by.empty() ? "GripLoad: a branch, a loop or a caller decides what the robot carries"
+                              : fmt::format("GripLoad: {} may change what the robot carries", by);
     state.load = known_load(std::move(load));
   }
 
@@ -410,8 +414,8 @@ class Reader {
     const auto& steps = std::get<0>(found);
     const auto& places = std::get<1>(found);
     const std::vector<State> states = states_before(
-        next_of(steps, true), entries_of(steps), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
-        [&](State& state, const State& other) { join(state, other); });
+        flow_of(steps, true), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
+        [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps.size(); ++s) {
       const Instruction* motion = places[s].instruction;
       const std::size_t module = places[s].module;
@@ -525,10 +529,8 @@ class Reader {
       if (argument.label == kToolArgument) tool = &argument;
     }
     if (positional.empty()) return;
-    for (const Expression* argument : positional) {
-      note_names(*argument);
-      if (const auto speed = predefined_speed(*argument)) program_.moves.back().speed_mm_s = speed;
-    }
+    for (const Expression* argument : positional) note_names(*argument);
+    note_speed(module, motion);
     const auto leave_it = [&](const std::string& why) {
       leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
     };
@@ -550,13 +552,39 @@ class Reader {
     }
   }
 
-  /// Of `v100`, mm/s; a controller predefines them.
-  static std::optional<double> predefined_speed(const Expression& argument) {
-    if (argument.kind != Kind::kName || !argument.name.text().starts_with('v')) return std::nullopt;
-    const std::string digits = argument.name.text().substr(1);
-    const auto number = read_number(digits);
-    const bool plain = digits.find_first_not_of("0123456789") == std::string::npos;
-    return number && plain ? std::optional<double>(number->value) : std::nullopt;
+  /// The fastest that its callers hand over; `\V:=60` decides it.
+  void note_speed(std::size_t module, const Instruction& motion) {
+    if (!is_linear(motion.name)) return;
+    std::optional<double>& speed = program_.moves.back().speed_mm_s;
+    for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
+      for (const Expression& argument : motion.arguments) {
+        if (!argument.label.empty()) continue;
+        if (const auto one = speed_of(argument, *scope)) speed = std::max(speed.value_or(0), *one);
+      }
+      for (const Expression& argument : motion.arguments) {
+        if (argument.label != "v") continue;
+        const Told<double> own = meaning_->number_of(argument, *scope);
+        speed = own ? std::optional<double>(*own) : std::nullopt;
+      }
+    }
+  }
+
+  /// mm/s, of the tool: what `v100`, which a controller predefines, or a constant speeddata says.
+  std::optional<double> speed_of(const Expression& argument, const Scope& scope) const {
+    const auto handed = meaning_->handed_over(argument, scope);
+    if (!handed) return std::nullopt;
+    const auto& [expression, where] = *handed;
+    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
+      const std::string& name = expression->name;
+      if (!name.starts_with('v') || name.find_first_not_of("0123456789", 1) != std::string::npos) return std::nullopt;
+      const auto number = read_number(std::string_view(name).substr(1));
+      return number ? std::optional<double>(number->value) : std::nullopt;
+    }
+    const bool written_here = expression->kind == Kind::kAggregate;
+    if (!written_here && meaning_->type_of(*expression, *where) != "speeddata") return std::nullopt;
+    int ignored = 0;
+    const Told<std::vector<double>> numbers = meaning_->numbers_of(*expression, 4, *where, &ignored);
+    return numbers ? std::optional<double>(numbers->front()) : std::nullopt;
   }
 
   /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
@@ -754,6 +782,7 @@ class Reader {
     if (!value) return because(value.error());
     // The same bytes reached through different callers must mean the same.
     for (const Use* use : uses) {
+      if (use->data.node == data.node && use->data.scope == data.scope) continue;
       const Told<TargetValue> other = meaning_->target_of(*use->data.node, *use->data.scope);
       if (!other) return because(other.error());
       if (other->numbers != value->numbers) return because("its callers hand over different values");
