@@ -75,9 +75,18 @@ class Reader {
   }
 
   RapidData data() {
-    std::vector<const Scope*> scopes;
-    for (std::size_t m = 0; m < modules_.size(); ++m) scopes.push_back(&own(m));
-    return tools_->declared(modules_, scopes);
+    RapidData found;
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (const Declaration& declared : modules_[m].declarations) {
+        if (declared.routine >= 0 || !declared.value || declared.is_array) continue;
+        const Data data{&*declared.value, &own(m), declared.type, &declared};
+        if (declared.type == "tooldata") found.tools.push_back(tools_->declared_tool(data));
+        if (declared.type == "wobjdata") found.frames.push_back(tools_->declared_frame(data));
+        const auto load = declared.type == "loaddata" ? tools_->load_of(data) : std::nullopt;
+        if (load) found.loads.emplace_back(declared.spelled, *load);
+      }
+    }
+    return found;
   }
 
   Program read() {

@@ -46,36 +46,22 @@ bool Tools::Load::operator==(const Load& other) const {
   return name == other.name && why_not == other.why_not && total == other.total && is_same(load, other.load);
 }
 
-RapidData Tools::declared(const std::vector<Module>& modules, const std::vector<const Scope*>& scopes) const {
-  RapidData found;
-  for (std::size_t m = 0; m < modules.size(); ++m) {
-    for (const Declaration& declared : modules[m].declarations) {
-      if (declared.routine < 0 && declared.value && !declared.is_array)
-        add_declared({&*declared.value, scopes[m], declared.type, &declared}, found);
-    }
-  }
-  return found;
+ProgramTool Tools::declared_tool(const Data& data) const {
+  ProgramTool tool;
+  tool.name = data.declared->spelled;
+  tool.file = program_.files[data.scope->module].name;
+  tool.line = data.declared->line;
+  read_tool(data, tool);
+  return tool;
 }
 
-void Tools::add_declared(const Data& data, RapidData& found) const {
-  const Declaration& declared = *data.declared;
-  if (declared.type == "tooldata") {
-    ProgramTool tool;
-    tool.name = declared.spelled;
-    tool.file = program_.files[data.scope->module].name;
-    tool.line = declared.line;
-    read_tool(data, tool);
-    found.tools.push_back(std::move(tool));
-  } else if (declared.type == "wobjdata") {
-    ProgramFrame frame;
-    frame.name = declared.spelled;
-    const Told<Data> parts = aggregate(data, 5);
-    if (parts) read_frame(*parts, frame);
-    if (!parts) frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
-    found.frames.push_back(std::move(frame));
-  } else if (declared.type == "loaddata") {
-    if (const auto load = load_of(data)) found.loads.emplace_back(declared.spelled, *load);
-  }
+ProgramFrame Tools::declared_frame(const Data& data) const {
+  ProgramFrame frame;
+  frame.name = data.declared->spelled;
+  const Told<Data> parts = aggregate(data, 5);
+  if (parts) read_frame(*parts, frame);
+  if (!parts) frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
+  return frame;
 }
 
 std::size_t Tools::undecided_load(std::size_t load, const std::string& why) {

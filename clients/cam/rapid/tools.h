@@ -9,7 +9,6 @@
 
 #include "clients/cam/program.h"
 #include "clients/cam/rapid/interpreter.h"
-#include "clients/cam/rapid/rapid.h"
 
 /// Tools, work objects and loads of a RAPID program, as its motions name them.
 namespace trammel::cam::rapid {
@@ -30,8 +29,10 @@ class Tools {
   /// The tool with what it carries: `\TLoad` says all of it, else `gripped` what comes to the tool's own.
   std::size_t tool_carrying(std::size_t tool, std::size_t gripped, const Instruction& motion, const Scope& scope);
 
-  /// What modules declare; `scopes`: of each.
-  [[nodiscard]] RapidData declared(const std::vector<Module>& modules, const std::vector<const Scope*>& scopes) const;
+  /// As a module declares it, whether motions use it or not.
+  [[nodiscard]] ProgramTool declared_tool(const Data& data) const;
+  [[nodiscard]] ProgramFrame declared_frame(const Data& data) const;
+  [[nodiscard]] std::optional<StatedLoad> load_of(const Data& data) const;
 
  private:
   struct Load {
@@ -51,11 +52,9 @@ class Tools {
   /// What an argument that names a tool or a work object stands for; an error where it is not in the files.
   [[nodiscard]] Told<Data> named(const Expression& argument, const Scope& scope) const;
   void read_tool(const Data& data, ProgramTool& tool) const;
-  [[nodiscard]] std::optional<StatedLoad> load_of(const Data& data) const;
   void read_frame(const Data& parts, ProgramFrame& frame) const;
   std::size_t known_load(Load load);
   [[nodiscard]] Load load_called(const Expression& argument, const Scope& scope) const;
-  void add_declared(const Data& data, RapidData& found) const;
 
   Interpreter& meaning_;
   const ReadOptions& options_;
