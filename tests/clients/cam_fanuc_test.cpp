@@ -171,6 +171,21 @@ TEST(Fanuc, PointsOfOneArcAreCorrectedTogether) {
   EXPECT_TRUE(row_of(with("PR[3]").program, "P[4]").corrected());
 }
 
+TEST(Fanuc, AMotionThatIsLeftIsSaidToMoveWithItsPositionWhereAnotherCorrectsIt) {
+  const auto with = [](const std::string& first) {
+    return ls(program("   2:" + first + "   3:L P[1] 100mm/sec FINE Offset,PR[1] ;\n", position(1, kXyz)));
+  };
+  const auto left = [](const test::Corrected& made) {
+    for (const ReceiptRow& row : made.program.rows) {
+      if (!row.corrected()) return row.message;
+    }
+    return std::string();
+  };
+  EXPECT_EQ(left(with("L P[1] 100mm/sec FINE ;\n")),
+            "Offset displaces it at run time; it moves with P[1], which is corrected");
+  EXPECT_EQ(left(with("  !none ;\n")), "Offset displaces it at run time");
+}
+
 TEST(Fanuc, APayloadThatOnlyTheControllerKnowsIsSaid) {
   const test::Corrected made = ls(program("   2:  PAYLOAD[3] ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
   ASSERT_EQ(made.program.notes.empty(), false);

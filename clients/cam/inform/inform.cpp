@@ -232,7 +232,8 @@ class Job {
       program_.left.push_back({name, index_, number, word, why});
     };
     for (const Piece& piece : pieces) {
-      if (piece.is("UNTIL")) return leave("a sensor may end the motion (UNTIL)");
+      if (piece.is("UNTIL") || piece.is("SRCH"))
+        return leave(fmt::format("a sensor may end the motion ({})", piece.text));
     }
     if (word == "IMOV") return leave("it is relative to where the robot is");
     if (shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", shifted_at));
