@@ -11,6 +11,7 @@
 
 #include "clients/cam/flow.h"
 #include "clients/cam/krl/lines.h"
+#include "clients/cam/krl/variables.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -19,17 +20,22 @@ namespace trammel::cam {
 
 namespace {
 
+using krl::Assigned;
+using krl::because;
+using krl::done_later;
+using krl::is_motion;
+using krl::kPose;
 using krl::Line;
+using krl::root_of;
+using krl::stem_of;
 using krl::Token;
 using krl::TokenKind;
+using krl::Told;
+using krl::upper;
 using krl::Value;
+using krl::Variable;
 
-template <typename T>
-using Told = tl::expected<T, std::string>;
-tl::unexpected<std::string> because(std::string why) { return tl::make_unexpected(std::move(why)); }
-
-constexpr int kDeepest = 20;  // calls within calls, names that stand for names
-constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "A", "B", "C"};
+constexpr int kDeepest = 20;  // calls within calls
 constexpr std::array<const char*, 6> kAxes = {"A1", "A2", "A3", "A4", "A5", "A6"};
 
 /// Of a number that the program did not write.
@@ -38,17 +44,6 @@ const NumberStyle kThreeDecimals = [] {
   style.decimals = 3;
   return style;
 }();
-
-/// A value that a line gives to a name.
-struct Assigned {
-  std::size_t file = 0, line = 0;
-  std::vector<Value> operands;
-};
-
-struct Variable {
-  std::vector<Assigned> values;
-  std::string changed;  ///< why its value is decided at run time
-};
 
 struct Routine {
   std::string name;
@@ -74,43 +69,8 @@ struct Load {
   std::string note, why_not;
 };
 
-std::string upper(std::string text) {
-  for (char& c : text) {
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  }
-  return text;
-}
-
-std::string stem_of(const std::string& name) { return upper(name.substr(0, name.rfind('.'))); }
-
-/// `XP[3].X` -> `XP[3]`
-std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
-
-bool is_motion(const std::string& word) {
-  static const std::set<std::string> kMotions = {"PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL"};
-  return kMotions.contains(word);
-}
 bool is_relative(const std::string& word) {
   return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
-}
-
-/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
-/// stands; 0: the line is neither.
-std::size_t done_later(const std::vector<Token>& tokens) {
-  const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
-  if (tokens.size() < first + 2 || (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER")) return 0;
-  for (std::size_t at = first + 1; at + 1 < tokens.size(); ++at) {
-    if (tokens[at].text == "DO") return at + 1;
-  }
-  return 0;
-}
-
-bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Value& one, const Value& other) {
-    return one.kind == other.kind && one.kind != Value::Kind::kOther && one.number == other.number &&
-           one.name == other.name && one.field_names == other.field_names &&
-           is_equal(one.field_values, other.field_values);
-  });
 }
 
 class Reader {
@@ -125,7 +85,7 @@ class Reader {
 
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
-    join_globals();
+    names_.join_globals();
     std::set<std::string> called;
     for (std::size_t r = 0; r < routines_.size(); ++r) by_name_.emplace(routines_[r].name, r);
     find_interrupts(called);
@@ -167,7 +127,7 @@ class Reader {
         routines_[static_cast<std::size_t>(open)].last = k;
         open = -1;
       } else {
-        note_value(f, k);
+        names_.note_value(f, k);
       }
     }
     if (!any) routines_.push_back({"", f, 0, lines.size()});
@@ -183,154 +143,6 @@ class Reader {
     const std::size_t end = line.comment.find_first_of(" ;,\t\r", close + 2);
     const std::string number(line.comment.substr(at + 5, close - at - 5));
     tool_names_.emplace(number, std::string(line.comment.substr(close + 2, end - close - 2)));
-  }
-
-  /// A declaration or assignment: behind `DECL` and a type, or bare.
-  void note_value(std::size_t f, std::size_t k) {
-    note_value(f, k, 0);
-    if (const std::size_t later = done_later(lines_[f][k].tokens); later > 0) note_value(f, k, later);
-  }
-
-  void note_value(std::size_t f, std::size_t k, std::size_t at) {
-    const bool later = at > 0;
-    const std::vector<Token>& tokens = lines_[f][k].tokens;
-    static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
-                                                 "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
-    bool declared = false;
-    while (at < tokens.size() &&
-           (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
-      declared |= tokens[at].text == "DECL";
-      ++at;
-    }
-    if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
-        tokens[at + 1].kind == TokenKind::kWord) {
-      ++at;
-      declared_[tokens[at].text].insert(stem_of(program_.files[f].name));
-    }
-    if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
-    std::size_t next = at;
-    const std::vector<Value> name = krl::operands_at(tokens, at, &next);
-    if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
-    if (next >= tokens.size() || tokens[next].text != "=") return;
-    std::size_t end = next;
-    std::vector<Value> operands = krl::operands_at(tokens, next + 1, &end);
-    const std::string root = root_of(name[0].name);
-    const auto key = std::pair(stem_of(program_.files[f].name), root);
-    Variable& variable = variables_[key];
-    if (later || root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
-      variable.changed = set_at(root, f, k);
-      return;
-    }
-    variable.values.push_back({f, k, std::move(operands)});
-    if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
-  }
-
-  /// What a file sets and does not declare is another one's, or the controller's.
-  void join_globals() {
-    static const std::set<std::string> kOfTheController = {"TOOL_DATA", "BASE_DATA", "LOAD_DATA"};
-    for (auto one = variables_.begin(); one != variables_.end();) {
-      const auto& [stem, root] = one->first;
-      const std::string word = root.substr(0, root.find('['));
-      const auto known = declared_.find(word);
-      std::set<std::string> owners;
-      if (kOfTheController.contains(word))
-        owners = {""};
-      else if (known != declared_.end() && !known->second.contains(stem))
-        owners = known->second;
-      if (owners.empty() || owners.contains(stem)) {
-        ++one;
-        continue;
-      }
-      for (const std::string& owner : owners) merge(one->second, root, variables_[{owner, root}]);
-      one = variables_.erase(one);
-    }
-  }
-
-  void merge(const Variable& from, const std::string& root, Variable& into) const {
-    if (into.changed.empty()) into.changed = from.changed;
-    for (const Assigned& value : from.values) {
-      const bool same = !into.values.empty() && is_equal(into.values[0].operands, value.operands);
-      if (!into.values.empty() && !same) into.changed = set_at(root, value.file, value.line);
-      if (!same) into.values.push_back(value);
-    }
-  }
-
-  std::string set_at(const std::string& name, std::size_t f, std::size_t k) const {
-    return fmt::format("{} is set at run time ({})", shown(spelled(name, f, k)), place(f, k));
-  }
-  std::string place(std::size_t f, std::size_t k) const {
-    return fmt::format("{} line {}", program_.files[f].name, lines_[f][k].number);
-  }
-
-  /// A name as a line spells it.
-  [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const {
-    const std::string word = name.substr(0, name.find('['));
-    for (const Token& token : lines_[f][k].tokens) {
-      if (token.kind == TokenKind::kWord && token.text == word)
-        return program_.files[f].text.substr(token.begin, token.end - token.begin) + name.substr(word.size());
-    }
-    return name;
-  }
-
-  /// The variable of a file's own data list, else of any.
-  [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const {
-    const auto own = variables_.find({stem_of(program_.files[f].name), name});
-    if (own != variables_.end()) return &own->second;
-    for (const auto& [key, variable] : variables_) {
-      if (key.second == name) return &variable;
-    }
-    return nullptr;
-  }
-
-  /// The only value of a name.
-  Told<const Assigned*> value_of(const std::string& name, std::size_t f) const {
-    const Variable* variable = find(root_of(name), f);
-    if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
-    // One element of an array is changed where any may be.
-    const std::string any = name.substr(0, name.find('[')) + "[*]";
-    const Variable* all = name.find('[') == std::string::npos ? nullptr : find(any, f);
-    if (all != nullptr && !all->changed.empty()) return because(all->changed);
-    if (!variable->changed.empty()) return because(variable->changed);
-    if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
-    return &variable->values[0];
-  }
-
-  // Values.
-
-  Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const {
-    if (operands.empty() || depth > kDeepest) return because("it is not constant");
-    Pose X = Pose::Identity();
-    for (const Value& operand : operands) {
-      const Told<Pose> one = frame_of(operand, f, depth);
-      if (!one) return one;
-      X = X * *one;
-    }
-    return X;
-  }
-
-  Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const {
-    if (value.kind == Value::Kind::kAggregate) {
-      const Told<std::vector<double>> numbers = numbers_of(value, kPose);
-      if (!numbers) return because(numbers.error());
-      return pose_of(Coordinates::kAnglesZyx, *numbers);
-    }
-    if (value.kind != Value::Kind::kName) return because("it is not constant");
-    if (value.name == "$NULLFRAME" || value.name == "$WORLD" || value.name == "$ROBROOT") return Pose::Identity();
-    if (value.name.starts_with("$")) return because(fmt::format("{} decides it", shown(value.name)));
-    const Told<const Assigned*> assigned = value_of(value.name, f);
-    if (!assigned) return because(assigned.error());
-    return frame_of((*assigned)->operands, (*assigned)->file, depth + 1);
-  }
-
-  static Told<std::vector<double>> numbers_of(const Value& value, const std::array<const char*, 6>& fields) {
-    std::vector<double> numbers;
-    for (const char* name : fields) {
-      const Value* field = value.field(name);
-      if (field == nullptr) return because(fmt::format("it does not say {}", name));
-      if (field->kind != Value::Kind::kNumber) return because(fmt::format("{} is not a constant number", name));
-      numbers.push_back(field->number);
-    }
-    return numbers;
   }
 
   // Tools and bases.
@@ -360,13 +172,14 @@ class Reader {
     tool.name = named == tool_names_.end() ? data : named->second;
     if (const auto given = options_.frames.find(data); given != options_.frames.end()) {
       tool.X_FT = given->second;
-    } else if (const Variable* variable = find(data, f)) {
+    } else if (const Variable* variable = names_.find(data, f)) {
       if (!variable->changed.empty())
         tool.why_not = variable->changed;
       else if (!variable->values.empty())
         fill(variable->values[0], tool);
     }
-    if (const Variable* load = find(fmt::format("LOAD_DATA[{}]", number), f); load != nullptr && !load->values.empty())
+    if (const Variable* load = names_.find(fmt::format("LOAD_DATA[{}]", number), f);
+        load != nullptr && !load->values.empty())
       tool.load = load_of(load->values[0].operands);
     return add_tool(std::move(tool));
   }
@@ -374,7 +187,7 @@ class Reader {
   void fill(const Assigned& assigned, ProgramTool& tool) const {
     tool.file = program_.files[assigned.file].name;
     tool.line = lines_[assigned.file][assigned.line].number;
-    const Told<Pose> X_FT = frame_of(assigned.operands, assigned.file);
+    const Told<Pose> X_FT = names_.frame_of(assigned.operands, assigned.file);
     if (!X_FT) {
       tool.why_not = fmt::format("tool {}: {}", shown(tool.name), X_FT.error());
       return;
@@ -406,7 +219,7 @@ class Reader {
       return tool_numbered(std::atoi(data.c_str() + 10), f);
     ProgramTool tool;
     tool.name = data.empty() ? "$TOOL" : data;
-    if (!data.empty() && find(data, f) == nullptr) return add_tool(std::move(tool));
+    if (!data.empty() && names_.find(data, f) == nullptr) return add_tool(std::move(tool));
     fill({f, k, operands}, tool);
     return add_tool(std::move(tool));
   }
@@ -421,20 +234,21 @@ class Reader {
 
   /// `$LOAD = ...`
   std::size_t load_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
-    Load load{fmt::format("$LOAD ({})", place(f, k)), std::nullopt, "", ""};
+    Load load{fmt::format("$LOAD ({})", names_.place(f, k)), std::nullopt, "", ""};
     const std::vector<Value>* value = &operands;
     if (operands.size() == 1 && operands[0].kind == Value::Kind::kName) {
       load.name = operands[0].name;
-      if (find(root_of(load.name), f) == nullptr) {
+      if (names_.find(root_of(load.name), f) == nullptr) {
         load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
         return add_load(std::move(load));
       }
-      const Told<const Assigned*> assigned = value_of(load.name, f);
+      const Told<const Assigned*> assigned = names_.value_of(load.name, f);
       if (assigned) value = &(*assigned)->operands;
       if (!assigned) load.why_not = "$LOAD: " + assigned.error();
     }
     if (load.why_not.empty()) load.load = load_of(*value);
-    if (load.why_not.empty() && !load.load) load.why_not = fmt::format("$LOAD is not constant ({})", place(f, k));
+    if (load.why_not.empty() && !load.load)
+      load.why_not = fmt::format("$LOAD is not constant ({})", names_.place(f, k));
     return add_load(std::move(load));
   }
 
@@ -468,7 +282,7 @@ class Reader {
     if (operands.size() == 1 && operands[0].name.starts_with("BASE_DATA[") &&
         options_.frames.contains(operands[0].name))
       return add_frame({operands[0].name, options_.frames.at(operands[0].name), ""});
-    const Told<Pose> X_BO = frame_of(operands, f);
+    const Told<Pose> X_BO = names_.frame_of(operands, f);
     std::string name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
     if (X_BO) return add_frame({std::move(name), *X_BO, ""});
     return add_frame({name, Pose::Identity(), fmt::format("base {}: {}", shown(name), X_BO.error())});
@@ -476,7 +290,7 @@ class Reader {
 
   /// FDAT of an inline form: `{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,...}`
   void apply_fdat(const std::string& name, std::size_t f, State& state) {
-    const Told<const Assigned*> assigned = value_of(name, f);
+    const Told<const Assigned*> assigned = names_.value_of(name, f);
     const Value* tool =
         assigned && (*assigned)->operands.size() == 1 ? (*assigned)->operands[0].field("TOOL_NO") : nullptr;
     const Value* base = tool == nullptr ? nullptr : (*assigned)->operands[0].field("BASE_NO");
@@ -648,11 +462,12 @@ class Reader {
     } else if (word == "$BASE" && assigns) {
       state.frame = base_set(krl::operands_at(tokens, 2, &end), f);
     } else if (word == "$LOAD" && tokens.size() > 1) {
-      state.load = assigns
-                       ? load_set(krl::operands_at(tokens, 2, &end), f, k)
-                       : add_load({"$LOAD", std::nullopt, "", fmt::format("a part of $LOAD is set ({})", place(f, k))});
+      state.load =
+          assigns
+              ? load_set(krl::operands_at(tokens, 2, &end), f, k)
+              : add_load({"$LOAD", std::nullopt, "", fmt::format("a part of $LOAD is set ({})", names_.place(f, k))});
     } else if ((word == "$TOOL" || word == "$BASE") && tokens.size() > 1) {
-      const std::string why = fmt::format("a part of {} is set ({})", word, place(f, k));
+      const std::string why = fmt::format("a part of {} is set ({})", word, names_.place(f, k));
       if (word == "$TOOL") state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
       if (word == "$BASE") state.frame = add_frame({"$BASE", Pose::Identity(), why});
     } else if (word == "$IPO_MODE" && assigns) {
@@ -697,7 +512,7 @@ class Reader {
   void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) {
     const bool constant = tokens[5].kind == TokenKind::kNumber;
     const int number = constant ? std::atoi(tokens[5].text.c_str()) : 0;
-    const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), place(f, k));
+    const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), names_.place(f, k));
     if (tokens[3].text == "TOOL" || tokens[3].text == "EX_TOOL") {
       state.load = 0;
       state.tool = constant ? tool_numbered(number, f)
@@ -791,17 +606,17 @@ class Reader {
     if (wanted.find("[*]") == std::string::npos) return use_named(f, k, wanted, name, use);
     const std::string beginning = wanted.substr(0, wanted.find("[*]") + 1);
     bool any = false;
-    for (const auto& [key, variable] : variables_) {
+    for (const auto& [key, variable] : names_.all()) {
       if (!key.second.starts_with(beginning) || key.second == wanted) continue;
       any = true;
       const Assigned* at = variable.values.empty() ? nullptr : &variable.values[0];
-      use_named(f, k, key.second, at == nullptr ? key.second : spelled(key.second, at->file, at->line), use);
+      use_named(f, k, key.second, at == nullptr ? key.second : names_.spelled(key.second, at->file, at->line), use);
     }
     if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
   }
 
   void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name, const SiteUse& use) {
-    const Told<const Assigned*> assigned = value_of(wanted, f);
+    const Told<const Assigned*> assigned = names_.value_of(wanted, f);
     if (!assigned) return leave(f, k, name, assigned.error());
     const Assigned& at = **assigned;
     if (at.operands.empty()) return leave(f, k, name, "it is not constant");
@@ -818,7 +633,7 @@ class Reader {
     const Value& first = place.operands[0];
     if (place.operands.size() == 1 && first.kind == Value::Kind::kAggregate) {
       if (first.field("A1") != nullptr) return describe_axes(first, target);
-      const Told<std::vector<double>> numbers = numbers_of(first, kPose);
+      const Told<std::vector<double>> numbers = names_.numbers_of(first, kPose);
       if (!numbers) return numbers.error();
       target.coordinates = Coordinates::kAnglesZyx;
       target.numbers = *numbers;
@@ -826,13 +641,13 @@ class Reader {
       note_rest(first, target);
       return "";
     }
-    const Told<Pose> pose = frame_of(place.operands, place.file);
+    const Told<Pose> pose = names_.frame_of(place.operands, place.file);
     if (!pose) return pose.error();
     target.coordinates = Coordinates::kAnglesZyx;
     target.numbers = cam::numbers_of(Coordinates::kAnglesZyx, *pose, std::vector<double>(6, 0.0));
     const Value* last = &place.operands.back();
     if (last->kind == Value::Kind::kName) {
-      const Told<const Assigned*> named = value_of(last->name, place.file);
+      const Told<const Assigned*> named = names_.value_of(last->name, place.file);
       last = named && (*named)->operands.size() == 1 ? &(*named)->operands[0] : nullptr;
     }
     if (last != nullptr) note_rest(*last, target);
@@ -842,7 +657,7 @@ class Reader {
 
   std::string describe_axes(const Value& value, ProgramTarget& target) const {
     if (options_.keep_joints) return "joint targets are kept (--keep-joints)";
-    const Told<std::vector<double>> numbers = numbers_of(value, kAxes);
+    const Told<std::vector<double>> numbers = names_.numbers_of(value, kAxes);
     if (!numbers) return numbers.error();
     target.coordinates = Coordinates::kJoints;
     target.numbers = *numbers;
@@ -913,7 +728,7 @@ class Reader {
   /// What else reads the targets that are written anew.
   void note_readings(std::size_t f) {
     if (targets_.empty()) {
-      for (const auto& [key, variable] : variables_) {
+      for (const auto& [key, variable] : names_.all()) {
         if (variable.values.size() != 1 || variable.values[0].operands.empty()) continue;
         const Assigned& at = variable.values[0];
         if (!places_.contains({at.file, at.operands[0].begin})) continue;
@@ -939,8 +754,8 @@ class Reader {
     const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
     const bool plain = one.size() == 1 && tokens[at > 0 ? at - 1 : 0].text != ":";
     if (moves && !number && plain) return;  // the motion goes to it
-    const auto own = variables_.find({stem_of(program_.files[f].name), root});
-    if (own != variables_.end()) {
+    const auto own = names_.all().find({stem_of(program_.files[f].name), root});
+    if (own != names_.all().end()) {
       if (own->second.values.size() == 1) add_reading(f, k, at, number, own->second.values[0]);
     } else if (const auto other = targets_.find(root); other != targets_.end()) {
       add_reading(f, k, at, number, *other->second);
@@ -966,7 +781,7 @@ class Reader {
       by = text.substr(tokens[k2 - 1].begin, tokens[k2 - 1].end - tokens[k2 - 1].begin);
     }
     if (number && !moves) {
-      read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", place(f, k)));
+      read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", names_.place(f, k)));
       return;
     }
     const Line& line = lines_[f][k];
@@ -981,7 +796,7 @@ class Reader {
 
   /// Positions of data lists that nothing moves to.
   void list_unused() {
-    for (const auto& one : variables_) {
+    for (const auto& one : names_.all()) {
       const auto& [key, variable] = one;
       const std::string& name = key.second;
       const bool is_position = variable.values.size() == 1 && variable.values[0].operands.size() == 1 &&
@@ -992,7 +807,7 @@ class Reader {
       const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
                                       [&](const LeftAlone& left) { return upper(left.name) == name; });
       if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
-      program_.left.push_back({spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
+      program_.left.push_back({names_.spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
                                "no motion in these files goes to it"});
     }
   }
@@ -1003,7 +818,7 @@ class Reader {
   std::map<std::string, const Assigned*> targets_;  ///< by name, of all files
   std::set<std::string> words_of_targets_;
   std::vector<Routine> routines_;
-  std::map<std::pair<std::string, std::string>, Variable> variables_;
+  krl::Variables names_{program_.files, lines_};
   std::map<std::string, std::string> tool_names_;
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<std::string, std::size_t> by_name_;  ///< routines
@@ -1012,7 +827,6 @@ class Reader {
   std::vector<std::size_t> interrupts_;  ///< routines that come in between
   bool resumes_ = false;                 ///< an interrupt may end what it came in
   bool inside_interrupt_ = false;
-  std::map<std::string, std::set<std::string>> declared_;  ///< in which files each word is
   std::set<std::tuple<std::size_t, State, bool>> run_;
   std::set<std::size_t> ran_;
   std::map<std::pair<std::size_t, std::size_t>, std::string> read_;  ///< why the numbers at a place must stay
