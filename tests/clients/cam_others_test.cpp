@@ -51,6 +51,12 @@ TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
   EXPECT_NE(why(made, "C00003").find("pulses"), std::string::npos);
 }
 
+TEST(Inform, ASearchEndsWhereItsSensorSays) {
+  const test::Corrected made = jbi(job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n",
+                                       "MOVL C00000 V=1.0 SRCH RIN#(1)=ON DIS=20.0\r\n"));
+  EXPECT_NE(why(made, "C00000").find("a sensor may end the motion (SRCH)"), std::string::npos) << why(made, "C00000");
+}
+
 TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
   const std::string point = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
   for (const std::string& lines : std::vector<std::string>{
