@@ -232,15 +232,20 @@ class Correcting {
       row.message = left.why;
     }
     tell_readings();
-    std::stable_sort(result_.rows.begin(), result_.rows.end(), [](const ReceiptRow& a, const ReceiptRow& b) {
+    tell_stored();
+    const auto by_place = [](const ReceiptRow& a, const ReceiptRow& b) {
       return std::tie(a.file, a.line) < std::tie(b.file, b.line);
-    });
+    };
+    // A row is large, and those of a long program mostly stand as they shall.
+    if (!std::is_sorted(result_.rows.begin(), result_.rows.end(), by_place))
+      std::stable_sort(result_.rows.begin(), result_.rows.end(), by_place);
     for (std::size_t f = 0; f < program_.files.size(); ++f) write_file(f);
     return std::move(result_);
   }
 
   /// What is left as it stands moves all the same where it is made of a target that is corrected.
   void tell_readings() {
+    if (program_.readings.empty()) return;
     std::set<std::pair<std::size_t, std::size_t>> written;
     for (std::size_t t = 0; t < program_.targets.size(); ++t) {
       if (!result_.rows[t].corrected()) continue;
@@ -272,6 +277,28 @@ class Correcting {
       const std::string note = fmt::format("{} line {} reads {}, which is corrected: what it makes of it moves with it",
                                            by_file, reading.by_line, shown(reading.name));
       if (!found && said.insert(note).second) result_.notes.push_back(note);
+    }
+  }
+
+  /// A motion that is left goes to a stored target all the same, which another motion has corrected.
+  void tell_stored() {
+    const auto is_name = [](const std::string& text) {
+      return !text.empty() && text.find_first_of(" ,(:") == std::string::npos && text[0] != '[' && text[0] != '{';
+    };
+    std::set<std::pair<std::string, std::string>> corrected;
+    const auto key = [&](const ReceiptRow& row) {
+      const bool shared = program_.dialect == "rapid" || program_.dialect == "krl";
+      return std::pair(shared ? std::string() : row.file, row.name);
+    };
+    if (program_.left.empty()) return;
+    for (std::size_t t = 0; t < program_.targets.size(); ++t) {
+      if (result_.rows[t].corrected() && is_name(result_.rows[t].name)) corrected.insert(key(result_.rows[t]));
+    }
+    for (std::size_t r = program_.targets.size(); r < result_.rows.size(); ++r) {
+      ReceiptRow& row = result_.rows[r];
+      const std::string moves = fmt::format("it moves with {}, which is corrected", shown(row.name));
+      if (!row.motion.empty() && corrected.contains(key(row)) && row.message.find(moves) == std::string::npos)
+        row.message += "; " + moves;
     }
   }
 

@@ -16,9 +16,10 @@ struct Block {
   bool has_else = false;
 };
 
+bool is_routine(Kind kind) { return kind == Kind::kRoutine || kind == Kind::kInterrupt; }
 bool opens(Kind kind) {
   return kind == Kind::kIf || kind == Kind::kSwitch || kind == Kind::kWhile || kind == Kind::kRepeat ||
-         kind == Kind::kRoutine;
+         is_routine(kind);
 }
 bool is_loop(Kind kind) { return kind == Kind::kWhile || kind == Kind::kRepeat; }
 
@@ -41,9 +42,20 @@ class Order {
     find_blocks();
   }
 
-  std::vector<std::vector<std::size_t>> next() {
+  Flow flow() {
     for (std::size_t s = 0; s < steps_.size(); ++s) follow(s);
-    return std::move(next_);
+    Flow made;
+    made.asides = asides();
+    if (std::any_of(made.asides.begin(), made.asides.end(),
+                    [](const Aside& aside) { return aside.at_failures && !aside.goes_back.empty(); }))
+      end_where_they_fail(made.asides);
+    made.next = std::move(next_);
+    made.entries = {0};
+    for (std::size_t s = 0; s < steps_.size(); ++s) {
+      if (steps_[s].kind == Kind::kRoutine && !called_.contains(steps_[s].label)) made.entries.push_back(s + 1);
+      made.never_fails.push_back(steps_[s].never_fails);
+    }
+    return made;
   }
 
  private:
@@ -95,6 +107,7 @@ class Order {
       case Kind::kSwitch:
       case Kind::kWhile:
       case Kind::kRoutine:
+      case Kind::kInterrupt:
         return enter(s);
       case Kind::kCase:
       case Kind::kElse:
@@ -105,10 +118,13 @@ class Order {
         return add(s, loop() == kNone ? s + 1 : behind(loop()));
       case Kind::kContinue:
         return add(s, loop() == kNone ? s + 1 : blocks_[loop()].head);
-      case Kind::kReturn: {
-        const std::size_t routine = around(s, [](Kind kind) { return kind == Kind::kRoutine; });
+      case Kind::kReturn:
+      case Kind::kHandler: {
+        const std::size_t routine = around(s, is_routine);
         return add(s, routine == kNone ? steps_.size() : blocks_[routine].end);
       }
+      case Kind::kGoBack:
+        return;
       case Kind::kJumpMaybe:
         add(s, s + 1);
         return jump(s);
@@ -122,6 +138,7 @@ class Order {
   void enter(std::size_t s) {
     const Block& block = blocks_[opened_.at(s)];
     const Kind kind = steps_[s].kind;
+    if (kind == Kind::kInterrupt) return add(s, block.end + 1);
     if (kind != Kind::kSwitch && (kind != Kind::kRoutine || !called_.contains(steps_[s].label))) add(s, s + 1);
     for (const std::size_t branch : block.branches) {
       if (kind == Kind::kIf || kind == Kind::kSwitch) add(s, branch + 1);
@@ -132,6 +149,7 @@ class Order {
   void leave(std::size_t s) {
     const std::size_t block = in_[s];
     if (block == kNone || blocks_[block].end != s) return add(s, s + 1);
+    if (kind_of(block) == Kind::kInterrupt) return;
     if (is_loop(kind_of(block))) add(s, blocks_[block].head);
     if (kind_of(block) != Kind::kRoutine) return add(s, s + 1);
     const std::string& name = steps_[blocks_[block].head].label;
@@ -148,7 +166,6 @@ class Order {
   void jump(std::size_t s) {
     const auto labels = labels_.find(steps_[s].label);
     if (labels == labels_.end()) return add(s, steps_.size());
-    const auto is_routine = [](Kind kind) { return kind == Kind::kRoutine; };
     for (const std::size_t label : labels->second) {
       // A label is known in its routine alone.
       if (around(label, is_routine) == around(s, is_routine)) add(s, label);
@@ -158,6 +175,62 @@ class Order {
   void call(std::size_t s) {
     const auto routine = routines_.find(steps_[s].label);
     add(s, routine == routines_.end() ? s + 1 : blocks_[routine->second].head + 1);
+  }
+
+  // What comes in between.
+
+  [[nodiscard]] std::vector<Aside> asides() const {
+    std::vector<Aside> all;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      if (kind_of(b) == Kind::kInterrupt)
+        all.push_back({steps_[block.head].label, block.head + 1, block.end, {block.end}, 0, steps_.size(), false});
+      if (is_routine(kind_of(b))) add_handlers(block, all);
+    }
+    return all;
+  }
+
+  /// `ERROR`, `UNDO`: each up to the next, or to the end of its routine.
+  void add_handlers(const Block& routine, std::vector<Aside>& all) const {
+    std::vector<std::size_t> begins;
+    for (std::size_t s = routine.head + 1; s < routine.end; ++s) {
+      if (steps_[s].kind == Kind::kHandler) begins.push_back(s);
+    }
+    for (std::size_t k = 0; k < begins.size(); ++k) {
+      const std::size_t end = k + 1 < begins.size() ? begins[k + 1] : routine.end;
+      Aside aside{steps_[begins[k]].label, begins[k] + 1, end, {}, routine.head + 1, begins[0], true};
+      for (std::size_t s = aside.first; s < end; ++s) {
+        if (steps_[s].kind == Kind::kGoBack) aside.goes_back.push_back(s);
+      }
+      all.push_back(std::move(aside));
+    }
+  }
+
+  /// A routine without a handler of its own ends where it fails, if a handler of those that call it goes on from there.
+  void end_where_they_fail(const std::vector<Aside>& asides) {
+    std::vector<bool> handles(blocks_.size(), false), ends(blocks_.size(), false);
+    std::vector<std::size_t> open;
+    const auto note_calls = [&](std::size_t from, std::size_t to) {
+      for (std::size_t s = from; s < to; ++s) {
+        const auto called = steps_[s].kind == Kind::kCall ? routines_.find(steps_[s].label) : routines_.end();
+        if (called == routines_.end() || handles[called->second] || ends[called->second]) continue;
+        ends[called->second] = true;
+        open.push_back(called->second);
+      }
+    };
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      for (const Aside& aside : asides)
+        handles[b] = handles[b] || (aside.at_failures && aside.from == blocks_[b].head + 1);
+    }
+    for (const Aside& aside : asides) {
+      if (aside.at_failures && !aside.goes_back.empty()) note_calls(aside.from, aside.to);
+    }
+    while (!open.empty()) {
+      const Block block = blocks_[open.back()];
+      open.pop_back();
+      for (std::size_t s = block.head + 1; s < block.end; ++s) add(s, block.end);
+      note_calls(block.head + 1, block.end);
+    }
   }
 
   const std::vector<Step>& steps_;
@@ -174,17 +247,6 @@ class Order {
 
 }  // namespace
 
-std::vector<std::vector<std::size_t>> next_of(const std::vector<Step>& steps, bool in_any_order) {
-  return Order(steps, in_any_order).next();
-}
-
-std::vector<std::size_t> entries_of(const std::vector<Step>& steps) {
-  const std::set<std::string> called = called_in(steps);
-  std::vector<std::size_t> entries = {0};
-  for (std::size_t s = 0; s < steps.size(); ++s) {
-    if (steps[s].kind == Step::Kind::kRoutine && !called.contains(steps[s].label)) entries.push_back(s + 1);
-  }
-  return entries;
-}
+Flow flow_of(const std::vector<Step>& steps, bool in_any_order) { return Order(steps, in_any_order).flow(); }
 
 }  // namespace trammel::cam

@@ -76,22 +76,48 @@ std::string called(const ProgramTool& tool) {
   return tool.carries.empty() ? shown(tool.name) : fmt::format("{} carrying {}", shown(tool.name), shown(tool.carries));
 }
 
+namespace {
+
+/// Whether one of the motions [first, end) of an arc is left.
+bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::size_t first, std::size_t end) {
+  return std::any_of(program.moves.begin() + static_cast<std::ptrdiff_t>(first),
+                     program.moves.begin() + static_cast<std::ptrdiff_t>(end), [&](const ProgramMove& move) {
+                       return move.left_some || std::any_of(move.targets.begin(), move.targets.end(),
+                                                            [&](std::size_t t) { return leave[t]; });
+                     });
+}
+
+}  // namespace
+
 void leave_halves_of_arcs(Program& program) {
   std::vector<bool> leave(program.targets.size(), false);
   bool any = false;
+  const auto leave_all = [&](ProgramMove& move, const ProgramMove& arc) {
+    move.left_some = true;
+    bool more = false;
+    for (const std::size_t t : move.targets) {
+      if (leave[t]) continue;
+      leave[t] = more = any = true;
+      const ProgramTarget& target = program.targets[t];
+      program.left.push_back(
+          {target.name, target.file, target.line, target.motion,
+           fmt::format("the other point of its arc ({} line {}) is left", program.files[arc.file].name, arc.line)});
+    }
+    return more;
+  };
   for (bool more = true; more;) {
     more = false;
-    for (ProgramMove& move : program.moves) {
-      const auto is_left = [&](std::size_t t) { return leave[t]; };
-      move.left_some |= std::any_of(move.targets.begin(), move.targets.end(), is_left);
-      if (!move.is_arc || !move.left_some) continue;
-      for (const std::size_t t : move.targets) {
-        if (leave[t]) continue;
-        leave[t] = more = any = true;
-        const ProgramTarget& target = program.targets[t];
-        program.left.push_back(
-            {target.name, target.file, target.line, target.motion,
-             fmt::format("the other point of its arc ({} line {}) is left", program.files[move.file].name, move.line)});
+    std::size_t end = 0;
+    for (std::size_t first = 0; first < program.moves.size(); first = end) {
+      end = first + 1;
+      while (end < program.moves.size() && program.moves[end].arc_goes_on) ++end;
+      const ProgramMove& arc = program.moves[first];
+      if (!arc_is_left(program, leave, first, end)) continue;
+      for (std::size_t m = first; m < end; ++m) {
+        if (arc.is_arc)
+          more |= leave_all(program.moves[m], arc);
+        else
+          program.moves[m].left_some = true;
       }
     }
   }

@@ -125,6 +125,7 @@ struct ProgramMove {
   int line = 0;
   std::vector<std::size_t> targets;       ///< of Program::targets, that it may go to; empty: left alone
   bool is_arc = false;                    ///< to an end by way of another target
+  bool arc_goes_on = false;               ///< it is part of the arc of the motion before
   bool left_some = false;                 ///< a target of it is left
   std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
 };

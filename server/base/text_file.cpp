@@ -78,9 +78,15 @@ fs::path target_of(const std::string& path) {
 
 fs::path beside(const std::string& path) { return fmt::format("{}.{}.part", target_of(path).string(), ::getpid()); }
 
-void remove_parts(const std::vector<TextFile>& files) {
+/// A TextFile that is not copied: a text may take tens of megabytes.
+struct FileView {
+  const std::string& path;
+  const std::string& text;
+};
+
+void remove_parts(const std::vector<FileView>& files) {
   std::error_code error;
-  for (const TextFile& file : files) {
+  for (const FileView& file : files) {
     if (!is_written_in_place(file.path)) fs::remove(beside(file.path), error);
   }
 }
@@ -89,12 +95,8 @@ Failure cannot_be_written(const std::string& path, const std::string& why) {
   return refused("cannot be written: {}", why).in(path);
 }
 
-}  // namespace
-
-Status write_text_file(const std::string& path, const std::string& text) { return write_text_files({{path, text}}); }
-
-Status write_text_files(const std::vector<TextFile>& files) {
-  for (const TextFile& file : files) {
+Status write_views(const std::vector<FileView>& files) {
+  for (const FileView& file : files) {
     if (is_written_in_place(file.path)) continue;
     if (const std::string why = write_all(beside(file.path), file.text); !why.empty()) {
       remove_parts(files);
@@ -102,7 +104,7 @@ Status write_text_files(const std::vector<TextFile>& files) {
     }
   }
   std::string done;
-  for (const TextFile& file : files) {
+  for (const FileView& file : files) {
     std::string why;
     if (is_written_in_place(file.path)) {
       why = write_all(file.path, file.text);
@@ -118,6 +120,16 @@ Status write_text_files(const std::vector<TextFile>& files) {
     done += " " + file.path;
   }
   return {};
+}
+
+}  // namespace
+
+Status write_text_file(const std::string& path, const std::string& text) { return write_views({{path, text}}); }
+
+Status write_text_files(const std::vector<TextFile>& files) {
+  std::vector<FileView> views;
+  for (const TextFile& file : files) views.push_back({file.path, file.text});
+  return write_views(views);
 }
 
 Status check_writable(const std::string& path) {

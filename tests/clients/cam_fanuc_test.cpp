@@ -126,6 +126,66 @@ TEST(Fanuc, WhatAJumpBackChangesHoldsAtItsLabelToo) {
   }
 }
 
+TEST(Fanuc, WhatAMonitorMaySelectIsNotKnown) {
+  for (const std::string& line : std::vector<std::string>{"MONITOR CHECK", "ERROR_PROG=CHECK", "RESUME_PROG=CHECK"}) {
+    const test::Corrected made = ls(program("   2:  UTOOL_NUM=2 ;\n   3:L P[1] 100mm/sec FINE ;\n   4:  " + line +
+                                                " ;\n   5:  UTOOL_NUM=2 ;\n   6:L P[2] 100mm/sec FINE ;\n"
+                                                "   7:L P[3] 100mm/sec FINE ;\n",
+                                            selected_position(1) + selected_position(2) + position(3, kXyz)));
+    EXPECT_TRUE(row_of(made.program, "P[1]").corrected()) << why(made, "P[1]");
+    EXPECT_NE(why(made, "P[2]").find(line + " may select another one"), std::string::npos) << why(made, "P[2]");
+    EXPECT_TRUE(row_of(made.program, "P[3]").corrected()) << "its own numbers are said";
+  }
+}
+
+TEST(Fanuc, ARegisterThatAnotherProgramSetsIsNoConstant) {
+  const auto with = [](const std::string& x) {
+    return corrected_by_shift(
+        Dialect::kFanuc,
+        {{"p.ls", program(setting("UTOOL[2]", {"100", "0", "150", "0", "-45", "0"}) + "   9:L P[1] 100mm/sec FINE ;\n",
+                          position(1, kXyz))},
+         {"q.ls", "/PROG Q\n/MN\n   1:  PR[5,1]=" + x + " ;\n/POS\n/END\n"}},
+        {.frames = {{"UFRAME[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5})}}});
+  };
+  EXPECT_TRUE(row_of(with("100").program, "P[1]").corrected()) << why(with("100"), "P[1]");
+  EXPECT_FALSE(with("101").refusal.empty() && row_of(with("101").program, "P[1]").corrected());
+}
+
+TEST(Fanuc, AnApostropheInARemarkHidesNoMotion) {
+  const test::Corrected made =
+      ls(program("   2:  !Don't stop here ;\n   3:L P[1:it's] 100mm/sec FINE ;\n"
+                 "   4:  !it isn't \"closed ;\n   5:C P[2]\n    :  P[3] 100mm/sec FINE ;\n",
+                 position(1, kXyz) + position(2, kXyz) + position(3, kXyz)));
+  for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected()) << row.name << ": " << row.message;
+  EXPECT_EQ(made.program.moves_corrected, 2u);
+}
+
+TEST(Fanuc, PointsOfOneArcAreCorrectedTogether) {
+  const auto with = [](const std::string& last) {
+    return ls(program("   2:A P[1] 100mm/sec FINE ;\n   3:A P[2] 100mm/sec FINE ;\n   4:A " + last +
+                          " 100mm/sec FINE ;\n   5:L P[4] 100mm/sec FINE ;\n",
+                      position(1, kXyz) + position(2, kXyz) + position(3, kXyz) + position(4, kXyz)));
+  };
+  EXPECT_TRUE(row_of(with("P[3]").program, "P[1]").corrected());
+  EXPECT_NE(why(with("PR[3]"), "P[1]").find("the other point of its arc"), std::string::npos);
+  EXPECT_TRUE(row_of(with("PR[3]").program, "P[4]").corrected());
+}
+
+TEST(Fanuc, AMotionThatIsLeftIsSaidToMoveWithItsPositionWhereAnotherCorrectsIt) {
+  const auto with = [](const std::string& first) {
+    return ls(program("   2:" + first + "   3:L P[1] 100mm/sec FINE Offset,PR[1] ;\n", position(1, kXyz)));
+  };
+  const auto left = [](const test::Corrected& made) {
+    for (const ReceiptRow& row : made.program.rows) {
+      if (!row.corrected()) return row.message;
+    }
+    return std::string();
+  };
+  EXPECT_EQ(left(with("L P[1] 100mm/sec FINE ;\n")),
+            "Offset displaces it at run time; it moves with P[1], which is corrected");
+  EXPECT_EQ(left(with("  !none ;\n")), "Offset displaces it at run time");
+}
+
 TEST(Fanuc, APayloadThatOnlyTheControllerKnowsIsSaid) {
   const test::Corrected made = ls(program("   2:  PAYLOAD[3] ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
   ASSERT_EQ(made.program.notes.empty(), false);

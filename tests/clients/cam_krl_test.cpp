@@ -158,6 +158,69 @@ TEST(Krl, ALoopThatSetsWhatItNeedsIsCorrected) {
   EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
 }
 
+const std::string kMore = "{X 310,Y 0,Z 500,A 0,B 60,C 0}";
+
+TEST(Krl, WhatAnInterruptRoutineSetsHoldsAnywhereBehindItsDeclaration) {
+  const auto with = [](const std::string& handler) {
+    return krl(program("LIN " + kMore + "\nINTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nINTERRUPT ON 3\nLIN " +
+                       kPoint + "\n") +
+               "DEF stopped( )\n" + handler + "END\n");
+  };
+  for (const char* set : {"$BASE=$NULLFRAME\n", "BAS(#BASE,0)\n", "null( )\nEND\nDEF null( )\n$BASE=$NULLFRAME\n"}) {
+    const test::Corrected made = with(set);
+    EXPECT_TRUE(row_of(made.program, kMore).corrected()) << why(made, kMore);
+    EXPECT_NE(why(made, kPoint).find("$BASE: the interrupt routine STOPPED may change it"), std::string::npos)
+        << set << why(made, kPoint);
+  }
+  for (const char* harmless : {"$OUT[1]=TRUE\n", "$BASE=$NULLFRAME\n$BASE=BASE_DATA[2]\n", "BRAKE F\nRESUME\n"})
+    EXPECT_TRUE(row_of(with(harmless).program, kPoint).corrected()) << harmless << why(with(harmless), kPoint);
+}
+
+TEST(Krl, AMotionOfAnInterruptRoutineHasTheToolAndBaseOfWhatItComesInto) {
+  const std::string declared = "INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO away( )\nLIN " + kMore + "\n";
+  const std::string away = "DEF away( )\nLIN " + kPoint + "\nEND\n";
+  const test::Corrected one = krl(program(declared) + away);
+  EXPECT_TRUE(row_of(one.program, kPoint).corrected()) << why(one, kPoint);
+  const test::Corrected two = krl(program(declared + "$BASE=$NULLFRAME\n") + away);
+  EXPECT_NE(why(two, kPoint).find("used in different ways"), std::string::npos) << why(two, kPoint);
+}
+
+TEST(Krl, ResumeEndsWhatWasInterruptedWhereverItWas) {
+  const auto with = [](const std::string& last) {
+    return krl(program("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO stopped( )\nsearching( )\nLIN " + kPoint + "\n") +
+               "DEF searching( )\n$BASE=$NULLFRAME\nLIN {X 1800,Y 0,Z 1000,A 0,B 60,C 0}\n$BASE=BASE_DATA[2]\nEND\n" +
+               "DEF stopped( )\nBRAKE\n" + last + "END\n");
+  };
+  EXPECT_TRUE(row_of(with("").program, kPoint).corrected()) << why(with(""), kPoint);
+  EXPECT_FALSE(row_of(with("RESUME\n").program, kPoint).corrected());
+}
+
+TEST(Krl, WhatATriggerOrAnotherFileSetsIsNoConstant) {
+  const std::string dat = "DEFDAT p\nDECL GLOBAL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const test::Corrected trigger = krl(program("TRIGGER WHEN DISTANCE=0 DELAY=0 DO XP1.X=305\nLIN XP1\n"), dat);
+  EXPECT_NE(why(trigger, "XP1").find("XP1 is set at run time (p.src line"), std::string::npos) << why(trigger, "XP1");
+  const auto beside = [&](const std::string& line) {
+    return corrected_by_shift(Dialect::kKrl, {{"p.src", program("LIN XP1\nBAS(#BASE,2)\nLIN " + kPoint + "\n")},
+                                              {"p.dat", dat},
+                                              {"$config.dat", kConfig},
+                                              {"q.src", "DEF q( )\n" + line + "\nEND\n"}});
+  };
+  EXPECT_TRUE(row_of(beside("").program, "XP1").corrected());
+  EXPECT_NE(why(beside("XP1.Z=400"), "XP1").find("(q.src line 2)"), std::string::npos)
+      << why(beside("XP1.Z=400"), "XP1");
+  const test::Corrected base = beside("BASE_DATA[2]={X 1501,Y 0,Z 500,A 0,B 0,C 0}");
+  EXPECT_NE(why(base, kPoint).find("BASE_DATA[2] is set at run time (q.src line 2)"), std::string::npos)
+      << why(base, kPoint);
+  EXPECT_TRUE(row_of(beside("BASE_DATA[2]={X 1500,Y 0,Z 500,A 0,B 0,C 0}").program, kPoint).corrected());
+}
+
+TEST(Krl, AFunctionInAnExpressionSetsWhatItSets) {
+  const test::Corrected made =
+      krl(program("H=null(1)\nLIN " + kPoint + "\n") + "DEFFCT INT null(n:IN)\n$BASE=$NULLFRAME\nRETURN 1\nENDFCT\n");
+  ASSERT_TRUE(row_of(made.program, kPoint).frame == "$NULLFRAME" || !row_of(made.program, kPoint).corrected())
+      << row_of(made.program, kPoint).frame;
+}
+
 TEST(Krl, ALoadThatMotionsSetIsComparedWithTheCells) {
   const test::Corrected all =
       krl(program("$LOAD={M 40.0,CM {X 0,Y 0,Z 100,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nLIN " + kPoint + "\n"));

@@ -51,6 +51,12 @@ TEST(Inform, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
   EXPECT_NE(why(made, "C00003").find("pulses"), std::string::npos);
 }
 
+TEST(Inform, ASearchEndsWhereItsSensorSays) {
+  const test::Corrected made = jbi(job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n",
+                                       "MOVL C00000 V=1.0 SRCH RIN#(1)=ON DIS=20.0\r\n"));
+  EXPECT_NE(why(made, "C00000").find("a sensor may end the motion (SRCH)"), std::string::npos) << why(made, "C00000");
+}
+
 TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
   const std::string point = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
   for (const std::string& lines : std::vector<std::string>{
@@ -63,6 +69,35 @@ TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
   const test::Corrected off =
       jbi(job(point, "*A\r\nMOVL C00000 V=100.0\r\nSFTON P001\r\nSFTOF\r\nJUMP *A IF IN#(1)=ON\r\n"));
   EXPECT_TRUE(row_of(off.program, "C00000").corrected()) << why(off, "C00000");
+}
+
+TEST(Inform, AFrameOrToolThatAJobSetsIsNotKnown) {
+  const std::string point = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
+  const std::string in_user = "///USER 1\r\n///POSTYPE USER\r\nC00001=300,-250,300,0,60,0\r\n";
+  const auto with = [&](const std::string& line) {
+    return corrected_by_shift(
+        Dialect::kInform,
+        {{"drill.jbi", job(point + in_user, line + "MOVL C00000 V=100.0\r\nMOVL C00001 V=100.0\r\n")}},
+        {.frames = {{"TOOL[1]", kSpindle}, {"USER[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5})}}});
+  };
+  EXPECT_EQ(with("").program.left_alone(), 0u) << why(with(""), "C00001");
+  const test::Corrected frame = with("MFRAME UF#(1) P001 P002 P003\r\n");
+  EXPECT_TRUE(row_of(frame.program, "C00000").corrected()) << why(frame, "C00000");
+  EXPECT_NE(why(frame, "C00001").find("USER[1] is set at run time (drill.jbi line"), std::string::npos);
+  EXPECT_TRUE(row_of(with("MFRAME UF#(2) P001 P002 P003\r\n").program, "C00001").corrected());
+  EXPECT_FALSE(row_of(with("MFRAME UF#(I001) P001 P002 P003\r\n").program, "C00001").corrected());
+  EXPECT_NE(why(with("SETTOOL TL#(1) P010\r\n"), "C00000").find("TOOL[1] is set at run time"), std::string::npos)
+      << why(with("SETTOOL TL#(1) P010\r\n"), "C00000");
+}
+
+TEST(Inform, PointsOfOneArcAreCorrectedTogether) {
+  const auto with = [](const std::string& last) {
+    return jbi(job("C00000=1800.000,-250.000,800.000,0,60,0\r\nC00001=1800.0,0,900.,0,60,0\r\n",
+                   "MOVL C00000 V=10.0\r\nMOVC C00001 V=10.0\r\nMOVC " + last + " V=10.0\r\n"));
+  };
+  EXPECT_TRUE(row_of(with("C00001").program, "C00001").corrected());
+  EXPECT_NE(why(with("P001"), "C00001").find("the other point of its arc"), std::string::npos);
+  EXPECT_TRUE(row_of(with("P001").program, "C00000").corrected());
 }
 
 // Universal Robots
@@ -122,6 +157,18 @@ TEST(UrScript, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   const test::Corrected set = script("def p():\n" + hole + "  while i < 2:\n  " + kTcp +
                                      "    movel(hole, a=1.2, v=0.05)\n    set_tcp(p[0, 0, 0, 0, 0, 0])\n  end\nend\n");
   EXPECT_TRUE(row_of(set.program, "hole").corrected()) << why(set, "hole");
+}
+
+TEST(UrScript, AThreadMaySetItsToolAtAnyTime) {
+  const auto with = [](const std::string& lines) {
+    return script("def drill():\n  thread watch():\n    while (True):\n" + lines + "    end\n  end\n" + kTcp +
+                  "  run watch()\n  movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\nend\n");
+  };
+  const test::Corrected set = with("      set_tcp(p[0, 0, 0.2, 0, 0, 0])\n");
+  EXPECT_NE(set.program.rows.at(0).message.find("set_tcp: the thread watch may change it"), std::string::npos)
+      << set.program.rows[0].message;
+  const test::Corrected harmless = with("      sleep(1)\n");
+  EXPECT_TRUE(harmless.program.rows.at(0).corrected()) << harmless.program.rows[0].message;
 }
 
 TEST(UrScript, ThePayloadIsComparedWithTheCells) {

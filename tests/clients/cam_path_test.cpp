@@ -93,7 +93,52 @@ TEST(Path, SpeedsOfOtherDialectsAreRead) {
   };
   EXPECT_EQ(speed(Dialect::kFanuc, "/MN\n   1:L P[1] 250mm/sec FINE    ;\n/POS\n"), 250);
   EXPECT_EQ(speed(Dialect::kFanuc, "/MN\n   1:J P[1] 50% FINE    ;\n/POS\n"), std::nullopt);
+  EXPECT_NEAR(speed(Dialect::kFanuc, "/MN\n   1:L P[1] 120cm/min FINE    ;\n/POS\n").value(), 20, 1e-9);
   EXPECT_EQ(speed(Dialect::kUrScript, "movel(p[1,0,0,0,0,0], a=1.2, v=0.05)\n"), 50);
+  EXPECT_EQ(speed(Dialect::kUrScript, "movel(p[1,0,0,0,0,0], 1.2, 0.05)\n"), 50);
+  EXPECT_EQ(speed(Dialect::kUrScript, "movej(p[1,0,0,0,0,0], 1.2, 0.05)\n"), std::nullopt);
+  const auto inform = [&](const std::string& line) {
+    return speed(Dialect::kInform, "/JOB\n//NAME A\n//POS\n///POSTYPE BASE\nC00000=0,0,0,0,0,0\n//INST\nNOP\n" + line);
+  };
+  EXPECT_EQ(inform("MOVL C00000 V=100.5\n"), 100.5);
+  EXPECT_EQ(inform("MOVJ C00000 VJ=50.00\n"), std::nullopt) << "a share of what the axes can";
+  EXPECT_EQ(inform("MOVL C00000 V=I000\n"), std::nullopt);
+}
+
+TEST(Path, SpeedsOfKrlAreThoseThatHoldAtTheMotion) {
+  const auto speed = [](const std::string& lines, std::size_t motion = 0) {
+    return read_program(Dialect::kKrl, {{"p.src", "DEF p( )\n" + lines + "END\n"}}, {}).moves.at(motion).speed_mm_s;
+  };
+  const std::string lin = "LIN {X 1,Y 0,Z 0,A 0,B 0,C 0}\n";
+  EXPECT_EQ(speed(lin), std::nullopt);
+  EXPECT_EQ(speed("$VEL.CP=0.25\n" + lin), 250);
+  EXPECT_EQ(speed("$VEL={CP 0.5,ORI1 200.0,ORI2 200.0}\n" + lin), 500);
+  EXPECT_EQ(speed("BAS(#CP_PARAMS,2)\n" + lin), 2000);
+  EXPECT_EQ(speed("BAS(#VEL_CP,0.3)\n" + lin), 300);
+  EXPECT_EQ(speed("$VEL.CP=v\n" + lin), std::nullopt);
+  EXPECT_EQ(speed("$VEL.CP=0.25\nPTP {X 1,Y 0,Z 0,A 0,B 0,C 0}\n"), std::nullopt) << "a share of what the axes can";
+  EXPECT_EQ(speed("SLIN {X 1,Y 0,Z 0,A 0,B 0,C 0} WITH $VEL.CP=0.1, $TOOL=$NULLFRAME\n"), 100);
+  EXPECT_EQ(speed("SLIN XP1 WITH $VEL=SVEL_CP(1.5, , LCPDAT1)\n"), 1500);
+  EXPECT_EQ(speed("$VEL.CP=0.1\nIF $IN[1] THEN\n$VEL.CP=0.2\nENDIF\n" + lin), 200) << "the faster of two ways";
+}
+
+TEST(Path, SpeedsOfRapidAreDeclaredOrWrittenInTheMotion) {
+  const auto speed = [](const std::string& motion) {
+    return read_program(Dialect::kRapid,
+                        {{"m.mod",
+                          "MODULE M\n  CONST speeddata vDrill:=[35,500,5000,1000];\n  VAR speeddata vNow:=[1,1,"
+                          "1,1];\nPROC main()\n vNow:=vDrill;\n " +
+                              motion + "\nENDPROC\nENDMODULE\n"}},
+                        {})
+        .moves.at(0)
+        .speed_mm_s;
+  };
+  EXPECT_EQ(speed("MoveL p1,v100,fine,tool0;"), 100);
+  EXPECT_EQ(speed("MoveL p1,vDrill,fine,tool0;"), 35);
+  EXPECT_EQ(speed("MoveL p1,[40,500,5000,1000],fine,tool0;"), 40);
+  EXPECT_EQ(speed("MoveL p1,v100\\V:=60,fine,tool0;"), 60);
+  EXPECT_EQ(speed("MoveL p1,vNow,fine,tool0;"), std::nullopt);
+  EXPECT_EQ(speed("MoveJ p1,v100,fine,tool0;"), std::nullopt);
 }
 
 TEST(Path, AtAStretchedWristJoint4StaysWhereItWas) {

@@ -257,6 +257,59 @@ TEST(Rapid, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
   }
 }
 
+const std::string kPart = "  PERS loaddata lPart:=[40,[0,0,100],[1,0,0,0],0,0,0];\n";
+
+/// p1 behind GripLoad load0, in a program with these routines beside main.
+test::Corrected beside(const std::string& routines, const std::string& rest_of_main = "",
+                       const std::string& before = "") {
+  return rapid("MODULE M\n" + kTool + kPanel + kPart + target("p1", "0,0,300") + target("p2", "0,10,300") +
+               "  PROC main()\n    GripLoad load0;\n" + before + move_l("p1") + rest_of_main + "  ENDPROC\n" +
+               routines + "ENDMODULE\n");
+}
+
+TEST(Rapid, WhatATrapChangesMayHoldAnywhere) {
+  const auto with = [](const std::string& lines) { return beside("  TRAP tStop\n" + lines + "  ENDTRAP\n"); };
+  EXPECT_NE(why(with("    GripLoad lPart;\n"), "p1").find("GripLoad: the TRAP tStop may change"), std::string::npos)
+      << why(with("    GripLoad lPart;\n"), "p1");
+  EXPECT_NE(why(with("    PDispSet dNow;\n"), "p1").find("PDispSet displaces it"), std::string::npos);
+  for (const std::string& harmless : std::vector<std::string>{"", "    StopMove;\n    SetDO do1,1;\n    StartMove;\n",
+                                                              "    GripLoad lPart;\n    GripLoad load0;\n"})
+    EXPECT_TRUE(row_of(with(harmless).program, "p1").corrected()) << harmless << why(with(harmless), "p1");
+}
+
+TEST(Rapid, AMotionInATrapHasTheLoadOfWhatItComesInto) {
+  const std::string trap = "  TRAP tAway\n" + move_l("p2") + "  ENDTRAP\n";
+  EXPECT_TRUE(row_of(beside(trap).program, "p2").corrected()) << why(beside(trap), "p2");
+  const test::Corrected gripped = beside(trap, "    GripLoad lPart;\n" + move_l("p1"));
+  EXPECT_FALSE(row_of(gripped.program, "p2").corrected());
+}
+
+TEST(Rapid, WhatAnErrorHandlerChangesHoldsWhereItGoesBack) {
+  const auto with = [](const std::string& lines, const std::string& head = "  ERROR\n") {
+    return beside("", head + lines);
+  };
+  for (const std::string& back : std::vector<std::string>{"RETRY", "TRYNEXT"}) {
+    const test::Corrected made = with("    GripLoad lPart;\n    " + back + ";\n");
+    EXPECT_NE(why(made, "p1").find("GripLoad: the handler 'error' of its routine may change"), std::string::npos)
+        << back << why(made, "p1");
+    EXPECT_TRUE(row_of(with("    SetDO do1,1;\n    " + back + ";\n").program, "p1").corrected());
+  }
+  const test::Corrected numbered = with("    GripLoad lPart;\n    RETRY;\n", "  ERROR (ERR_1, LONG_JMP_ERR)\n");
+  EXPECT_FALSE(row_of(numbered.program, "p1").corrected());
+  EXPECT_TRUE(row_of(with("    GripLoad lPart;\n    RAISE;\n").program, "p1").corrected()) << "it does not come back";
+  for (const std::string& kind : std::vector<std::string>{"  UNDO\n", "  BACKWARD\n"})
+    EXPECT_TRUE(row_of(with("    GripLoad lPart;\n", kind).program, "p1").corrected()) << kind;
+}
+
+TEST(Rapid, WhatHoldsWhereARoutineFailsHoldsInTheHandlerOfItsCaller) {
+  const auto with = [](const std::string& handler) {
+    return beside("  PROC part()\n    GripLoad lPart;\n    WaitDI di1,1;\n    GripLoad load0;\n  ENDPROC\n",
+                  "  ERROR\n" + handler, "    part;\n");
+  };
+  EXPECT_FALSE(row_of(with("    TRYNEXT;\n").program, "p1").corrected());
+  EXPECT_TRUE(row_of(with("    RETURN;\n").program, "p1").corrected()) << why(with("    RETURN;\n"), "p1");
+}
+
 TEST(Rapid, WhatIsMadeOfACorrectedTargetIsSaidToMoveWithIt) {
   const test::Corrected made =
       rapid(program(target("pA", "0,125,400") + "  VAR robtarget pX;\n  VAR num n;\n",

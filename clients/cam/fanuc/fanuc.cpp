@@ -44,7 +44,13 @@ struct Register {
 /// What UFRAME_NUM and UTOOL_NUM select: a number; empty: not set; else why it is not known.
 struct Selected {
   std::string frame, tool;
+  std::string beside;  ///< a program that may select another one at any time, as the statement that starts it; or empty
   bool operator==(const Selected&) const = default;
+};
+/// What all programs of a controller share.
+struct Controller {
+  std::map<std::string, Register> registers;
+  std::map<std::string, std::string> set_from, changed;  ///< of UFRAME[n] and UTOOL[n]
 };
 bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -57,25 +63,32 @@ double number(const Piece& piece) {
 
 class File {
  public:
-  File(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
-      : index_(index), program_(program), sites_(sites), options_(options), text_(program.files[index].text) {}
+  File(std::size_t index, Program& program, Sites& sites, Controller& controller, const ReadOptions& options)
+      : index_(index),
+        program_(program),
+        sites_(sites),
+        controller_(controller),
+        options_(options),
+        text_(program.files[index].text) {}
 
+  /// Its positions, and what it sets.
   void read() {
-    const auto pieces = [&](const Part& part) {
-      return pieces_of(text_, part.begin, part.end, part.line, {"", "'\""});
-    };
     const Part motions = part_of("/MN"), positions = part_of("/POS");
     program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
-    read_positions(pieces(positions));
-    statements_ = statements(pieces(motions));
+    read_positions(pieces_of(text_, positions.begin, positions.end, positions.line, {"", "'\""}));
+    read_statements(motions);
     for (const Pieces& statement : statements_) note_setting(statement);
+  }
+
+  /// When all files are read.
+  void read_motions() {
     std::vector<Step> steps;
     for (const Pieces& statement : statements_) {
       steps.push_back(step_of(statement));
       note_load(statement);
     }
     const std::vector<Selected> selected = states_before(
-        next_of(steps), {0}, Selected{}, [&](std::size_t s, Selected& state) { select(statements_[s], state); }, join);
+        flow_of(steps), Selected{}, [&](std::size_t s, Selected& state) { select(statements_[s], state); }, join);
     for (std::size_t s = 0; s < statements_.size(); ++s) motion(statements_[s], selected[s]);
     finish();
   }
@@ -172,8 +185,24 @@ class File {
       position.groups.erase(1);
   }
 
-  /// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers.
-  static std::vector<Pieces> statements(const Pieces& pieces) {
+  /// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers. A quote in one of them, or in a
+  /// remark, is no matter of the next.
+  void read_statements(const Part& part) {
+    std::size_t begin = part.begin;
+    int line = part.line, first_line = part.line;
+    for (std::size_t at = part.begin; at < part.end; ++line) {
+      const std::size_t end = std::min(text_.find('\n', at), part.end - 1) + 1;
+      const std::size_t last = text_.find_last_not_of(" \t\r\n", end - 1);
+      at = end;
+      if (end < part.end && (last == std::string::npos || last < begin || text_[last] != ';')) continue;
+      const std::size_t first = text_.find_first_not_of(" \t\r\n0123456789:", begin);
+      if (first < end && text_[first] != '!') add_statements(pieces_of(text_, begin, end, first_line, {"", "'\""}));
+      begin = end;
+      first_line = line + 1;
+    }
+  }
+
+  void add_statements(const Pieces& pieces) {
     std::vector<Pieces> all(1);
     for (const Piece& piece : pieces) {
       if (piece.is(";")) {
@@ -184,8 +213,8 @@ class File {
     }
     for (Pieces& one : all) {
       while (!one.empty() && (one[0].kind == Piece::Kind::kNumber || one[0].is(":"))) one.erase(one.begin());
+      if (!one.empty()) statements_.push_back(std::move(one));
     }
-    return all;
   }
 
   static Step step_of(const Pieces& statement) {
@@ -212,6 +241,10 @@ class File {
 
   /// `UFRAME_NUM=1`, `UTOOL_NUM=R[2]`, `CALL SUB`
   void select(const Pieces& statement, Selected& selected) const {
+    const bool monitors = statement.size() > 1 && statement[0].is("MONITOR") && !statement[1].is("END");
+    const bool names = statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
+    if (monitors) selected.beside = fmt::format("MONITOR {}", shown(statement[1].text));
+    if (names) selected.beside = fmt::format("{}={}", statement[0].text, shown(statement[2].text));
     for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
       if (!statement[at].is("CALL") && !statement[at].is("RUN")) continue;
       selected.frame = selected.tool =
@@ -226,10 +259,15 @@ class File {
                                  statement[at].line);
     }
   }
-  static void join(Selected& state, const Selected& other) {
+  static void join(Selected& state, const Selected& other, const std::string&) {
     const std::string why = "a branch, a jump or a loop of the program decides it";
     if (state.frame != other.frame) state.frame = why;
     if (state.tool != other.tool) state.tool = why;
+    if (state.beside.empty()) state.beside = other.beside;
+  }
+  /// What is selected where a program beside may select another one.
+  static std::string with(const std::string& selected, const std::string& beside) {
+    return beside.empty() || !is_number(selected) ? selected : beside + " may select another one";
   }
 
   /// `PAYLOAD[3]`
@@ -261,8 +299,9 @@ class File {
     if (word == "PR" && !name.empty()) return note_register(statement, equals, name, where);
     if ((word == "UFRAME" || word == "UTOOL") && !name.empty()) {
       const std::string from = indexed(statement, equals + 1);
-      const bool twice = !set_from_.emplace(name, from).second;
-      if (twice && set_from_[name] != from) changed_[name] = fmt::format("{} is set at run time ({})", name, where);
+      const bool twice = !controller_.set_from.emplace(name, from).second;
+      if (twice && controller_.set_from[name] != from)
+        controller_.changed[name] = fmt::format("{} is set at run time ({})", name, where);
     } else if (word == "P" && name.starts_with("P[")) {
       const auto position = by_name_.find(name);
       const std::string why = fmt::format("{} is set at run time ({})", name, where);
@@ -287,7 +326,7 @@ class File {
   }
 
   void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where) {
-    Register& set = registers_[name];
+    Register& set = controller_.registers[name];
     const bool element = equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
     const bool constant = equals + 2 == statement.size() && statement[equals + 1].kind == Piece::Kind::kNumber;
     const int index = element ? static_cast<int>(number(statement[4])) : 0;
@@ -304,18 +343,18 @@ class File {
   /// The value of UFRAME[n] or UTOOL[n]; else why it is not known.
   std::optional<Pose> setting(const std::string& name, std::string& why) const {
     if (const auto given = options_.frames.find(name); given != options_.frames.end()) return given->second;
-    const auto from = set_from_.find(name);
-    if (from == set_from_.end()) {
+    const auto from = controller_.set_from.find(name);
+    if (from == controller_.set_from.end()) {
       why = fmt::format("{} is not in the files handed over: --frames tells its value", name);
       return std::nullopt;
     }
-    if (const auto set = changed_.find(name); set != changed_.end()) {
+    if (const auto set = controller_.changed.find(name); set != controller_.changed.end()) {
       why = set->second;
       return std::nullopt;
     }
-    const auto set = registers_.find(from->second);
+    const auto set = controller_.registers.find(from->second);
     std::vector<double> numbers;
-    for (std::size_t k = 0; set != registers_.end() && set->second.changed.empty() && k < 6; ++k) {
+    for (std::size_t k = 0; set != controller_.registers.end() && set->second.changed.empty() && k < 6; ++k) {
       if (set->second.elements[k]) numbers.push_back(*set->second.elements[k]);
     }
     if (numbers.size() == 6) return pose_of(Coordinates::kAnglesXyz, numbers);
@@ -389,8 +428,10 @@ class File {
     static const std::set<std::string_view> kMotions = {"J", "L", "C", "A", "S"};
     if (statement.size() < 4 || !kMotions.contains(statement[0].text)) return;
     if (!statement[1].is("P") && !statement[1].is("PR")) return;
-    program_.moves.push_back({index_, statement[0].line, {}, false});
-    program_.moves.back().is_arc = statement[0].is("C");
+    const bool goes_on = statement[0].is("A") && last_motion_ == "A";
+    program_.moves.push_back({index_, statement[0].line, {}, statement[0].is("C") || statement[0].is("A")});
+    program_.moves.back().arc_goes_on = goes_on;
+    last_motion_ = std::string(statement[0].text);
     note_speed(statement);
     std::string why;
     for (const Piece& piece : statement) {
@@ -414,12 +455,14 @@ class File {
     }
   }
 
-  /// `250mm/sec`
+  /// `250mm/sec`, `1500.0cm/min`
   void note_speed(const Pieces& statement) {
     for (std::size_t at = 0; at + 3 < statement.size(); ++at) {
-      if (statement[at].kind == Piece::Kind::kNumber && statement[at + 1].is("mm") && statement[at + 2].is("/") &&
-          statement[at + 3].is("sec"))
-        program_.moves.back().speed_mm_s = number(statement[at]);
+      if (statement[at].kind != Piece::Kind::kNumber || !statement[at + 2].is("/")) continue;
+      const Piece &length = statement[at + 1], &time = statement[at + 3];
+      const double mm = length.is("mm") ? 1 : length.is("cm") ? 10 : length.is("inch") ? 25.4 : 0;
+      const double s = time.is("sec") ? 1 : time.is("min") ? 60 : 0;
+      if (mm > 0 && s > 0) program_.moves.back().speed_mm_s = number(statement[at]) * mm / s;
     }
   }
 
@@ -434,9 +477,9 @@ class File {
       const Group& robot = group == position.groups.end() ? empty : group->second;
       const bool joint = statement[0].is("J");
       sites_.add(index_, begin, known,
-                 {tool_of(robot.tool.empty() ? "?" : robot.tool, selected.tool),
-                  frame_of(robot.frame.empty() ? "?" : robot.frame, selected.frame), std::string(statement[0].text),
-                  index_, statement[0].line, program_.moves.size() - 1, !joint});
+                 {tool_of(robot.tool.empty() ? "?" : robot.tool, with(selected.tool, selected.beside)),
+                  frame_of(robot.frame.empty() ? "?" : robot.frame, with(selected.frame, selected.beside)),
+                  std::string(statement[0].text), index_, statement[0].line, program_.moves.size() - 1, !joint});
       used_.insert(begin);
     }
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
@@ -485,13 +528,13 @@ class File {
   std::size_t index_;
   Program& program_;
   Sites& sites_;
+  Controller& controller_;
   const ReadOptions& options_;
   const std::string& text_;
   std::map<std::size_t, Position> positions_;  ///< by their first byte
   std::map<std::string, std::size_t> by_name_;
   std::vector<Pieces> statements_;
-  std::map<std::string, Register> registers_;
-  std::map<std::string, std::string> set_from_, changed_;
+  std::string last_motion_;
   std::set<std::size_t> used_;
 };
 
@@ -502,9 +545,12 @@ Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options) {
   program.dialect = "fanuc";
   program.files = std::move(files);
   Sites sites;
+  Controller controller;
   std::vector<File> read;
   read.reserve(program.files.size());
-  for (std::size_t f = 0; f < program.files.size(); ++f) read.emplace_back(f, program, sites, options).read();
+  for (std::size_t f = 0; f < program.files.size(); ++f)
+    read.emplace_back(f, program, sites, controller, options).read();
+  for (File& file : read) file.read_motions();
   sites.finish(program,
                [&](const Site& site, ProgramTarget& target) { return read[site.file].describe(site, target); });
   return program;

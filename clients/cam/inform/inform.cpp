@@ -54,6 +54,21 @@ class Job {
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
+
+  /// `MFRAME UF#(1) C00000 C00001 C00002`, `SETTOOL TL#(1) P010`: frames and tools that jobs set, with where.
+  void note_settings(std::map<std::string, std::string>& set) const {
+    for (const Statement& statement : statements_) {
+      const std::vector<Piece> pieces = pieces_at(statement);
+      if (pieces.size() < 4 || (!pieces[0].is("MFRAME") && !pieces[0].is("SETTOOL"))) continue;
+      const bool numbered = pieces.size() > 5 && pieces[2].is("#") && pieces[4].kind == Piece::Kind::kNumber;
+      const std::string what = fmt::format("{}[{}]", pieces[0].is("MFRAME") ? "USER" : "TOOL",
+                                           numbered ? pieces[4].text : std::string_view("*"));
+      set.emplace(what,
+                  fmt::format("{} is set at run time ({} line {})", what, program_.files[index_].name, statement.line));
+    }
+  }
+  /// Of all jobs.
+  void take_settings(const std::map<std::string, std::string>& set) { set_ = &set; }
   [[nodiscard]] const std::vector<Statement>& statements() const { return statements_; }
 
   /// What a statement does to the order. A condition behind it makes a block of it.
@@ -146,6 +161,7 @@ class Job {
     ProgramTool tool;
     tool.name = fmt::format("TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
     if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
+    tool.why_not = why_set(tool.name, "TOOL[*]");
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       if (program_.tools[k].name == tool.name) return k;
     }
@@ -158,6 +174,8 @@ class Job {
     frame.name = position.kind;
     if (position.kind == "USER") {
       frame.name = fmt::format("USER[{}]", position.user);
+      frame.why_not = why_set(frame.name, "USER[*]");
+      if (!frame.why_not.empty()) return known_frame(std::move(frame));
       if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
         frame.X_BO = given->second;
       } else {
@@ -166,11 +184,23 @@ class Job {
     } else if (position.kind != "BASE" && position.kind != "ROBOT" && position.kind != "PULSE") {
       frame.why_not = fmt::format("frame {} is not known", shown(position.kind));
     }
+    return known_frame(std::move(frame));
+  }
+
+  std::size_t known_frame(ProgramFrame frame) {
     for (std::size_t k = 0; k < program_.frames.size(); ++k) {
       if (program_.frames[k].name == frame.name) return k;
     }
     program_.frames.push_back(std::move(frame));
     return program_.frames.size() - 1;
+  }
+
+  /// Why a frame or tool is not what it was; empty: no job sets it.
+  [[nodiscard]] std::string why_set(const std::string& name, const std::string& any) const {
+    for (const std::string& one : {name, any}) {
+      if (const auto set = set_->find(one); set != set_->end()) return set->second;
+    }
+    return "";
   }
 
   [[nodiscard]] std::vector<Piece> pieces_at(const Statement& statement) const {
@@ -190,7 +220,11 @@ class Job {
     const std::string word(pieces[0].text);
     static const std::set<std::string> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
     if (!kMotions.contains(word) || pieces.size() < 2) return;
-    program_.moves.push_back({index_, number, {}, false});
+    const bool goes_on = !program_.moves.empty() && program_.moves.back().file == index_ && last_motion_ == word;
+    program_.moves.push_back({index_, number, {}, word == "MOVC"});
+    program_.moves.back().arc_goes_on = word == "MOVC" && goes_on;
+    program_.moves.back().speed_mm_s = speed_of(pieces);
+    last_motion_ = word;
     const std::string name(pieces[1].text);
     const auto leave = [&](const std::string& why) {
       used_.insert(name);
@@ -198,7 +232,8 @@ class Job {
       program_.left.push_back({name, index_, number, word, why});
     };
     for (const Piece& piece : pieces) {
-      if (piece.is("UNTIL")) return leave("a sensor may end the motion (UNTIL)");
+      if (piece.is("UNTIL") || piece.is("SRCH"))
+        return leave(fmt::format("a sensor may end the motion ({})", piece.text));
     }
     if (word == "IMOV") return leave("it is relative to where the robot is");
     if (shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", shifted_at));
@@ -211,6 +246,15 @@ class Job {
   }
 
  private:
+  /// `V=138.0`, mm/s, of a motion of the tool. `VJ=50.00` is a share of what the axes can.
+  static std::optional<double> speed_of(const std::vector<Piece>& pieces) {
+    for (std::size_t at = 0; at + 2 < pieces.size(); ++at) {
+      if (!pieces[at].is("V") || !pieces[at + 1].is("=")) continue;
+      if (const auto speed = read_number(pieces[at + 2].text)) return speed->value;
+    }
+    return std::nullopt;
+  }
+
   /// `1,0,0,0,0,0`: wrist not flipped, upper arm, front; R, T, S below 180 deg.
   static Configuration configuration_of(const std::vector<int>& conf) {
     Configuration said;
@@ -234,8 +278,9 @@ class Job {
   Position now_;
   std::map<std::string, Position> positions_;
   std::set<std::string> used_;
-  std::string name_;
+  std::string name_, last_motion_;
   std::vector<Statement> statements_;
+  const std::map<std::string, std::string>* set_ = nullptr;
 };
 
 /// The motions of all jobs, each with the shift that holds before it: a job calls another.
@@ -250,6 +295,11 @@ void read_motions(std::vector<Job>& jobs) {
     steps.push_back(std::move(step));
     places.push_back(place);
   };
+  std::map<std::string, std::string> set;
+  for (Job& job : jobs) {
+    job.note_settings(set);
+    job.take_settings(set);
+  }
   for (std::size_t j = 0; j < jobs.size(); ++j) {
     add({Step::Kind::kRoutine, jobs[j].name()}, {});
     for (const Statement& statement : jobs[j].statements()) {
@@ -262,11 +312,11 @@ void read_motions(std::vector<Job>& jobs) {
     add({Step::Kind::kEnd}, {});
   }
   const std::vector<int> shifted = states_before(
-      next_of(steps), entries_of(steps), 0,
+      flow_of(steps), 0,
       [&](std::size_t s, int& at) {
         if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, at);
       },
-      [](int& at, const int& other) { at = std::max(at, other); });
+      [](int& at, const int& other, const std::string&) { at = std::max(at, other); });
   for (std::size_t s = 0; s < steps.size(); ++s) {
     if (places[s].statement != nullptr) jobs[places[s].job].motion(*places[s].statement, shifted[s]);
   }

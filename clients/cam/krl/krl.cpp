@@ -11,6 +11,7 @@
 
 #include "clients/cam/flow.h"
 #include "clients/cam/krl/lines.h"
+#include "clients/cam/krl/variables.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -19,17 +20,22 @@ namespace trammel::cam {
 
 namespace {
 
+using krl::Assigned;
+using krl::because;
+using krl::done_later;
+using krl::is_motion;
+using krl::kPose;
 using krl::Line;
+using krl::root_of;
+using krl::stem_of;
 using krl::Token;
 using krl::TokenKind;
+using krl::Told;
+using krl::upper;
 using krl::Value;
+using krl::Variable;
 
-template <typename T>
-using Told = tl::expected<T, std::string>;
-tl::unexpected<std::string> because(std::string why) { return tl::make_unexpected(std::move(why)); }
-
-constexpr int kDeepest = 20;  // calls within calls, names that stand for names
-constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "A", "B", "C"};
+constexpr int kDeepest = 20;  // calls within calls
 constexpr std::array<const char*, 6> kAxes = {"A1", "A2", "A3", "A4", "A5", "A6"};
 
 /// Of a number that the program did not write.
@@ -39,27 +45,20 @@ const NumberStyle kThreeDecimals = [] {
   return style;
 }();
 
-/// A value that a line gives to a name.
-struct Assigned {
-  std::size_t file = 0, line = 0;
-  std::vector<Value> operands;
-};
-
-struct Variable {
-  std::vector<Assigned> values;
-  std::string changed;  ///< why its value is decided at run time
-};
-
 struct Routine {
   std::string name;
   std::size_t file = 0, first = 0, last = 0;  ///< lines
 };
 
+constexpr double kSpeedUnknown = -1;
+
 /// What the controller has set when a motion comes.
 struct State {
   std::size_t tool = 0, frame = 0;
-  std::size_t load = 0;    ///< 0: the tool's own
-  std::string fixed_tool;  ///< why the robot does not hold the tool; empty: it does
+  std::size_t load = 0;          ///< 0: the tool's own
+  std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
+  std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
+  double speed = kSpeedUnknown;  ///< of the tool, mm/s
   auto operator<=>(const State&) const = default;
 };
 
@@ -70,22 +69,6 @@ struct Load {
   std::string note, why_not;
 };
 
-std::string upper(std::string text) {
-  for (char& c : text) {
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  }
-  return text;
-}
-
-std::string stem_of(const std::string& name) { return upper(name.substr(0, name.rfind('.'))); }
-
-/// `XP[3].X` -> `XP[3]`
-std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
-
-bool is_motion(const std::string& word) {
-  static const std::set<std::string> kMotions = {"PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL"};
-  return kMotions.contains(word);
-}
 bool is_relative(const std::string& word) {
   return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
 }
@@ -102,8 +85,10 @@ class Reader {
 
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
+    names_.join_globals();
     std::set<std::string> called;
     for (std::size_t r = 0; r < routines_.size(); ++r) by_name_.emplace(routines_[r].name, r);
+    find_interrupts(called);
     for (const Routine& routine : routines_) note_calls(routine, called);
     for (std::size_t r = 0; r < routines_.size(); ++r) {
       if (!called.contains(routines_[r].name)) run(r, {}, 0);
@@ -142,7 +127,7 @@ class Reader {
         routines_[static_cast<std::size_t>(open)].last = k;
         open = -1;
       } else {
-        note_value(f, k);
+        names_.note_value(f, k);
       }
     }
     if (!any) routines_.push_back({"", f, 0, lines.size()});
@@ -158,117 +143,6 @@ class Reader {
     const std::size_t end = line.comment.find_first_of(" ;,\t\r", close + 2);
     const std::string number(line.comment.substr(at + 5, close - at - 5));
     tool_names_.emplace(number, std::string(line.comment.substr(close + 2, end - close - 2)));
-  }
-
-  /// A declaration or assignment: behind `DECL` and a type, or bare.
-  void note_value(std::size_t f, std::size_t k) {
-    const std::vector<Token>& tokens = lines_[f][k].tokens;
-    static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
-                                                 "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
-    std::size_t at = 0;
-    bool declared = false;
-    while (at < tokens.size() &&
-           (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
-      declared |= tokens[at].text == "DECL";
-      ++at;
-    }
-    if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
-        tokens[at + 1].kind == TokenKind::kWord)
-      ++at;
-    if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
-    std::size_t next = at;
-    const std::vector<Value> name = krl::operands_at(tokens, at, &next);
-    if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
-    if (next >= tokens.size() || tokens[next].text != "=") return;
-    std::size_t end = next;
-    std::vector<Value> operands = krl::operands_at(tokens, next + 1, &end);
-    const std::string root = root_of(name[0].name);
-    const auto key = std::pair(stem_of(program_.files[f].name), root);
-    Variable& variable = variables_[key];
-    if (root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
-      variable.changed = set_at(root, f, k);
-      return;
-    }
-    variable.values.push_back({f, k, std::move(operands)});
-    if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
-  }
-
-  std::string set_at(const std::string& name, std::size_t f, std::size_t k) const {
-    return fmt::format("{} is set at run time ({})", shown(spelled(name, f, k)), place(f, k));
-  }
-  std::string place(std::size_t f, std::size_t k) const {
-    return fmt::format("{} line {}", program_.files[f].name, lines_[f][k].number);
-  }
-
-  /// A name as a line spells it.
-  [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const {
-    const std::string word = name.substr(0, name.find('['));
-    for (const Token& token : lines_[f][k].tokens) {
-      if (token.kind == TokenKind::kWord && token.text == word)
-        return program_.files[f].text.substr(token.begin, token.end - token.begin) + name.substr(word.size());
-    }
-    return name;
-  }
-
-  /// The variable of a file's own data list, else of any.
-  [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const {
-    const auto own = variables_.find({stem_of(program_.files[f].name), name});
-    if (own != variables_.end()) return &own->second;
-    for (const auto& [key, variable] : variables_) {
-      if (key.second == name) return &variable;
-    }
-    return nullptr;
-  }
-
-  /// The only value of a name.
-  Told<const Assigned*> value_of(const std::string& name, std::size_t f) const {
-    const Variable* variable = find(root_of(name), f);
-    if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
-    // One element of an array is changed where any may be.
-    const std::string any = name.substr(0, name.find('[')) + "[*]";
-    const Variable* all = name.find('[') == std::string::npos ? nullptr : find(any, f);
-    if (all != nullptr && !all->changed.empty()) return because(all->changed);
-    if (!variable->changed.empty()) return because(variable->changed);
-    if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
-    return &variable->values[0];
-  }
-
-  // Values.
-
-  Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const {
-    if (operands.empty() || depth > kDeepest) return because("it is not constant");
-    Pose X = Pose::Identity();
-    for (const Value& operand : operands) {
-      const Told<Pose> one = frame_of(operand, f, depth);
-      if (!one) return one;
-      X = X * *one;
-    }
-    return X;
-  }
-
-  Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const {
-    if (value.kind == Value::Kind::kAggregate) {
-      const Told<std::vector<double>> numbers = numbers_of(value, kPose);
-      if (!numbers) return because(numbers.error());
-      return pose_of(Coordinates::kAnglesZyx, *numbers);
-    }
-    if (value.kind != Value::Kind::kName) return because("it is not constant");
-    if (value.name == "$NULLFRAME" || value.name == "$WORLD" || value.name == "$ROBROOT") return Pose::Identity();
-    if (value.name.starts_with("$")) return because(fmt::format("{} decides it", shown(value.name)));
-    const Told<const Assigned*> assigned = value_of(value.name, f);
-    if (!assigned) return because(assigned.error());
-    return frame_of((*assigned)->operands, (*assigned)->file, depth + 1);
-  }
-
-  static Told<std::vector<double>> numbers_of(const Value& value, const std::array<const char*, 6>& fields) {
-    std::vector<double> numbers;
-    for (const char* name : fields) {
-      const Value* field = value.field(name);
-      if (field == nullptr) return because(fmt::format("it does not say {}", name));
-      if (field->kind != Value::Kind::kNumber) return because(fmt::format("{} is not a constant number", name));
-      numbers.push_back(field->number);
-    }
-    return numbers;
   }
 
   // Tools and bases.
@@ -298,13 +172,14 @@ class Reader {
     tool.name = named == tool_names_.end() ? data : named->second;
     if (const auto given = options_.frames.find(data); given != options_.frames.end()) {
       tool.X_FT = given->second;
-    } else if (const Variable* variable = find(data, f)) {
+    } else if (const Variable* variable = names_.find(data, f)) {
       if (!variable->changed.empty())
         tool.why_not = variable->changed;
       else if (!variable->values.empty())
         fill(variable->values[0], tool);
     }
-    if (const Variable* load = find(fmt::format("LOAD_DATA[{}]", number), f); load != nullptr && !load->values.empty())
+    if (const Variable* load = names_.find(fmt::format("LOAD_DATA[{}]", number), f);
+        load != nullptr && !load->values.empty())
       tool.load = load_of(load->values[0].operands);
     return add_tool(std::move(tool));
   }
@@ -312,7 +187,7 @@ class Reader {
   void fill(const Assigned& assigned, ProgramTool& tool) const {
     tool.file = program_.files[assigned.file].name;
     tool.line = lines_[assigned.file][assigned.line].number;
-    const Told<Pose> X_FT = frame_of(assigned.operands, assigned.file);
+    const Told<Pose> X_FT = names_.frame_of(assigned.operands, assigned.file);
     if (!X_FT) {
       tool.why_not = fmt::format("tool {}: {}", shown(tool.name), X_FT.error());
       return;
@@ -344,7 +219,7 @@ class Reader {
       return tool_numbered(std::atoi(data.c_str() + 10), f);
     ProgramTool tool;
     tool.name = data.empty() ? "$TOOL" : data;
-    if (!data.empty() && find(data, f) == nullptr) return add_tool(std::move(tool));
+    if (!data.empty() && names_.find(data, f) == nullptr) return add_tool(std::move(tool));
     fill({f, k, operands}, tool);
     return add_tool(std::move(tool));
   }
@@ -359,20 +234,21 @@ class Reader {
 
   /// `$LOAD = ...`
   std::size_t load_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
-    Load load{fmt::format("$LOAD ({})", place(f, k)), std::nullopt, "", ""};
+    Load load{fmt::format("$LOAD ({})", names_.place(f, k)), std::nullopt, "", ""};
     const std::vector<Value>* value = &operands;
     if (operands.size() == 1 && operands[0].kind == Value::Kind::kName) {
       load.name = operands[0].name;
-      if (find(root_of(load.name), f) == nullptr) {
+      if (names_.find(root_of(load.name), f) == nullptr) {
         load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
         return add_load(std::move(load));
       }
-      const Told<const Assigned*> assigned = value_of(load.name, f);
+      const Told<const Assigned*> assigned = names_.value_of(load.name, f);
       if (assigned) value = &(*assigned)->operands;
       if (!assigned) load.why_not = "$LOAD: " + assigned.error();
     }
     if (load.why_not.empty()) load.load = load_of(*value);
-    if (load.why_not.empty() && !load.load) load.why_not = fmt::format("$LOAD is not constant ({})", place(f, k));
+    if (load.why_not.empty() && !load.load)
+      load.why_not = fmt::format("$LOAD is not constant ({})", names_.place(f, k));
     return add_load(std::move(load));
   }
 
@@ -406,7 +282,7 @@ class Reader {
     if (operands.size() == 1 && operands[0].name.starts_with("BASE_DATA[") &&
         options_.frames.contains(operands[0].name))
       return add_frame({operands[0].name, options_.frames.at(operands[0].name), ""});
-    const Told<Pose> X_BO = frame_of(operands, f);
+    const Told<Pose> X_BO = names_.frame_of(operands, f);
     std::string name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
     if (X_BO) return add_frame({std::move(name), *X_BO, ""});
     return add_frame({name, Pose::Identity(), fmt::format("base {}: {}", shown(name), X_BO.error())});
@@ -414,7 +290,7 @@ class Reader {
 
   /// FDAT of an inline form: `{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,...}`
   void apply_fdat(const std::string& name, std::size_t f, State& state) {
-    const Told<const Assigned*> assigned = value_of(name, f);
+    const Told<const Assigned*> assigned = names_.value_of(name, f);
     const Value* tool =
         assigned && (*assigned)->operands.size() == 1 ? (*assigned)->operands[0].field("TOOL_NO") : nullptr;
     const Value* base = tool == nullptr ? nullptr : (*assigned)->operands[0].field("BASE_NO");
@@ -438,7 +314,42 @@ class Reader {
   void note_calls(const Routine& routine, std::set<std::string>& called) const {
     for (std::size_t k = routine.first; k < routine.last; ++k) {
       const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
-      if (tokens.size() > 1 && tokens[1].text == "(") called.insert(tokens[0].text);
+      for (const std::size_t r : called_by(tokens)) called.insert(routines_[r].name);
+    }
+  }
+
+  /// The routines that come in between.
+  void find_interrupts(std::set<std::string>& called) {
+    for (std::size_t f = 0; f < lines_.size(); ++f) {
+      for (const Line& line : lines_[f]) {
+        const std::size_t at = done_later(line.tokens);
+        const auto routine = at == 0 ? by_name_.end() : by_name_.find(line.tokens[at].text);
+        resumes_ |= !line.tokens.empty() && line.tokens[0].text == "RESUME";
+        const auto known = [&] { return std::find(interrupts_.begin(), interrupts_.end(), routine->second); };
+        if (routine == by_name_.end() || known() != interrupts_.end()) continue;
+        called.insert(routine->first);
+        interrupts_.push_back(routine->second);
+      }
+    }
+  }
+  static std::uint64_t bit_of(std::size_t interrupt) {
+    return std::uint64_t{1} << std::min<std::size_t>(interrupt, 63);
+  }
+
+  /// What interrupts that are declared make of a state before a line.
+  void come_in(State& state, int depth) {
+    if (inside_interrupt_ || state.armed == 0) return;
+    for (bool more = true; more;) {
+      more = false;
+      for (std::size_t i = 0; i < interrupts_.size(); ++i) {
+        if ((state.armed & bit_of(i)) == 0) continue;
+        inside_interrupt_ = true;
+        const State back = end_of(interrupts_[i], state, depth + 1);
+        inside_interrupt_ = false;
+        const State was = state;
+        join(state, back, fmt::format("the interrupt routine {}", shown(routines_[interrupts_[i]].name)));
+        more |= !(state == was);
+      }
     }
   }
 
@@ -466,16 +377,21 @@ class Reader {
       std::vector<Step> steps;
       for (std::size_t k = routine.first; k < routine.last; ++k)
         steps.push_back(step_of(lines_[routine.file][k].tokens));
-      order->second = next_of(steps);
+      order->second = flow_of(steps);
+      // RESUME ends what was interrupted, wherever it was.
+      for (std::vector<std::size_t>& next : order->second.next) {
+        if (resumes_) next.push_back(steps.size());
+      }
     }
     return states_before(
-        order->second, {0}, begin,
+        order->second, begin,
         [&](std::size_t step, State& state) { set(routine.file, routine.first + step, state, depth); },
-        [&](State& state, const State& other) { join(state, other); });
+        [&](State& state, const State& other, const std::string& by) { join(state, other, by); },
+        [&](State& state) { come_in(state, depth); });
   }
 
   State end_of(std::size_t r, const State& begin, int depth) {
-    const auto key = std::pair(r, begin);
+    const auto key = std::tuple(r, begin, inside_interrupt_);
     if (const auto known = ends_.find(key); known != ends_.end()) return known->second;
     ends_[key] = begin;
     return ends_[key] = states_in(r, begin, depth).back();
@@ -483,7 +399,7 @@ class Reader {
 
   /// Its motions, and those of what it calls.
   void run(std::size_t r, const State& begin, int depth) {
-    if (!run_.emplace(r, begin).second) return;
+    if (!run_.emplace(r, begin, inside_interrupt_).second) return;
     ran_.insert(r);
     const Routine routine = routines_[r];
     const std::vector<State> states = states_in(r, begin, depth);
@@ -492,24 +408,46 @@ class Reader {
       if (tokens.empty()) continue;
       const State& state = states[k - routine.first];
       if (is_motion(tokens[0].text) || is_relative(tokens[0].text)) motion(routine.file, k, state);
-      if (const auto called = called_by(tokens); called && depth < kDeepest) run(*called, state, depth + 1);
+      if (depth >= kDeepest) continue;
+      for (const std::size_t called : called_by(tokens)) run(called, state, depth + 1);
+      run_interrupts(state, depth);
+    }
+    run_interrupts(states.back(), depth);
+  }
+
+  void run_interrupts(const State& state, int depth) {
+    for (std::size_t i = 0; i < interrupts_.size() && !inside_interrupt_; ++i) {
+      if ((state.armed & bit_of(i)) == 0) continue;
+      inside_interrupt_ = true;
+      run(interrupts_[i], state, depth + 1);
+      inside_interrupt_ = false;
     }
   }
 
-  [[nodiscard]] std::optional<std::size_t> called_by(const std::vector<Token>& tokens) const {
-    if (tokens.size() < 2 || tokens[1].text != "(") return std::nullopt;
-    const auto routine = by_name_.find(tokens[0].text);
-    return routine == by_name_.end() ? std::nullopt : std::optional(routine->second);
+  /// Procedures and functions, in their order.
+  [[nodiscard]] std::vector<std::size_t> called_by(const std::vector<Token>& tokens) const {
+    std::vector<std::size_t> called;
+    if (done_later(tokens) > 0) return called;
+    for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
+      if (tokens[at].kind != TokenKind::kWord || tokens[at + 1].text != "(") continue;
+      if (const auto routine = by_name_.find(tokens[at].text); routine != by_name_.end())
+        called.push_back(routine->second);
+    }
+    return called;
   }
 
   /// Where ways come together, what they set differently is not known.
-  void join(State& state, const State& other) {
-    const std::string why = "a branch or a loop of the program decides it";
-    if (state.tool != other.tool)
+  void join(State& state, const State& other, const std::string& by) {
+    const std::string why = by.empty() ? "a branch or a loop of the program decides it" : by + " may change it";
+    if (state.tool != other.tool && program_.tools[state.tool].why_not.empty())
       state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
-    if (state.frame != other.frame) state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
-    if (state.load != other.load) state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
-    if (state.fixed_tool != other.fixed_tool) state.fixed_tool = why;
+    if (state.frame != other.frame && program_.frames[state.frame].why_not.empty())
+      state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
+    if (state.load != other.load && loads_[state.load].why_not.empty())
+      state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
+    if (state.fixed_tool != other.fixed_tool && state.fixed_tool.empty()) state.fixed_tool = why;
+    state.armed |= other.armed;
+    state.speed = std::max(state.speed, other.speed);
   }
 
   /// What a line sets.
@@ -524,11 +462,12 @@ class Reader {
     } else if (word == "$BASE" && assigns) {
       state.frame = base_set(krl::operands_at(tokens, 2, &end), f);
     } else if (word == "$LOAD" && tokens.size() > 1) {
-      state.load = assigns
-                       ? load_set(krl::operands_at(tokens, 2, &end), f, k)
-                       : add_load({"$LOAD", std::nullopt, "", fmt::format("a part of $LOAD is set ({})", place(f, k))});
+      state.load =
+          assigns
+              ? load_set(krl::operands_at(tokens, 2, &end), f, k)
+              : add_load({"$LOAD", std::nullopt, "", fmt::format("a part of $LOAD is set ({})", names_.place(f, k))});
     } else if ((word == "$TOOL" || word == "$BASE") && tokens.size() > 1) {
-      const std::string why = fmt::format("a part of {} is set ({})", word, place(f, k));
+      const std::string why = fmt::format("a part of {} is set ({})", word, names_.place(f, k));
       if (word == "$TOOL") state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
       if (word == "$BASE") state.frame = add_frame({"$BASE", Pose::Identity(), why});
     } else if (word == "$IPO_MODE" && assigns) {
@@ -537,20 +476,51 @@ class Reader {
       apply_fdat(tokens[2].text, f, state);
     } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
       set_by_bas(tokens, f, k, state);
-    } else if (const auto called = called_by(tokens); called && depth < kDeepest) {
-      state = end_of(*called, state, depth + 1);
+    } else if (word == "$VEL") {
+      state.speed = speed_at(tokens, 0);
+    } else if (const std::size_t later = done_later(tokens); later > 0) {
+      for (std::size_t i = 0; i < interrupts_.size(); ++i) {
+        if (routines_[interrupts_[i]].name == tokens[later].text) state.armed |= bit_of(i);
+      }
     }
+    if (depth >= kDeepest) return;
+    for (const std::size_t called : called_by(tokens)) state = end_of(called, state, depth + 1);
+  }
+
+  /// `$VEL.CP=0.25`, `$VEL={CP 0.25,...}`, `$VEL=SVEL_CP(0.25, , LCPDAT1)`, m/s.
+  static double speed_at(const std::vector<Token>& tokens, std::size_t at) {
+    const auto is = [&](std::size_t ahead, std::string_view text) {
+      return at + ahead < tokens.size() && tokens[at + ahead].text == text;
+    };
+    std::size_t number = 0;
+    if (is(1, ".") && is(2, "CP") && is(3, "=")) number = at + 4;
+    if (is(1, "=") && is(2, "SVEL_CP") && is(3, "(")) number = at + 4;
+    if (is(1, "=") && is(2, "{")) {
+      number = at + 3;
+      while (number < tokens.size() && tokens[number].text != "CP" && tokens[number].text != "}") ++number;
+      ++number;
+    }
+    return number == 0 ? kSpeedUnknown : speed_of(tokens, number);
+  }
+  static double speed_of(const std::vector<Token>& tokens, std::size_t at) {
+    if (at >= tokens.size() || tokens[at].kind != TokenKind::kNumber) return kSpeedUnknown;
+    const auto number = read_number(tokens[at].text);
+    return number && number->value > 0 ? to_mm(number->value) : kSpeedUnknown;
   }
 
   /// `BAS(#TOOL,1)`, `BAS(#BASE,2)`
   void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) {
     const bool constant = tokens[5].kind == TokenKind::kNumber;
     const int number = constant ? std::atoi(tokens[5].text.c_str()) : 0;
-    const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), place(f, k));
+    const std::string why = fmt::format("{} chooses it ({})", shown(tokens[5].text), names_.place(f, k));
     if (tokens[3].text == "TOOL" || tokens[3].text == "EX_TOOL") {
       state.load = 0;
       state.tool = constant ? tool_numbered(number, f)
                             : add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+    } else if (tokens[3].text == "CP_PARAMS" || tokens[3].text == "VEL_CP") {
+      state.speed = speed_of(tokens, 5);
+    } else if (tokens[3].text == "INITMOV") {
+      state.speed = kSpeedUnknown;
     } else if (tokens[3].text == "BASE") {
       state.frame = constant ? base_numbered(number, f) : add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
     }
@@ -559,7 +529,8 @@ class Reader {
   /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion alone.
   void apply_with(std::size_t f, std::size_t k, State& state) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
-    for (std::size_t at = 0; at + 2 < tokens.size(); ++at) {
+    for (std::size_t at = 1; at + 2 < tokens.size(); ++at) {
+      if (tokens[at].text == "$VEL") state.speed = speed_at(tokens, at);
       if (tokens[at + 1].text != "=" || (tokens[at].text != "$TOOL" && tokens[at].text != "$BASE")) continue;
       const bool by_fdat =
           at + 4 < tokens.size() && tokens[at + 3].text == "(" && tokens[at + 4].kind == TokenKind::kWord;
@@ -595,6 +566,8 @@ class Reader {
     program_.moves[move].is_arc = word == "CIRC" || word == "SCIRC";
     if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
     apply_with(f, k, state);
+    if (state.speed > program_.moves[move].speed_mm_s.value_or(0) && word.find("PTP") == std::string::npos)
+      program_.moves[move].speed_mm_s = state.speed;
     state.tool = tool_carrying(state.tool, state.load);
     std::size_t next = 1;
     const int count = word == "CIRC" || word == "SCIRC" ? 2 : 1;
@@ -633,17 +606,17 @@ class Reader {
     if (wanted.find("[*]") == std::string::npos) return use_named(f, k, wanted, name, use);
     const std::string beginning = wanted.substr(0, wanted.find("[*]") + 1);
     bool any = false;
-    for (const auto& [key, variable] : variables_) {
+    for (const auto& [key, variable] : names_.all()) {
       if (!key.second.starts_with(beginning) || key.second == wanted) continue;
       any = true;
       const Assigned* at = variable.values.empty() ? nullptr : &variable.values[0];
-      use_named(f, k, key.second, at == nullptr ? key.second : spelled(key.second, at->file, at->line), use);
+      use_named(f, k, key.second, at == nullptr ? key.second : names_.spelled(key.second, at->file, at->line), use);
     }
     if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
   }
 
   void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name, const SiteUse& use) {
-    const Told<const Assigned*> assigned = value_of(wanted, f);
+    const Told<const Assigned*> assigned = names_.value_of(wanted, f);
     if (!assigned) return leave(f, k, name, assigned.error());
     const Assigned& at = **assigned;
     if (at.operands.empty()) return leave(f, k, name, "it is not constant");
@@ -660,7 +633,7 @@ class Reader {
     const Value& first = place.operands[0];
     if (place.operands.size() == 1 && first.kind == Value::Kind::kAggregate) {
       if (first.field("A1") != nullptr) return describe_axes(first, target);
-      const Told<std::vector<double>> numbers = numbers_of(first, kPose);
+      const Told<std::vector<double>> numbers = names_.numbers_of(first, kPose);
       if (!numbers) return numbers.error();
       target.coordinates = Coordinates::kAnglesZyx;
       target.numbers = *numbers;
@@ -668,13 +641,13 @@ class Reader {
       note_rest(first, target);
       return "";
     }
-    const Told<Pose> pose = frame_of(place.operands, place.file);
+    const Told<Pose> pose = names_.frame_of(place.operands, place.file);
     if (!pose) return pose.error();
     target.coordinates = Coordinates::kAnglesZyx;
     target.numbers = cam::numbers_of(Coordinates::kAnglesZyx, *pose, std::vector<double>(6, 0.0));
     const Value* last = &place.operands.back();
     if (last->kind == Value::Kind::kName) {
-      const Told<const Assigned*> named = value_of(last->name, place.file);
+      const Told<const Assigned*> named = names_.value_of(last->name, place.file);
       last = named && (*named)->operands.size() == 1 ? &(*named)->operands[0] : nullptr;
     }
     if (last != nullptr) note_rest(*last, target);
@@ -684,7 +657,7 @@ class Reader {
 
   std::string describe_axes(const Value& value, ProgramTarget& target) const {
     if (options_.keep_joints) return "joint targets are kept (--keep-joints)";
-    const Told<std::vector<double>> numbers = numbers_of(value, kAxes);
+    const Told<std::vector<double>> numbers = names_.numbers_of(value, kAxes);
     if (!numbers) return numbers.error();
     target.coordinates = Coordinates::kJoints;
     target.numbers = *numbers;
@@ -755,7 +728,7 @@ class Reader {
   /// What else reads the targets that are written anew.
   void note_readings(std::size_t f) {
     if (targets_.empty()) {
-      for (const auto& [key, variable] : variables_) {
+      for (const auto& [key, variable] : names_.all()) {
         if (variable.values.size() != 1 || variable.values[0].operands.empty()) continue;
         const Assigned& at = variable.values[0];
         if (!places_.contains({at.file, at.operands[0].begin})) continue;
@@ -781,8 +754,8 @@ class Reader {
     const bool moves = is_motion(tokens[0].text) || is_relative(tokens[0].text);
     const bool plain = one.size() == 1 && tokens[at > 0 ? at - 1 : 0].text != ":";
     if (moves && !number && plain) return;  // the motion goes to it
-    const auto own = variables_.find({stem_of(program_.files[f].name), root});
-    if (own != variables_.end()) {
+    const auto own = names_.all().find({stem_of(program_.files[f].name), root});
+    if (own != names_.all().end()) {
       if (own->second.values.size() == 1) add_reading(f, k, at, number, own->second.values[0]);
     } else if (const auto other = targets_.find(root); other != targets_.end()) {
       add_reading(f, k, at, number, *other->second);
@@ -808,7 +781,7 @@ class Reader {
       by = text.substr(tokens[k2 - 1].begin, tokens[k2 - 1].end - tokens[k2 - 1].begin);
     }
     if (number && !moves) {
-      read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", place(f, k)));
+      read_.emplace(where, fmt::format("its numbers are read elsewhere too ({})", names_.place(f, k)));
       return;
     }
     const Line& line = lines_[f][k];
@@ -823,7 +796,7 @@ class Reader {
 
   /// Positions of data lists that nothing moves to.
   void list_unused() {
-    for (const auto& one : variables_) {
+    for (const auto& one : names_.all()) {
       const auto& [key, variable] = one;
       const std::string& name = key.second;
       const bool is_position = variable.values.size() == 1 && variable.values[0].operands.size() == 1 &&
@@ -834,7 +807,7 @@ class Reader {
       const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
                                       [&](const LeftAlone& left) { return upper(left.name) == name; });
       if (places_.contains({at.file, at.operands[0].begin}) || listed) continue;
-      program_.left.push_back({spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
+      program_.left.push_back({names_.spelled(name, at.file, at.line), at.file, lines_[at.file][at.line].number, "",
                                "no motion in these files goes to it"});
     }
   }
@@ -845,13 +818,16 @@ class Reader {
   std::map<std::string, const Assigned*> targets_;  ///< by name, of all files
   std::set<std::string> words_of_targets_;
   std::vector<Routine> routines_;
-  std::map<std::pair<std::string, std::string>, Variable> variables_;
+  krl::Variables names_{program_.files, lines_};
   std::map<std::string, std::string> tool_names_;
   std::vector<Load> loads_ = std::vector<Load>(1);
-  std::map<std::string, std::size_t> by_name_;                           ///< routines
-  std::map<std::size_t, std::vector<std::vector<std::size_t>>> orders_;  ///< of the lines of each routine
-  std::map<std::pair<std::size_t, State>, State> ends_;
-  std::set<std::pair<std::size_t, State>> run_;
+  std::map<std::string, std::size_t> by_name_;  ///< routines
+  std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine
+  std::map<std::tuple<std::size_t, State, bool>, State> ends_;
+  std::vector<std::size_t> interrupts_;  ///< routines that come in between
+  bool resumes_ = false;                 ///< an interrupt may end what it came in
+  bool inside_interrupt_ = false;
+  std::set<std::tuple<std::size_t, State, bool>> run_;
   std::set<std::size_t> ran_;
   std::map<std::pair<std::size_t, std::size_t>, std::string> read_;  ///< why the numbers at a place must stay
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;

@@ -72,6 +72,8 @@ Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector
     : files_(files), modules_(modules), by_name_(modules.size()) {
   for (std::size_t m = 0; m < modules_.size(); ++m) {
     static_cast<void>(own_scope(m, -1));
+    for (std::size_t r = 0; r < modules_[m].routines.size(); ++r)
+      routines_[modules_[m].routines[r].name].emplace_back(m, static_cast<int>(r));
     for (const Declaration& declared : modules_[m].declarations) {
       by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
       if (declared.routine < 0 && !declared.local) global_.emplace(declared.name, Found{&declared, m});
@@ -86,9 +88,11 @@ std::string Interpreter::place_of(std::size_t module, int line) const {
 
 std::string Interpreter::text_of(const Expression& expression, const Scope& scope) const {
   const std::string& text = files_[scope.module].text;
+  const std::string_view bytes = std::string_view(text).substr(expression.begin, expression.end - expression.begin);
+  if (bytes.find_first_of(" \t\r\n\f!\"") == std::string_view::npos && bytes.find('\0') == std::string_view::npos)
+    return std::string(bytes);
   std::string shown;
-  for (const Token& token :
-       tokens_of(std::string_view(text).substr(expression.begin, expression.end - expression.begin))) {
+  for (const Token& token : tokens_of(bytes)) {
     shown += text.substr(expression.begin + token.begin, token.end - token.begin);
   }
   return shown;
@@ -106,13 +110,12 @@ std::optional<Interpreter::Found> Interpreter::find(const std::string& name, con
 
 std::optional<std::pair<std::size_t, int>> Interpreter::find_routine(const std::string& name,
                                                                      std::size_t module) const {
+  const auto known = routines_.find(name);
+  if (known == routines_.end()) return std::nullopt;
   for (const bool own : {true, false}) {
-    for (std::size_t m = 0; m < modules_.size(); ++m) {
-      if ((m == module) != own) continue;
-      const auto& routines = modules_[m].routines;
-      for (std::size_t r = 0; r < routines.size(); ++r) {
-        if (routines[r].name == name && (own || !routines[r].local)) return std::pair(m, static_cast<int>(r));
-      }
+    for (const auto& [m, r] : known->second) {
+      const bool is_local = modules_[m].routines[static_cast<std::size_t>(r)].local;
+      if ((m == module) == own && (own || !is_local)) return std::pair(m, r);
     }
   }
   return std::nullopt;
@@ -189,13 +192,17 @@ void Interpreter::note_changes() {
 void Interpreter::note_changes_by(std::size_t module, const Instruction& instruction) {
   const Scope& scope = *own_scope(module, instruction.routine);
   const auto routine = find_routine(instruction.name, module);
+  if (!routine && only_reads(instruction.name)) return;
   std::size_t position = 0;
   for (const Expression& argument : instruction.arguments) {
     const std::size_t at = argument.label.empty() ? position++ : position;
     const Expression* root = root_of(argument);
     if (root == nullptr) continue;
-    const std::string why = fmt::format("{} may be changed by {} ({})", text_of(*root, scope),
-                                        shown(instruction.spelled), place_of(module, instruction.line));
+    const auto change = [&] {
+      note_change(argument, scope,
+                  fmt::format("{} may be changed by {} ({})", text_of(*root, scope), shown(instruction.spelled),
+                              place_of(module, instruction.line)));
+    };
     if (routine) {
       const Routine& called = modules_[routine->first].routines[static_cast<std::size_t>(routine->second)];
       const std::string& parameter = !argument.label.empty()         ? argument.label.text()
@@ -203,15 +210,15 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
                                                                      : root->name.text();
       const auto found = by_name_[routine->first].find({routine->second, parameter});
       if (found == by_name_[routine->first].end() || !found->second->may_be_changed) continue;
-      if (changed_.contains(found->second)) note_change(argument, scope, why);
+      if (changed_.contains(found->second)) change();
       continue;
     }
     const bool is_found_point = instruction.name.starts_with("search") && at == 1 && argument.label.empty();
-    if (only_reads(instruction.name) || (instruction.name.starts_with("search") && !is_found_point)) continue;
+    if (instruction.name.starts_with("search") && !is_found_point) continue;
     const std::string type = type_of(argument, scope);
     // Tools and work objects are handed to all kinds of instructions; they are changed by assignment.
     if (type == "tooldata" || type == "wobjdata") continue;
-    note_change(argument, scope, why);
+    change();
   }
 }
 

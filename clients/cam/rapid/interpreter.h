@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 #include <tl/expected.hpp>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "clients/cam/program.h"
@@ -109,6 +111,7 @@ class Interpreter {
   const std::vector<Module>& modules_;
   std::vector<std::map<std::pair<int, std::string>, const Declaration*>> by_name_;
   std::map<std::string, Found> global_;
+  std::unordered_map<std::string, std::vector<std::pair<std::size_t, int>>> routines_;  ///< by name, in their order
   std::map<const Declaration*, std::string> changed_;
   std::vector<std::unique_ptr<Scope>> scopes_;
   std::map<std::pair<std::size_t, int>, std::vector<const Scope*>> ways_in_;

@@ -8,9 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "clients/cam/cell_tools.h"
 #include "clients/cam/flow.h"
 #include "clients/cam/rapid/interpreter.h"
+#include "clients/cam/rapid/tools.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -71,9 +71,7 @@ class Reader {
       program_.mark_places.push_back(mark_place(file.text, modules_.back().head_end));
     }
     meaning_.emplace(program_.files, modules_);
-    if (const auto base = options_.frames.find("robot_base"); base != options_.frames.end())
-      X_BW_ = base->second.inverse();
-    program_.frames.push_back({"wobj0", X_BW_, ""});
+    tools_.emplace(*meaning_, options_, program_);
   }
 
   RapidData data() {
@@ -82,23 +80,10 @@ class Reader {
       for (const Declaration& declared : modules_[m].declarations) {
         if (declared.routine >= 0 || !declared.value || declared.is_array) continue;
         const Data data{&*declared.value, &own(m), declared.type, &declared};
-        if (declared.type == "tooldata") {
-          ProgramTool tool;
-          tool.name = declared.spelled;
-          tool.file = program_.files[m].name;
-          tool.line = declared.line;
-          read_tool(data, tool);
-          found.tools.push_back(std::move(tool));
-        } else if (declared.type == "wobjdata") {
-          ProgramFrame frame;
-          frame.name = declared.spelled;
-          const Told<Data> parts = aggregate(data, 5);
-          if (parts) read_frame(*parts, frame);
-          if (!parts) frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
-          found.frames.push_back(std::move(frame));
-        } else if (declared.type == "loaddata") {
-          if (const auto load = load_of(data)) found.loads.emplace_back(declared.spelled, *load);
-        }
+        if (declared.type == "tooldata") found.tools.push_back(tools_->declared_tool(data));
+        if (declared.type == "wobjdata") found.frames.push_back(tools_->declared_frame(data));
+        const auto load = declared.type == "loaddata" ? tools_->load_of(data) : std::nullopt;
+        if (load) found.loads.emplace_back(declared.spelled, *load);
       }
     }
     return found;
@@ -123,186 +108,6 @@ class Reader {
     const std::size_t end = head_end == 0 ? std::string::npos : text.find('\n', head_end);
     const std::size_t top = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
     return {end == std::string::npos ? top : end + 1, "  ! "};
-  }
-
-  // Tools and frames.
-
-  std::size_t known_tool(ProgramTool tool) {
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      const ProgramTool& known = program_.tools[k];
-      if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line &&
-          known.carries == tool.carries)
-        return k;
-    }
-    program_.tools.push_back(std::move(tool));
-    return program_.tools.size() - 1;
-  }
-
-  std::size_t known_frame(ProgramFrame frame) {
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (in_lower_case(program_.frames[k].name) == in_lower_case(frame.name) &&
-          program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12) && program_.frames[k].why_not == frame.why_not)
-        return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
-  }
-
-  /// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
-  Told<Data> aggregate(const Data& of, std::size_t parts) const {
-    Data now = of;
-    for (int depth = 0; now.node->kind != Kind::kAggregate && depth < 10; ++depth) {
-      const Told<std::vector<Data>> inner = meaning_->data_of(*now.node, *now.scope);
-      if (!inner) return because(inner.error());
-      if (inner->size() != 1 || inner->front().node == now.node) return because("it is not written out");
-      now = inner->front();
-    }
-    if (now.node->kind != Kind::kAggregate || now.node->parts.size() != parts)
-      return because(fmt::format("a {} without its {} parts", shown(of.type), parts));
-    return now;
-  }
-
-  Told<Pose> pose(const Data& of, int* rotation_decimals) const {
-    const Told<Data> both = aggregate(of, 2);
-    if (!both) return because(both.error());
-    int ignored = 0;
-    const Told<std::vector<double>> p = meaning_->numbers_of(both->node->parts[0], 3, *both->scope, &ignored);
-    if (!p) return because(p.error());
-    const Told<std::vector<double>> q = meaning_->numbers_of(both->node->parts[1], 4, *both->scope, rotation_decimals);
-    if (!q) return because(q.error());
-    std::vector<double> numbers = *p;
-    numbers.insert(numbers.end(), q->begin(), q->end());
-    if (std::abs(Eigen::Vector4d((*q)[0], (*q)[1], (*q)[2], (*q)[3]).norm() - 1) > 0.01)
-      return because("a quaternion that is not of length 1");
-    return pose_of(Coordinates::kQuaternion, numbers);
-  }
-
-  static Data part(const Data& of, std::size_t index) {
-    return {&of.node->parts[index], of.scope, of.type, of.declared};
-  }
-
-  Told<bool> truth(const Data& of) const {
-    if (of.node->kind == Kind::kTruth) return of.node->name == "true";
-    const Told<std::vector<Data>> data = meaning_->data_of(*of.node, *of.scope);
-    if (!data || data->size() != 1 || data->front().node->kind != Kind::kTruth) return because("it is not constant");
-    return data->front().node->name == "true";
-  }
-
-  /// What an argument that names a tool or a work object stands for; an error where it is not in the files.
-  Told<Data> named(const Expression& argument, const Scope& scope) const {
-    const Told<std::vector<Data>> data = meaning_->data_of(argument, scope);
-    if (!data) return because(data.error());
-    if (data->size() != 1)
-      return because(fmt::format("an index chooses {}", shown(meaning_->text_of(argument, scope))));
-    return data->front();
-  }
-
-  std::size_t tool_of(const Expression& argument, const Scope& scope) {
-    ProgramTool tool;
-    tool.name = meaning_->text_of(argument, scope);
-    const auto handed = meaning_->handed_over(argument, scope);
-    if (!handed) {
-      tool.why_not = handed.error();
-      return known_tool(std::move(tool));
-    }
-    const auto& [expression, where] = *handed;
-    tool.name = meaning_->text_of(*expression, *where);
-    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
-      if (expression->name == "tool0") tool.X_FT = Pose::Identity();
-      if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
-      return known_tool(std::move(tool));
-    }
-    const Told<Data> data = named(*expression, *where);
-    if (!data) {
-      tool.why_not = data.error();
-      return known_tool(std::move(tool));
-    }
-    const auto [seen, fresh] = tool_at_.emplace(data->node, 0);
-    if (!fresh) return seen->second;
-    tool.file = program_.files[data->scope->module].name;
-    tool.line = data->node->line;
-    read_tool(*data, tool);
-    return seen->second = known_tool(std::move(tool));
-  }
-
-  void read_tool(const Data& data, ProgramTool& tool) const {
-    const Told<Data> parts = aggregate(data, 3);
-    const Told<bool> held = parts ? truth(part(*parts, 0)) : because(parts.error());
-    int decimals = 0;
-    const Told<Pose> X_FT = parts ? pose(part(*parts, 1), &decimals) : because("");
-    if (!held || !X_FT) {
-      tool.why_not = fmt::format("tool {}: {}", shown(tool.name), held ? X_FT.error() : held.error());
-      return;
-    }
-    tool.X_FT = *X_FT;
-    tool.rotation_rounding = 2 * std::pow(10.0, -decimals);
-    if (!*held) tool.why_not = fmt::format("tool {} is not held by the robot", shown(tool.name));
-    tool.load = load_of(part(*parts, 2));
-  }
-
-  std::optional<StatedLoad> load_of(const Data& data) const {
-    const Told<Data> load = aggregate(data, 6);
-    if (!load) return std::nullopt;
-    int ignored = 0;
-    const Told<double> mass = meaning_->number_of(load->node->parts[0], *load->scope);
-    const Told<std::vector<double>> cog = meaning_->numbers_of(load->node->parts[1], 3, *load->scope, &ignored);
-    if (!mass || !cog) return std::nullopt;
-    return StatedLoad{*mass, Vector3((*cog)[0], (*cog)[1], (*cog)[2]) * from_mm(1)};
-  }
-
-  std::size_t frame_of(const Expression* argument, const Scope& scope) {
-    if (argument == nullptr) return 0;
-    ProgramFrame frame;
-    frame.name = meaning_->text_of(*argument, scope);
-    if (frame.name.empty()) frame.name = "\\WObj";
-    const auto handed = meaning_->handed_over(*argument, scope);
-    if (!handed) {
-      frame.why_not = handed.error();
-      return known_frame(std::move(frame));
-    }
-    const auto& [expression, where] = *handed;
-    frame.name = meaning_->text_of(*expression, *where);
-    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
-      if (expression->name == "wobj0") return 0;
-      if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
-        frame.X_BO = given->second;
-      } else {
-        frame.why_not =
-            fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
-      }
-      return known_frame(std::move(frame));
-    }
-    const Told<Data> data = named(*expression, *where);
-    if (data) {
-      if (const auto seen = frame_at_.find(data->node); seen != frame_at_.end()) return seen->second;
-    }
-    const Told<Data> parts = data ? aggregate(*data, 5) : because(data.error());
-    if (!parts) {
-      frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
-      return known_frame(std::move(frame));
-    }
-    read_frame(*parts, frame);
-    return frame_at_[data->node] = known_frame(std::move(frame));
-  }
-
-  void read_frame(const Data& parts, ProgramFrame& frame) const {
-    const Told<bool> held = truth(part(parts, 0));
-    const Told<bool> fixed = truth(part(parts, 1));
-    int ignored = 0;
-    const Told<Pose> user = pose(part(parts, 3), &ignored);
-    const Told<Pose> object = pose(part(parts, 4), &ignored);
-    std::string why;
-    if (!held || !fixed || !user || !object) {
-      why = !held ? held.error() : !fixed ? fixed.error() : !user ? user.error() : object.error();
-    } else if (*held) {
-      why = "it is held by the robot";
-    } else if (!*fixed) {
-      why = "a mechanical unit moves it";
-    } else {
-      frame.X_BO = X_BW_ * *user * *object;
-      return;
-    }
-    frame.why_not = fmt::format("work object {}: {}", shown(frame.name), why);
   }
 
   // Motions.
@@ -368,8 +173,11 @@ class Reader {
   }
 
   Step step_of(std::size_t module, const Instruction& instruction) const {
-    static const std::set<std::string> kReturns = {"return", "raise", "exit", "exitcycle", "retry", "trynext"};
+    static const std::set<std::string> kReturns = {"return", "raise", "exit", "exitcycle"};
+    static const std::set<std::string> kGoesBack = {"retry", "trynext", "startmoveretry"};
     if (is_motion(instruction.name)) return {};
+    if (kGoesBack.contains(instruction.name)) return {Step::Kind::kGoBack};
+    if (instruction.name == "gripload" || instruction.name == "pdispoff") return {Step::Kind::kPlain, "", true};
     if (kReturns.contains(instruction.name)) return {Step::Kind::kReturn};
     if (instruction.name == "goto" && !instruction.arguments.empty())
       return {Step::Kind::kJump, instruction.arguments[0].name};
@@ -380,7 +188,7 @@ class Reader {
 
   /// What holds where a motion begins.
   struct State {
-    std::size_t load = 0;       ///< of loads_; 0: the tool's own
+    std::size_t load = 0;       ///< as tools_ numbers them; 0: the tool's own
     std::size_t displaced = 0;  ///< of displacements_; 0: none
     bool operator==(const State&) const = default;
   };
@@ -388,7 +196,7 @@ class Reader {
   void set(const Place& place, State& state) {
     if (place.instruction == nullptr) return;
     const Instruction& instruction = *place.instruction;
-    if (instruction.name == "gripload") state.load = load_set(place.module, instruction);
+    if (instruction.name == "gripload") state.load = tools_->load_set(place.module, instruction);
     if (instruction.name == "pdispoff") state.displaced = 0;
     if (!displaces(instruction)) return;
     const std::string why = displacement(place.module, instruction);
@@ -396,13 +204,12 @@ class Reader {
     state.displaced = static_cast<std::size_t>(known - displacements_.begin());
     if (known == displacements_.end()) displacements_.push_back(why);
   }
-  void join(State& state, const State& other) {
+  void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
     if (state.load == other.load) return;
-    Load load;
-    load.name = "GripLoad";
-    load.why_not = "GripLoad: a branch, a loop or a caller decides what the robot carries";
-    state.load = known_load(std::move(load));
+    state.load = tools_->undecided_load(
+        state.load, by.empty() ? "GripLoad: a branch, a loop or a caller decides what the robot carries"
+                               : fmt::format("GripLoad: {} may change what the robot carries", by));
   }
 
   void read_motions() {
@@ -410,8 +217,8 @@ class Reader {
     const auto& steps = std::get<0>(found);
     const auto& places = std::get<1>(found);
     const std::vector<State> states = states_before(
-        next_of(steps, true), entries_of(steps), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
-        [&](State& state, const State& other) { join(state, other); });
+        flow_of(steps, true), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
+        [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps.size(); ++s) {
       const Instruction* motion = places[s].instruction;
       const std::size_t module = places[s].module;
@@ -420,99 +227,6 @@ class Reader {
       state_ = states[s];
       read_motion(module, *motion);
     }
-  }
-
-  // Loads.
-
-  struct Load {
-    std::string name;
-    std::optional<StatedLoad> load;
-    std::string note, why_not;
-    bool total = false;  ///< with the tool's own
-    bool operator==(const Load& other) const {
-      return name == other.name && why_not == other.why_not && total == other.total;
-    }
-  };
-
-  std::size_t known_load(Load load) {
-    const auto known = std::find(loads_.begin(), loads_.end(), load);
-    if (known != loads_.end()) return static_cast<std::size_t>(known - loads_.begin());
-    loads_.push_back(std::move(load));
-    return loads_.size() - 1;
-  }
-
-  Load load_called(const Expression& argument, const Scope& scope) const {
-    Load load;
-    load.name = meaning_->text_of(argument, scope);
-    const auto handed = meaning_->handed_over(argument, scope);
-    if (!handed) {
-      load.why_not = handed.error();
-      return load;
-    }
-    const auto& [expression, where] = *handed;
-    load.name = meaning_->text_of(*expression, *where);
-    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
-      if (expression->name == "load0")
-        load.load = StatedLoad{};
-      else
-        load.note = fmt::format("load {} is not in the files: it is not compared with the cell's", shown(load.name));
-      return load;
-    }
-    const Told<Data> data = named(*expression, *where);
-    if (data) load.load = load_of(*data);
-    if (!load.load)
-      load.why_not = fmt::format("load {}: {}", shown(load.name), data ? "it is not constant" : data.error());
-    return load;
-  }
-
-  /// `GripLoad lPart;`: beside the tool's own load.
-  std::size_t load_set(std::size_t module, const Instruction& instruction) {
-    const std::vector<const Scope*> scopes = meaning_->scopes_of(module, instruction.routine);
-    if (instruction.arguments.empty()) return 0;
-    Load load = load_called(instruction.arguments[0], *scopes[0]);
-    for (const Scope* scope : scopes) {
-      if (!(load_called(instruction.arguments[0], *scope) == load))
-        load.why_not = "GripLoad: its callers decide the load";
-    }
-    if (load.load && is_placeholder(*load.load)) return 0;
-    return known_load(std::move(load));
-  }
-
-  /// The tool with what it carries: `\TLoad` says all of it, else GripLoad what comes to the tool's own.
-  std::size_t tool_carrying(std::size_t tool, const Instruction& motion, const Scope& scope) {
-    std::size_t index = state_.load;
-    for (const Expression& argument : motion.arguments) {
-      if (argument.label != "tload") continue;
-      Load total = load_called(argument, scope);
-      total.total = true;
-      if (!total.load || total.load->mass > 0) index = known_load(std::move(total));
-    }
-    if (index == 0) return tool;
-    const auto [entry, is_new] = carrying_.try_emplace({tool, index}, 0);
-    if (!is_new) return entry->second;
-    const Load& load = loads_[index];
-    ProgramTool carrying = program_.tools[tool];
-    const std::optional<StatedLoad> own = carrying.load;
-    carrying.load = load.load;
-    if (load.load && !load.total) carrying.load = together(*load.load, own, carrying.X_FT);
-    if (own && carrying.load && own->mass == carrying.load->mass && own->p_F == carrying.load->p_F)
-      return entry->second = tool;
-    carrying.carries = load.name;
-    carrying.load_note = load.note;
-    if (carrying.why_not.empty()) carrying.why_not = load.why_not;
-    return entry->second = known_tool(std::move(carrying));
-  }
-
-  /// What the flange bears: a gripped load, whose centre is given in the tool, and the tool's own where it is stated.
-  static StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& own,
-                             const std::optional<Pose>& X_FT) {
-    StatedLoad all = gripped;
-    all.has_centre = X_FT.has_value();
-    if (X_FT) all.p_F = *X_FT * gripped.p_F;
-    if (!own || is_placeholder(*own)) return all;
-    all.p_F = (all.p_F * gripped.mass + own->p_F * own->mass) / (gripped.mass + own->mass);
-    all.mass = gripped.mass + own->mass;
-    return all;
   }
 
   void read_motion(std::size_t module, const Instruction& motion) {
@@ -525,10 +239,8 @@ class Reader {
       if (argument.label == kToolArgument) tool = &argument;
     }
     if (positional.empty()) return;
-    for (const Expression* argument : positional) {
-      note_names(*argument);
-      if (const auto speed = predefined_speed(*argument)) program_.moves.back().speed_mm_s = speed;
-    }
+    for (const Expression* argument : positional) note_names(*argument);
+    note_speed(module, motion);
     const auto leave_it = [&](const std::string& why) {
       leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
     };
@@ -544,19 +256,46 @@ class Reader {
       const bool joints = motion.name.starts_with("moveabsj");
       const std::size_t targets = is_arc(motion.name) ? 2 : 1;
       for (std::size_t k = 0; k < std::min(targets, positional.size()); ++k) {
-        use(module, motion, *positional[k], joints, tool_carrying(tool_of(*with, *scope), motion, *scope),
-            frame_of(frame, *scope), *scope);
+        use(module, motion, *positional[k], joints,
+            tools_->tool_carrying(tools_->tool_of(*with, *scope), state_.load, motion, *scope),
+            tools_->frame_of(frame, *scope), *scope);
       }
     }
   }
 
-  /// Of `v100`, mm/s; a controller predefines them.
-  static std::optional<double> predefined_speed(const Expression& argument) {
-    if (argument.kind != Kind::kName || !argument.name.text().starts_with('v')) return std::nullopt;
-    const std::string digits = argument.name.text().substr(1);
-    const auto number = read_number(digits);
-    const bool plain = digits.find_first_not_of("0123456789") == std::string::npos;
-    return number && plain ? std::optional<double>(number->value) : std::nullopt;
+  /// The fastest that its callers hand over; `\V:=60` decides it.
+  void note_speed(std::size_t module, const Instruction& motion) {
+    if (!is_linear(motion.name)) return;
+    std::optional<double>& speed = program_.moves.back().speed_mm_s;
+    for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
+      for (const Expression& argument : motion.arguments) {
+        if (!argument.label.empty()) continue;
+        if (const auto one = speed_of(argument, *scope)) speed = std::max(speed.value_or(0), *one);
+      }
+      for (const Expression& argument : motion.arguments) {
+        if (argument.label != "v") continue;
+        const Told<double> own = meaning_->number_of(argument, *scope);
+        speed = own ? std::optional<double>(*own) : std::nullopt;
+      }
+    }
+  }
+
+  /// mm/s, of the tool: what `v100`, which a controller predefines, or a constant speeddata says.
+  std::optional<double> speed_of(const Expression& argument, const Scope& scope) const {
+    const auto handed = meaning_->handed_over(argument, scope);
+    if (!handed) return std::nullopt;
+    const auto& [expression, where] = *handed;
+    if (expression->kind == Kind::kName && !meaning_->find(expression->name, *where)) {
+      const std::string& name = expression->name;
+      if (!name.starts_with('v') || name.find_first_not_of("0123456789", 1) != std::string::npos) return std::nullopt;
+      const auto number = read_number(std::string_view(name).substr(1));
+      return number ? std::optional<double>(number->value) : std::nullopt;
+    }
+    const bool written_here = expression->kind == Kind::kAggregate;
+    if (!written_here && meaning_->type_of(*expression, *where) != "speeddata") return std::nullopt;
+    int ignored = 0;
+    const Told<std::vector<double>> numbers = meaning_->numbers_of(*expression, 4, *where, &ignored);
+    return numbers ? std::optional<double>(numbers->front()) : std::nullopt;
   }
 
   /// `MoveC`, `TriggC`, `ArcC1Start`: the letter behind the kind of motion.
@@ -754,6 +493,7 @@ class Reader {
     if (!value) return because(value.error());
     // The same bytes reached through different callers must mean the same.
     for (const Use* use : uses) {
+      if (use->data.node == data.node && use->data.scope == data.scope) continue;
       const Told<TargetValue> other = meaning_->target_of(*use->data.node, *use->data.scope);
       if (!other) return because(other.error());
       if (other->numbers != value->numbers) return because("its callers hand over different values");
@@ -937,19 +677,16 @@ class Reader {
   }
 
   ReadOptions options_;
-  Pose X_BW_ = Pose::Identity();  ///< the controller's world, seen from the robot's base
   Program program_;
   std::vector<Module> modules_;
   std::optional<Interpreter> meaning_;
+  std::optional<Tools> tools_;
   std::map<std::pair<std::size_t, std::size_t>, Site> sites_;
   std::map<std::size_t, Scope> own_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
   std::set<std::string> named_;
-  std::map<const Expression*, std::size_t> tool_at_, frame_at_;  ///< of Program::tools and frames, by what says them
   std::string open_displacement_;
   std::vector<std::string> displacements_ = std::vector<std::string>(1);
-  std::vector<Load> loads_ = std::vector<Load>(1);
-  std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
   State state_;  ///< of the motion that is read
   bool calls_routine_ = false, moves_ = false;
   std::map<const Declaration*, std::string> read_;  ///< where numbers of a target are read

@@ -1,9 +1,12 @@
 #include "clients/cam/rapid/syntax.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <set>
 
 #include "clients/cam/number_text.h"
+#include "server/base/plain_text.h"
 
 namespace trammel::cam::rapid {
 
@@ -108,6 +111,7 @@ class Parser {
     } else if (kSingle.contains(first) || is_sign(":", 1)) {
       note_single(first);
       at_ += is_sign(":", 1) ? 2 : 1;
+      if (first == "error" && is_sign("(")) skip_numbers_of_errors();
     } else if (first == "alias") {
       skip_statement();
     } else {
@@ -124,9 +128,14 @@ class Parser {
     else if (first == "else" || first == "default")
       turn(Step::Kind::kElse);
     else if (first == "error" || first == "undo" || first == "backward")
-      turn(Step::Kind::kReturn);
+      turn(Step::Kind::kHandler, fmt::format("the handler '{}' of its routine", shown(first)));
     else
       turn(Step::Kind::kLabel, first);
+  }
+  /// `ERROR (ERR_1, ERR_2)`
+  void skip_numbers_of_errors() {
+    while (!at_statement_end() && !is_sign(")")) ++at_;
+    take(")");
   }
   /// From the token `begin` to where the reading is.
   void note_condition(std::size_t begin) {
@@ -194,10 +203,14 @@ class Parser {
   void routine_head(const std::string& kind, bool local) {
     Routine routine;
     if (kind == "func") take_word();
+    const std::string spelled(bytes());
     routine.name = take_word();
     routine.local = local;
     routine_ = static_cast<int>(module_.routines.size());
-    turn(Step::Kind::kRoutine, std::to_string(routine_));
+    if (kind == "trap")
+      turn(Step::Kind::kInterrupt, fmt::format("the TRAP {}", shown(spelled)));
+    else
+      turn(Step::Kind::kRoutine, std::to_string(routine_));
     if (take("(")) parameters(routine);
     module_.routines.push_back(std::move(routine));
   }
@@ -430,6 +443,7 @@ class Parser {
     ++at_;
     made.kind = Kind::kAggregate;
     while (!at_end() && !is_sign("]") && !is_sign(";")) {
+      if (plain_number(made)) continue;
       made.parts.push_back(expression(depth + 1));
       if (made.parts.back().kind == Kind::kUnknown) {
         made.kind = Kind::kUnknown;
@@ -440,6 +454,24 @@ class Parser {
     }
     if (!take("]")) made.kind = Kind::kUnknown;
     made.parts.shrink_to_fit();  // a long program is mostly this
+  }
+
+  /// `-1.5,` or `1.5]` as the next part: most of a long program.
+  bool plain_number(Expression& made) {
+    const std::size_t sign = is_sign("-") || is_sign("+") ? 1 : 0;
+    if (token(sign).kind != TokenKind::kNumber || (!is_sign(",", sign + 1) && !is_sign("]", sign + 1))) return false;
+    const auto number = read_number(text_.substr(token().begin, token(sign).end - token().begin));
+    if (!number) return false;
+    if (made.parts.empty()) made.parts.reserve(4);
+    Expression& part = made.parts.emplace_back();
+    part.kind = Kind::kNumber;
+    part.begin = token().begin;
+    part.end = token(sign).end;
+    part.line = token().line;
+    part.value = number->value;
+    at_ += sign + 1;
+    take(",");
+    return true;
   }
 
   void name(Expression& made, int depth) {

@@ -69,9 +69,11 @@ class Script {
     const std::size_t tool = unknown_tool();
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_assignment(at);
     find_steps();
+    Flow flow = flow_of(steps_);
+    flow.entries = {0};
     const std::vector<State> states = states_before(
-        next_of(steps_), {0}, State{tool, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
-        [&](State& state, const State& other) { join(state, other); });
+        flow, State{tool, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
+        [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps_.size(); ++s) {
       const std::size_t at = step_at_[s];
       if (is_motion(pieces_[at])) {
@@ -113,7 +115,7 @@ class Script {
     const auto defines = [](const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); };
     std::set<std::string> functions;
     for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
-      if (defines(pieces_[at])) functions.emplace(pieces_[at + 1].text);
+      if (pieces_[at].is("def")) functions.emplace(pieces_[at + 1].text);
     }
     const auto add = [&](Step step, std::size_t at) {
       steps_.push_back(std::move(step));
@@ -123,7 +125,11 @@ class Script {
       if (pieces_[at].kind != Piece::Kind::kWord) continue;
       const bool is_call = at + 1 < pieces_.size() && pieces_[at + 1].is("(");
       if (defines(pieces_[at]) && at + 1 < pieces_.size()) {
-        add({Kind::kRoutine, std::string(pieces_[at + 1].text)}, at);
+        const std::string name(pieces_[at + 1].text);
+        // A thread runs beside all others.
+        add(pieces_[at].is("def") ? Step{Kind::kRoutine, name}
+                                  : Step{Kind::kInterrupt, fmt::format("the thread {}", shown(name))},
+            at);
         ++at;  // not a call of it
       } else if (const auto word = kWords.find(pieces_[at].text); word != kWords.end()) {
         add({word->second}, at);
@@ -143,15 +149,17 @@ class Script {
       state.load = load_set(at, state.load);
   }
 
-  void join(State& state, const State& other) {
-    const std::string why = "a branch or a loop of the script decides it";
-    if (state.tool != other.tool) {
+  void join(State& state, const State& other, const std::string& by) {
+    const std::string why =
+        by.empty() ? "a branch or a loop of the script decides it" : fmt::format("{} may change it", by);
+    if (state.tool != other.tool && program_.tools[state.tool].why_not.empty()) {
       ProgramTool tool;
       tool.name = "tcp";
       tool.why_not = "set_tcp: " + why;
       state.tool = known_tool(std::move(tool));
     }
-    if (state.load != other.load) state.load = known_load({"set_payload", std::nullopt, "set_payload: " + why});
+    if (state.load != other.load && loads_[state.load].why_not.empty())
+      state.load = known_load({"set_payload", std::nullopt, "set_payload: " + why});
   }
 
   std::size_t known_load(Load load) {
@@ -408,11 +416,15 @@ class Script {
     note_speed(at, next);
   }
 
-  /// `v=0.1`, m/s, of a motion of the tool.
+  /// `v=0.1`, or the second number behind the target, m/s, of a motion of the tool.
   void note_speed(std::size_t at, std::size_t next) {
     if (pieces_[at].is("movej")) return;
+    const std::size_t first = next;
     for (; next + 2 < pieces_.size() && pieces_[next].line == pieces_[at].line && !pieces_[next].is(")"); ++next) {
-      if (!pieces_[next].is("v") || !pieces_[next + 1].is("=")) continue;
+      const bool named = pieces_[next].is("v") && pieces_[next + 1].is("=");
+      const bool second = next == first && pieces_[next].kind == Piece::Kind::kNumber && pieces_[next + 1].is(",");
+      if (!named && !second) continue;
+      if (pieces_[next + 2].kind != Piece::Kind::kNumber) continue;
       if (const auto speed = read_number(pieces_[next + 2].text))
         program_.moves.back().speed_mm_s = to_mm(speed->value);
     }

@@ -18,6 +18,9 @@ using cam::ReceiptRow;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kNumbers = 7;  // of the longest kind of target
+// Bytes a target: a text of a long program that grows by doubling takes three times its size for a moment.
+constexpr std::size_t kCsvBytes = 400;
+constexpr std::size_t kJsonBytes = 900;
 
 /// Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
 std::string millimetres(double value) { return std::isfinite(value) ? fmt::format("{:.5f}", value) : ""; }
@@ -95,6 +98,7 @@ std::string receipt_csv(const CorrectedProgram& program) {
   text +=
       ",x_mm,y_mm,z_mm,error_before_mm,error_after_mm,sigma_mm,sigma_measured_mm,rounding_mm,domain,iterations,"
       "path_limit_before_mm_s,path_limit_after_mm_s,model_id,message,suggestion\n";
+  text.reserve(text.size() + kCsvBytes * program.rows.size());
   const auto out = std::back_inserter(text);
   for (const ReceiptRow& row : program.rows) {
     fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},", csv_field(row.file), row.line, csv_field(row.name),
@@ -144,13 +148,15 @@ std::string receipt_json(const CorrectedProgram& program, const std::optional<To
   std::string text = json_text(head);
   text.erase(text.rfind("\n}"));
   text += ",\n  \"targets\": [";
+  text.reserve(text.size() + kJsonBytes * program.rows.size());
   const char* separator = "\n    ";
   for (const ReceiptRow& row : program.rows) {
     text += separator;
     text += shown_lines(item_of(row).dump(-1, ' ', false, ordered_json::error_handler_t::replace));
     separator = ",\n    ";
   }
-  return text + "\n  ]\n}\n";
+  text += "\n  ]\n}\n";
+  return text;
 }
 
 std::string receipt_summary(const CorrectedProgram& program) {

@@ -1,0 +1,199 @@
+#include "clients/cam/krl/variables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "clients/cam/number_text.h"
+#include "server/base/plain_text.h"
+
+namespace trammel::cam::krl {
+
+namespace {
+
+constexpr int kDeepest = 20;  // calls within calls, names that stand for names
+
+bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Value& one, const Value& other) {
+    return one.kind == other.kind && one.kind != Value::Kind::kOther && one.number == other.number &&
+           one.name == other.name && one.field_names == other.field_names &&
+           is_equal(one.field_values, other.field_values);
+  });
+}
+
+}  // namespace
+
+std::string upper(std::string text) {
+  for (char& c : text) {
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  }
+  return text;
+}
+
+std::string stem_of(const std::string& name) { return upper(name.substr(0, name.rfind('.'))); }
+
+/// `XP[3].X` -> `XP[3]`
+std::string root_of(const std::string& name) { return name.substr(0, name.find('.')); }
+
+/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
+/// stands; 0: the line is neither.
+std::size_t done_later(const std::vector<Token>& tokens) {
+  const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
+  if (tokens.size() < first + 2 || (tokens[first].text != "INTERRUPT" && tokens[first].text != "TRIGGER")) return 0;
+  for (std::size_t at = first + 1; at + 1 < tokens.size(); ++at) {
+    if (tokens[at].text == "DO") return at + 1;
+  }
+  return 0;
+}
+
+bool is_motion(const std::string& word) {
+  static const std::set<std::string> kMotions = {"PTP", "LIN", "CIRC", "SPTP", "SLIN", "SCIRC", "SPL"};
+  return kMotions.contains(word);
+}
+
+Variables::Variables(const std::vector<SourceFile>& files, const std::vector<std::vector<Line>>& lines)
+    : files_(files), lines_(lines) {}
+
+void Variables::note_value(std::size_t f, std::size_t k) {
+  note_value(f, k, 0);
+  if (const std::size_t later = done_later(lines_[f][k].tokens); later > 0) note_value(f, k, later);
+}
+
+void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
+  const bool later = at > 0;
+  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  static const std::set<std::string> kTypes = {"POS",  "E6POS", "FRAME", "AXIS", "E6AXIS", "FDAT", "LDAT",
+                                               "PDAT", "LOAD",  "INT",   "REAL", "BOOL",   "CHAR"};
+  bool declared = false;
+  while (at < tokens.size() &&
+         (tokens[at].text == "GLOBAL" || tokens[at].text == "DECL" || tokens[at].text == "CONST")) {
+    declared |= tokens[at].text == "DECL";
+    ++at;
+  }
+  if (at + 1 < tokens.size() && (declared || kTypes.contains(tokens[at].text)) &&
+      tokens[at + 1].kind == TokenKind::kWord) {
+    ++at;
+    declared_[tokens[at].text].insert(stem_of(files_[f].name));
+  }
+  if (at >= tokens.size() || tokens[at].kind != TokenKind::kWord || is_motion(tokens[at].text)) return;
+  std::size_t next = at;
+  const std::vector<Value> name = operands_at(tokens, at, &next);
+  if (name.size() != 1 || name[0].kind != Value::Kind::kName) return;
+  if (next >= tokens.size() || tokens[next].text != "=") return;
+  std::size_t end = next;
+  std::vector<Value> operands = operands_at(tokens, next + 1, &end);
+  const std::string root = root_of(name[0].name);
+  const auto key = std::pair(stem_of(files_[f].name), root);
+  Variable& variable = variables_[key];
+  if (later || root != name[0].name || root.find("[*]") != std::string::npos || end < tokens.size()) {
+    variable.changed = set_at(root, f, k);
+    return;
+  }
+  variable.values.push_back({f, k, std::move(operands)});
+  if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
+}
+
+void Variables::join_globals() {
+  static const std::set<std::string> kOfTheController = {"TOOL_DATA", "BASE_DATA", "LOAD_DATA"};
+  for (auto one = variables_.begin(); one != variables_.end();) {
+    const auto& [stem, root] = one->first;
+    const std::string word = root.substr(0, root.find('['));
+    const auto known = declared_.find(word);
+    std::set<std::string> owners;
+    if (kOfTheController.contains(word))
+      owners = {""};
+    else if (known != declared_.end() && !known->second.contains(stem))
+      owners = known->second;
+    if (owners.empty() || owners.contains(stem)) {
+      ++one;
+      continue;
+    }
+    for (const std::string& owner : owners) merge(one->second, root, variables_[{owner, root}]);
+    one = variables_.erase(one);
+  }
+}
+
+void Variables::merge(const Variable& from, const std::string& root, Variable& into) const {
+  if (into.changed.empty()) into.changed = from.changed;
+  for (const Assigned& value : from.values) {
+    const bool same = !into.values.empty() && is_equal(into.values[0].operands, value.operands);
+    if (!into.values.empty() && !same) into.changed = set_at(root, value.file, value.line);
+    if (!same) into.values.push_back(value);
+  }
+}
+
+std::string Variables::set_at(const std::string& name, std::size_t f, std::size_t k) const {
+  return fmt::format("{} is set at run time ({})", shown(spelled(name, f, k)), place(f, k));
+}
+
+std::string Variables::place(std::size_t f, std::size_t k) const {
+  return fmt::format("{} line {}", files_[f].name, lines_[f][k].number);
+}
+
+std::string Variables::spelled(const std::string& name, std::size_t f, std::size_t k) const {
+  const std::string word = name.substr(0, name.find('['));
+  for (const Token& token : lines_[f][k].tokens) {
+    if (token.kind == TokenKind::kWord && token.text == word)
+      return files_[f].text.substr(token.begin, token.end - token.begin) + name.substr(word.size());
+  }
+  return name;
+}
+
+const Variable* Variables::find(const std::string& name, std::size_t f) const {
+  const auto own = variables_.find({stem_of(files_[f].name), name});
+  if (own != variables_.end()) return &own->second;
+  for (const auto& [key, variable] : variables_) {
+    if (key.second == name) return &variable;
+  }
+  return nullptr;
+}
+
+Told<const Assigned*> Variables::value_of(const std::string& name, std::size_t f) const {
+  const Variable* variable = find(root_of(name), f);
+  if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
+  // One element of an array is changed where any may be.
+  const std::string any = name.substr(0, name.find('[')) + "[*]";
+  const Variable* all = name.find('[') == std::string::npos ? nullptr : find(any, f);
+  if (all != nullptr && !all->changed.empty()) return because(all->changed);
+  if (!variable->changed.empty()) return because(variable->changed);
+  if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
+  return &variable->values[0];
+}
+
+Told<Pose> Variables::frame_of(const std::vector<Value>& operands, std::size_t f, int depth) const {
+  if (operands.empty() || depth > kDeepest) return because("it is not constant");
+  Pose X = Pose::Identity();
+  for (const Value& operand : operands) {
+    const Told<Pose> one = frame_of(operand, f, depth);
+    if (!one) return one;
+    X = X * *one;
+  }
+  return X;
+}
+
+Told<Pose> Variables::frame_of(const Value& value, std::size_t f, int depth) const {
+  if (value.kind == Value::Kind::kAggregate) {
+    const Told<std::vector<double>> numbers = numbers_of(value, kPose);
+    if (!numbers) return because(numbers.error());
+    return pose_of(Coordinates::kAnglesZyx, *numbers);
+  }
+  if (value.kind != Value::Kind::kName) return because("it is not constant");
+  if (value.name == "$NULLFRAME" || value.name == "$WORLD" || value.name == "$ROBROOT") return Pose::Identity();
+  if (value.name.starts_with("$")) return because(fmt::format("{} decides it", shown(value.name)));
+  const Told<const Assigned*> assigned = value_of(value.name, f);
+  if (!assigned) return because(assigned.error());
+  return frame_of((*assigned)->operands, (*assigned)->file, depth + 1);
+}
+
+Told<std::vector<double>> Variables::numbers_of(const Value& value, const std::array<const char*, 6>& fields) {
+  std::vector<double> numbers;
+  for (const char* name : fields) {
+    const Value* field = value.field(name);
+    if (field == nullptr) return because(fmt::format("it does not say {}", name));
+    if (field->kind != Value::Kind::kNumber) return because(fmt::format("{} is not a constant number", name));
+    numbers.push_back(field->number);
+  }
+  return numbers;
+}
+
+}  // namespace trammel::cam::krl

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+#include <vector>
+
+#include "clients/cam/krl/lines.h"
+#include "clients/cam/program.h"
+
+/// What the names of a KRL program stand for.
+namespace trammel::cam::krl {
+
+/// A value, or one clause that says why the program decides it at run time.
+template <typename T>
+using Told = tl::expected<T, std::string>;
+[[nodiscard]] inline tl::unexpected<std::string> because(std::string why) {
+  return tl::make_unexpected(std::move(why));
+}
+
+constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "A", "B", "C"};
+
+/// A value that a line gives to a name.
+struct Assigned {
+  std::size_t file = 0, line = 0;
+  std::vector<Value> operands;
+};
+
+struct Variable {
+  std::vector<Assigned> values;
+  std::string changed;  ///< why its value is decided at run time
+};
+
+[[nodiscard]] std::string upper(std::string text);
+[[nodiscard]] std::string stem_of(const std::string& name);
+/// `XP[3].X` -> `XP[3]`
+[[nodiscard]] std::string root_of(const std::string& name);
+/// `INTERRUPT DECL 3 WHEN $IN[1] DO stopped( )`, `TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE`: where what is done
+/// stands; 0: the line is neither.
+[[nodiscard]] std::size_t done_later(const std::vector<Token>& tokens);
+[[nodiscard]] bool is_motion(const std::string& word);
+
+class Variables {
+ public:
+  /// Of files and their lines, which may still grow.
+  Variables(const std::vector<SourceFile>& files, const std::vector<std::vector<Line>>& lines);
+
+  /// A declaration or assignment: behind `DECL` and a type, or bare.
+  void note_value(std::size_t f, std::size_t k);
+  /// What a file sets and does not declare is another one's, or the controller's.
+  void join_globals();
+  [[nodiscard]] std::string place(std::size_t f, std::size_t k) const;
+  /// A name as a line spells it.
+  [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const;
+  /// The variable of a file's own data list, else of any.
+  [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const;
+  /// The only value of a name.
+  [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;
+  [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const;
+  [[nodiscard]] static Told<std::vector<double>> numbers_of(const Value& value,
+                                                            const std::array<const char*, 6>& fields);
+  /// By file and name.
+  [[nodiscard]] const std::map<std::pair<std::string, std::string>, Variable>& all() const { return variables_; }
+
+ private:
+  void note_value(std::size_t f, std::size_t k, std::size_t at);
+  void merge(const Variable& from, const std::string& root, Variable& into) const;
+  [[nodiscard]] std::string set_at(const std::string& name, std::size_t f, std::size_t k) const;
+  [[nodiscard]] Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const;
+
+  const std::vector<SourceFile>& files_;
+  const std::vector<std::vector<Line>>& lines_;
+  std::map<std::pair<std::string, std::string>, Variable> variables_;
+  std::map<std::string, std::set<std::string>> declared_;  ///< in which files each word is
+};
+
+}  // namespace trammel::cam::krl
