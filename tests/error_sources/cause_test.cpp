@@ -49,6 +49,26 @@ TEST(Causes, ARecordThatLeavesSomethingOutIsTold) {
   EXPECT_TRUE(misses([](CauseRecord& record) { record.forms.clear(); }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.acts = {}; }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.whole_batch.reset(); }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.added_by_data = causes::AddedByData{"gremlins", nullptr, ""}; }));
+}
+
+TEST(Causes, RulesAboutOneCauseAreMembersOfItsRecord) {
+  const Cell cell = cell_7();
+  for (const causes::StandsFor what : {causes::StandsFor::kNoKnownCause, causes::StandsFor::kArmNotAsModelled})
+    EXPECT_TRUE(cause_that_stands_for(what).forms.empty()) << "no physics describes it";
+  for (const causes::Part part : {causes::Part::kBase, causes::Part::kTool, causes::Part::kPayload}) {
+    const CauseRecord& record = cause_correcting(part);
+    EXPECT_EQ(record.lasting, causes::Lasting::kAlways) << record.spelling;
+    EXPECT_TRUE(corrects({std::string(record.spelling)}, part));
+  }
+  int added = 0;
+  for (const CauseRecord* record : all_causes()) {
+    if (!record->added_by_data) continue;
+    ++added;
+    EXPECT_FALSE(cause_spelled(record->added_by_data->beside).forms.empty()) << record->spelling;
+    EXPECT_EQ(record->added_by_data->is_known(cell), cell.robot.has_link_masses());
+  }
+  EXPECT_EQ(added, 1);
 }
 
 TEST(Causes, SpellingsAndNamesForPeopleAreTheirOwn) {
