@@ -8,6 +8,7 @@
 
 #include "server/base/text_file.h"
 #include "server/error_sources/catalogue.h"
+#include "server/error_sources/cause_words.h"
 #include "server/error_sources/spelling.h"
 
 namespace trammel {
@@ -128,6 +129,11 @@ TEST(Causes, PeopleReadPlainNamesAndFilesKeepTheSpelling) {
   EXPECT_EQ(in_words("geometry:d6"), "link geometry (d6)");
   EXPECT_EQ(in_words("compliance_linear"), "gearbox compliance");
   EXPECT_EQ(in_words("nominal"), "nominal");
+  EXPECT_EQ(causes_in_words({}), "");
+  EXPECT_EQ(causes_in_words({"geometry", "gear_transmission:3@48.5+97", "tracker_moved@40"}),
+            "link geometry, gear ripple in joint 3, the tracker moved from row 40 on");
+  EXPECT_EQ(level_in_words("base,geometry,backlash:2"), "base position, link geometry, backlash in joint 2");
+  EXPECT_EQ(level_in_words(""), "none");
 }
 
 TEST(Causes, FormsOfOneCauseAreToldFromOtherCauses) {
