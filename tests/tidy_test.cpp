@@ -377,16 +377,18 @@ std::vector<std::string> shipped_causes(const SourceTree& tree) {
 }
 
 /// Complains of whoever asks for a cause by its spelling instead of asking its record: by a comparison, by the
-/// beginning or end of a text, or by a table with a spelling for a key.
+/// beginning or end of a text, by looking its record up, by adding it to a list, or by a table with a spelling for a
+/// key.
 Complaints check_causes(const SourceTree& tree) {
   std::string any;
   for (const std::string& cause : shipped_causes(tree)) any += (any.empty() ? "" : "|") + cause;
   Complaints complaints;
   if (any.empty()) return complaints;
   const std::string spelling = "\"(" + any + ")[:@_]?\"";
-  const std::regex asks("[=!]= *" + spelling + "|" + spelling +
-                        " *[=!]=|(starts_with|ends_with|contains|find|count|compare)\\(" + spelling + "|(^|[{,]) *\\{" +
-                        spelling + ", \"");
+  const std::regex asks(
+      "[=!]= *" + spelling + "|" + spelling +
+      " *[=!]=|(starts_with|ends_with|contains|find|count|compare|cause_spelled|find_cause|emplace_back|push_back)\\(" +
+      spelling + "|(^|[{,]) *\\{" + spelling + ", \"");
   for (const auto& [path, text] : tree) {
     const bool is_of_server = is_under(path, "server") && !is_under(path, "server/error_sources");
     if (!is_source(path) || !(is_of_server || is_under(path, "clients"))) continue;
@@ -824,7 +826,9 @@ TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
   EXPECT_EQ(complaints("server/plan/a.cpp", "name.starts_with(\"joint_map:\")"), 1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "contains(\"tool\")"), 1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "{\"joint_map\", \"a map of a joint\"},"), 1u);
-  EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(\"tool\");"), 0u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(\"tool\");"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "if (&source.cause() == &cause_spelled(\"joint_map\")) return;"), 1u);
+  EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(record.spelling);"), 0u);
   EXPECT_EQ(complaints("server/error_sources/tool.cpp", "if (cause == \"tool\") return;"), 0u);
 }
 

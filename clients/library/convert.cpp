@@ -15,6 +15,38 @@ constexpr double kLargestJoint = 1e6;  // deg, of a rail mm
 
 bool is_rail(const Chain& robot, int joint) { return robot.joint(joint).type == JointType::kPrismatic; }
 
+/// The code of the same name. One that is new in ours needs its line here: the compiler refuses a switch that lacks it.
+constexpr api::ErrorCode same_code(trammel::ErrorCode code) {
+  using trammel::ErrorCode;
+  switch (code) {
+    case ErrorCode::kUsage:
+      return api::ErrorCode::kUsage;
+    case ErrorCode::kRefused:
+      return api::ErrorCode::kRefused;
+    case ErrorCode::kNotFound:
+      return api::ErrorCode::kNotFound;
+    case ErrorCode::kConflict:
+      return api::ErrorCode::kConflict;
+    case ErrorCode::kTooLarge:
+      return api::ErrorCode::kTooLarge;
+    case ErrorCode::kBusy:
+      return api::ErrorCode::kBusy;
+    case ErrorCode::kUnreachable:
+      return api::ErrorCode::kUnreachable;
+    case ErrorCode::kInternal:
+      return api::ErrorCode::kInternal;
+  }
+  return api::ErrorCode::kInternal;
+}
+
+/// Whether a code of the library, cast to ours, is the one of the same name.
+constexpr bool casts_keep_names() {
+  for (int k = 0; k <= static_cast<int>(trammel::ErrorCode::kInternal); ++k)
+    if (same_code(static_cast<trammel::ErrorCode>(k)) != static_cast<api::ErrorCode>(k)) return false;
+  return true;
+}
+static_assert(casts_keep_names());
+
 Error at_index(Error error, std::size_t index) {
   return Failure(std::move(error)).at_row(static_cast<long>(index)).value();
 }
@@ -23,7 +55,7 @@ Error at_index(Error error, std::size_t index) {
 
 api::Error to_api(const Error& error) {
   api::Error out;
-  out.code = static_cast<api::ErrorCode>(error.code);
+  out.code = same_code(error.code);
   out.message = error.message;
   out.file = error.file;
   out.row = error.row;

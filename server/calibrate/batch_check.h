@@ -12,7 +12,7 @@ namespace trammel {
 /// at a batch before anything is learned asks this.
 [[nodiscard]] std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell);
 
-/// The same, without what is said of another tool: of a batch that a model in force judges better.
+/// The same without doubts about the tool: for a batch of which a model in force can judge that better.
 [[nodiscard]] std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell);
 
 /// Refuses a batch with a batch_doubt().

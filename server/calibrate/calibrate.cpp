@@ -26,8 +26,8 @@ constexpr double kStretchedOfSession = 3;  // and so much more for each of them
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
   if (Status located = locate_unknown_frames(model, batch); !located) return located;
   std::vector<std::string> free;
-  if (!model.cell->X_WB) free.emplace_back("base");
-  if (has_unknown_tool(*model.cell)) free.emplace_back("tool");
+  if (!model.cell->X_WB) free.emplace_back(cause_correcting(causes::Part::kBase).spelling);
+  if (has_unknown_tool(*model.cell)) free.emplace_back(cause_correcting(causes::Part::kTool).spelling);
   if (free.empty()) return {};
   Result<PhysicalModel> frames = make_physical_model(model.cell, free);
   if (!frames) return tl::make_unexpected(frames.error());
@@ -201,26 +201,28 @@ Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
   return best;
 }
 
-/// With the links' weights beside `compliance`, in each of its forms; the other sources as they were found.
-std::vector<std::vector<std::string>> with_link_weights(const CalibrationResult& without) {
-  const CauseRecord& compliance = cause_spelled("compliance");
+/// With `added` beside the cause that shows it, in each of its forms; the other sources as they were found.
+std::vector<std::vector<std::string>> with_added(const CalibrationResult& without, const CauseRecord& added) {
+  const CauseRecord& beside = cause_spelled(added.added_by_data->beside);
   std::vector<std::vector<std::string>> candidates;
-  for (const causes::Form& form : compliance.forms) {
+  for (const causes::Form& form : beside.forms) {
     std::vector<std::string>& names = candidates.emplace_back();
     for (const ErrorSourcePtr& source : without.model.sources)
-      names.emplace_back(&source->cause() == &compliance ? std::string(form.spelling) : source->name());
-    names.emplace_back(cause_spelled("link_weights").spelling);
+      names.emplace_back(&source->cause() == &beside ? std::string(form.spelling) : source->name());
+    names.emplace_back(added.spelling);
   }
   return candidates;
 }
 
-/// Whether the data may decide on the links' weights: compliance is asked for in any form, and no mass is told.
-bool may_weigh_links(const Cell& cell, const std::vector<std::string>& specs, const CalibrateOptions& options) {
-  const auto has = [&](const CauseRecord& cause) {
-    return std::find(specs.begin(), specs.end(), cause.spelling) != specs.end();
-  };
-  return options.weigh_links && !cell.robot.has_link_masses() && has(cause_spelled("compliance")) &&
-         !has(cause_spelled("link_weights"));
+/// The cause that the data may add: what shows it is asked for in any form, and the cell does not say it. Null if there
+/// is none.
+const CauseRecord* may_be_added(const Cell& cell, const std::vector<std::string>& specs) {
+  const auto has = [&](std::string_view cause) { return std::find(specs.begin(), specs.end(), cause) != specs.end(); };
+  for (const CauseRecord* record : all_causes()) {
+    const auto& added = record->added_by_data;
+    if (added && has(added->beside) && !has(record->spelling) && !added->is_known(cell)) return record;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -228,8 +230,9 @@ bool may_weigh_links(const Cell& cell, const std::vector<std::string>& specs, co
 Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
                                     const MeasurementBatch& batch, const CalibrateOptions& options) {
   Result<CalibrationResult> without = most_likely(cell, combinations(specs, *cell), batch, options);
-  if (!without || !may_weigh_links(*cell, specs, options)) return without;
-  Result<CalibrationResult> with = most_likely(cell, with_link_weights(*without), batch, options);
+  const CauseRecord* added = options.weigh_links ? may_be_added(*cell, specs) : nullptr;
+  if (!without || added == nullptr) return without;
+  Result<CalibrationResult> with = most_likely(cell, with_added(*without, *added), batch, options);
   const bool asked_for = with && with->log_evidence > without->log_evidence + kWeighed;
   return asked_for ? with : without;
 }

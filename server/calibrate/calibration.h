@@ -12,8 +12,8 @@
 /// What a calibration is asked, and what it found.
 namespace trammel {
 
-/// Joints that lead to the positions leave less than the larger of these after identification: m rms, and share of how
-/// far the positions spread. A nominal robot is off by a few mm.
+/// If the joints belong to the positions, identification leaves less than the larger of these: m rms, and a share of
+/// how far the positions spread. A nominal robot is off by a few mm.
 inline constexpr double kNoModelError = 0.025;
 inline constexpr double kNoModelShare = 0.05;
 

@@ -33,8 +33,8 @@ struct Change {
 /// explains more than any single change.
 [[nodiscard]] std::optional<Change> strongest_change(const CalibrationResult& found, const MeasurementBatch& batch);
 
-/// The same as if no session were noisier than the others: what a session was taken to be noisy for may be a change.
-/// Empty where none is noisier. A session that is noisy makes a change seem to be there, so it is only a proposal.
+/// The same, with no session taken to be noisier than the others: what looks like a noisy session may be a change.
+/// Empty where none is noisier. It is only a proposal, since a session that is noisy looks like a change as well.
 [[nodiscard]] std::optional<Change> change_instead_of_noise(const CalibrationResult& found,
                                                             const MeasurementBatch& batch);
 

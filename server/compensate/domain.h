@@ -14,13 +14,13 @@ struct Domain {
   /// How much of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of range, or where nearly
   /// as little is known as without data. Smooth in q and in `prior_share`.
   [[nodiscard]] double bias_weight(const JointVector& q, double prior_share) const;
-  /// m², variance of one coordinate that what the physics leaves over has in addition out of range: Σ_j (slope_j d_j)²
-  /// with d_j the distance_beyond() of joint j. `slope`: m per rad or m; empty for none.
+  /// The variance by which one coordinate of the residual grows outside the range, m²: Σ_j (slope_j d_j)², with d_j the
+  /// distance_beyond() of joint j. `slope`: m per rad, of a prismatic joint per m; empty: it does not grow.
   [[nodiscard]] double growth(const JointVector& q, const JointVector& slope, const Chain& robot) const;
 };
 
-/// The distance that counts for a joint that is `beyond` its range (rad, m). For a revolute joint it is the chord,
-/// since what turns comes back: that of half a turn at most.
+/// The distance that counts for a joint that is `beyond` its range (rad, m). For a revolute joint it is the chord of
+/// the angle, at most that of half a turn: after a full turn the joint is where it was.
 [[nodiscard]] double distance_beyond(const Joint& joint, double beyond);
 
 }  // namespace trammel

@@ -82,15 +82,12 @@ std::string what_would_give_way() {
   return text;
 }
 
-/// Which way the data went about weights that the robot file does not tell.
-void add_link_weights(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
-  const CauseRecord& weights = cause_spelled("link_weights");
-  const bool weighed = std::any_of(parts.physics.sources.begin(), parts.physics.sources.end(),
-                                   [&](const ErrorSourcePtr& source) { return &source->cause() == &weights; });
-  if (!weighed || parts.physics.cell->robot.has_link_masses()) return;
-  notes.emplace_back(
-      "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance acts on link "
-      "weights that were found from the poses (link_weights); without them it would act on the payload alone");
+/// What training added by itself.
+void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const auto& added = source->cause().added_by_data;
+    if (added && !added->is_known(*parts.physics.cell)) notes.emplace_back(added->note);
+  }
 }
 
 std::string idle_sentence(const CompensatedModel::Parts& parts, const ErrorSource& source) {
@@ -212,7 +209,7 @@ std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
   add_changes(model.parts(), notes);
   add_sessions(model.parts(), notes);
-  add_link_weights(model.parts(), notes);
+  add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_moved_tools(model, notes);
   return notes;

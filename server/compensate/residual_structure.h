@@ -15,12 +15,12 @@ namespace trammel {
 /// whether two samples are from the same population, 1940).
 struct ResidualOrder {
   int joint = -1;          ///< 0-based; -1: the order of the rows
-  double runs = 0;         ///< stretches of one sign
-  double expected = 0;     ///< the same, of noise
-  double stddev = 0;       ///< of that number
+  double runs = 0;         ///< number of stretches of one sign
+  double expected = 0;     ///< the number to expect of noise
+  double stddev = 0;       ///< standard deviation of that number
   double correlation = 0;  ///< of one pose with the next
 
-  /// Standard deviations that there are too few runs by.
+  /// By how many standard deviations there are too few runs.
   [[nodiscard]] double z() const { return stddev > 0 ? (expected - runs) / stddev : 0; }
   /// Chance alone goes so far in one of ten thousand orders.
   static constexpr double kBeyondChance = 3.72;

@@ -32,7 +32,7 @@ Cause cause_at(const CauseRecord& record, int joint) {
   return cause;
 }
 
-Cause unknown_cause(int joint) { return cause_at(cause_spelled("unknown"), joint); }
+Cause unknown_cause(int joint) { return cause_at(cause_that_stands_for(causes::StandsFor::kNoKnownCause), joint); }
 
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {

@@ -13,22 +13,23 @@ namespace trammel::cause_search::thresholds {
 /// Share of batches with nothing to find in which the best of all candidates passes the line of one scan. A diagnosis
 /// scans at least twice; all of it stays below 1 false alarm in 100 batches.
 inline constexpr double kFalseAlarms = 0.003;
-/// Times the line: a score between these is so near that the line is drawn anew for the present background. No
-/// background has moved it as far.
+/// Times the line: a score between these two is so near that the line is computed anew for the present background. No
+/// background has moved it further.
 inline constexpr double kNearLine[] = {0.6, 1.6};
 /// Times the line: a cause above it needs no folds. A fold has seven eighths of the poses, and so of the score; it
 /// still sees five times the line.
 inline constexpr double kBeyondFolds = 6;
-/// Share of the best score that a cause needs to be among those that folds choose from. A fold has seven eighths of the
-/// poses: a third on all of them is not the most on those.
+/// Share of the best score that a cause needs to take part in the folds. A fold has seven eighths of the poses. With so
+/// many, a cause that has a third of the best score on all poses does not become the best.
 inline constexpr double kFoldContender = 0.3;
 /// Nat by which an anonymous function must beat the best named cause: odds of 7 to 1.
 inline constexpr double kUnnamedMargin = 2;
 /// Nat by which something slow must beat a step or a drift to be taken in its place: odds of 150 to 1. Steps are what
 /// happens to robots, and what is slow has more courses than anybody lists.
 inline constexpr double kSlowInstead = 5;
-/// Share of its strength, in nat, by which a step must beat something slow to be beyond doubt, less kStepChance: any
-/// smooth course leaves more of a step than that, and of something slow a step leaves more.
+/// A step is beyond doubt if it beats everything slow by this share of its strength (nat), less kStepChance. If there
+/// is a step, every smooth course leaves more than this share of it unexplained. If there is something slow, the step
+/// loses.
 inline constexpr double kStepShare = 0.04;
 /// Nat that chance takes off: a step of strength 75 or less need not win, but must not lose.
 inline constexpr double kStepChance = 3;
@@ -42,8 +43,8 @@ inline constexpr double kSameOrder = 0.5;
 /// Share of the poses that may be out, in a diagnosis and in triage. With more of them it is not single poses that are
 /// wrong.
 inline constexpr double kMostOutliers = 0.1;
-/// Share of the evidence of the pose that is farthest out that makes another one out as well. What one bad pose draws
-/// the others by is far less: its share in the fit, squared.
+/// Another pose is out as well if its evidence is at least this share of that of the pose that is farthest out. A
+/// single bad pose draws the others out by far less: by the square of its share in the fit.
 inline constexpr double kOutAsWell = 0.25;
 /// rad: a joint that moves less shows no function of its angle. Two degrees.
 inline constexpr double kSmallestSpan = 0.035;
@@ -54,14 +55,14 @@ inline constexpr double kSameTemperature = 0.5;
 
 /// Canonical correlation above which two causes do the same to the poses.
 inline constexpr double kSameEffect = 0.95;
-/// Share of an effect's strength that a cause of the same effect makes at least.
+/// Share of an effect's strength that another cause explains at least if it has the same effect.
 inline constexpr double kSameShare = kSameEffect * kSameEffect;
-/// The same of a cause that makes all of it: no strength of the effect tells the two apart.
+/// The same of a cause that explains all of it: however strong the effect is, the two cannot be told apart.
 inline constexpr double kWholeShare = 0.995;
 /// The same of a cause that is related, and may be there instead. A correlation of 0.63.
 inline constexpr double kRelatedShare = 0.4;
-/// The same below which a cause that wins a repetition has won it by another effect than this one. A correlation of
-/// 0.32.
+/// A cause that wins a repetition, and explains less than this share of the effect, has won by another effect, by
+/// chance. A correlation of 0.32.
 inline constexpr double kCoincidenceShare = 0.1;
 /// Share of simulated repetitions that must give a name for it to be sure.
 inline constexpr double kSureFrequency = 0.9;
@@ -81,7 +82,7 @@ inline constexpr double kAsGoodStrength = 6;
 inline constexpr double kMoreNumbers = 8;
 /// Share of an effect's strength by which real causes differ from their models.
 inline constexpr double kShapeError = 0.02;
-/// Share of the poses: a step before it stands for something that always acted.
+/// Share of the poses: a step that begins before it stands for something that always acted.
 inline constexpr double kAtOnce = 0.05;
 /// rad that no joint exceeds from pose to pose along a path that was measured in motion.
 inline constexpr double kPathStep = 0.2;

@@ -70,13 +70,25 @@ const CauseRecord& cause_spelled(std::string_view spelling) {
   return *found;
 }
 
-const CauseRecord& first_searched_by(causes::SearchFamily family) {
+namespace {
+
+/// The first record with that value of a member.
+template <typename Value>
+const CauseRecord& first_with(Value CauseRecord::*member, Value value) {
   const auto records = catalogue().records();
-  const auto found = std::find_if(records->begin(), records->end(),
-                                  [&](const CauseRecord* record) { return record->search == family; });
+  const auto found =
+      std::find_if(records->begin(), records->end(), [&](const CauseRecord* one) { return one->*member == value; });
   TRAMMEL_CHECK(found != records->end());
   return **found;
 }
+
+}  // namespace
+
+const CauseRecord& first_searched_by(causes::SearchFamily family) { return first_with(&CauseRecord::search, family); }
+
+const CauseRecord& cause_that_stands_for(causes::StandsFor what) { return first_with(&CauseRecord::stands_for, what); }
+
+const CauseRecord& cause_correcting(causes::Part part) { return first_with(&CauseRecord::part, part); }
 
 namespace {
 
@@ -97,6 +109,7 @@ class Missing {
     want_forms();
     want_rivals();
     want_scope();
+    if (record_.added_by_data) want_added(*record_.added_by_data);
     return std::move(missing_);
   }
 
@@ -123,6 +136,11 @@ class Missing {
     const bool is_step = record_.lasting == causes::Lasting::kFromAPose;
     want(!is_step || record_.whole_batch.has_value(), "whole_batch: what a batch shows that it began before");
     want(!is_step || whole_of(record_) != nullptr, "rivals: what it would be from the first pose on");
+  }
+
+  void want_added(const causes::AddedByData& added) {
+    want(find_cause(added.beside) != nullptr, "added_by_data: the cause that shows it");
+    want(added.is_known != nullptr && !added.note.empty(), "added_by_data: where it is known, and a note");
   }
 
   const CauseRecord& record_;

@@ -22,6 +22,12 @@ namespace trammel {
 /// The first cause of that search family. It is a bug if there is none.
 [[nodiscard]] const CauseRecord& first_searched_by(causes::SearchFamily family);
 
+/// The first record that stands for that. It is a bug if there is none.
+[[nodiscard]] const CauseRecord& cause_that_stands_for(causes::StandsFor what);
+
+/// The cause whose parameters correct that part of the nominal cell. It is a bug if there is none.
+[[nodiscard]] const CauseRecord& cause_correcting(causes::Part part);
+
 /// What is missing in a record, in words for its author; empty if it is complete. Its rivals must be known causes.
 [[nodiscard]] std::vector<std::string> missing_in(const CauseRecord& record);
 

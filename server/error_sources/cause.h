@@ -68,6 +68,13 @@ enum class SearchFamily {
   kPose,      ///< every pose by itself
 };
 
+/// What a record stands for.
+enum class StandsFor {
+  kACause,           ///< one physical cause
+  kNoKnownCause,     ///< an effect that no known cause explains
+  kArmNotAsModelled  ///< any number of the arm's causes together: the arm differs from the model in force
+};
+
 /// Whether a cause may be wrong in single parameters only.
 enum class Numbers {
   kTogether,   ///< all parameters together
@@ -132,6 +139,13 @@ struct Example {
   int joint = -1;  ///< 0-based; -1: any
 };
 
+/// Marks a cause that training adds by itself where the measurements make it much more likely, beside another one.
+struct AddedByData {
+  std::string_view beside;             ///< the cause that shows it; it must be among the error sources
+  bool (*is_known)(const Cell& cell);  ///< whether the cell's files say it; if so it is not added
+  std::string_view note;               ///< for people, where a model has it
+};
+
 /// The order in which causes act on the arm: in the order given here, then by `turn`, then in the order of
 /// registration.
 enum class ActsOn { kNothing, kBase, kLinks, kTool, kJoints, kLoad, kLoadedArm };
@@ -178,6 +192,8 @@ struct CauseRecord {
   std::optional<causes::Example> example = {};
   /// Whether the forms give different results in a cell. If not, only the usual one is used.
   bool (*forms_differ)(const Cell& cell) = nullptr;
+  causes::StandsFor stands_for = causes::StandsFor::kACause;
+  std::optional<causes::AddedByData> added_by_data = {};
 };
 
 /// The rival that a step equals if it began before the first pose; null if the cause does not begin at a pose.

@@ -19,6 +19,7 @@ const CauseRecord& causes::drift() {
       .shown_by = "poses over the whole range of the joints",
       .action = "train again from poses over the whole range of the joints",
       .figures = {{"effect_rms", "mm", "how far the arm is from where the model in force has it"}},
+      .stands_for = StandsFor::kArmNotAsModelled,
   };
   return record;
 }

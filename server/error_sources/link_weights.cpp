@@ -86,6 +86,14 @@ const CauseRecord& causes::link_weights() {
       .action = "keep it in the cell's error sources, or give the links' masses in the robot file",
       .figures = {{"wx", "kg m", "first moment of all that a link carries, along the link"},
                   {"wy", "kg m", "across link and axis"}},
+      .added_by_data =
+          AddedByData{
+              .beside = "compliance",
+              .is_known = [](const Cell& cell) { return cell.robot.has_link_masses(); },
+              .note =
+                  "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance "
+                  "acts on link weights that were found from the poses (link_weights); without them it would act on "
+                  "the payload alone"},
   };
   return record;
 }

@@ -19,6 +19,7 @@ const CauseRecord& causes::unknown() {
       .shown_by = "more poses, with times, temperatures and approach directions",
       .action = "find out what depends on the joints that are named",
       .figures = {{"rms", "mm", "how much of the error it is"}},
+      .stands_for = StandsFor::kNoKnownCause,
   };
   return record;
 }

@@ -244,7 +244,7 @@ void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, c
 
 void Examination::unknown_found(double chance, const Eigen::VectorXd& left, int freedom) {
   SeenChange change;
-  change.cause.record = &cause_spelled("unknown");
+  change.cause.record = &cause_that_stands_for(causes::StandsFor::kNoKnownCause);
   change.p_value = chance;
   double noise = 0;  // m, of one axis
   for (std::size_t i = 0; i < rows_.poses(); ++i) noise += covariance_.diagonal().segment<3>(rows_.first[i]).sum();

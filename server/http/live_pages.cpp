@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/error_sources/cause_words.h"
 #include "server/http/readiness.h"
 #include "server/report/history.h"
 #include "server/report/html.h"
@@ -42,16 +43,10 @@ std::string section(const std::string& title, const std::string& body) {
   return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", html_text(title), body);
 }
 
-std::string in_words(std::string word) {
+/// `not_better` as two words.
+std::string apart_words(std::string word) {
   std::replace(word.begin(), word.end(), '_', ' ');
   return word;
-}
-
-/// A list with a blank behind each comma, so that lines can end there.
-std::string spaced(const std::string& list) {
-  std::string text;
-  for (const char c : list) text += c == ',' ? std::string(", ") : std::string(1, c);
-  return text;
 }
 
 std::string millimetres(const std::optional<double>& m) { return m && *m > 0 ? fmt::format("{:.4f}", to_mm(*m)) : "–"; }
@@ -75,7 +70,7 @@ const char* kind_of(JobKind kind) {
 }
 
 std::string state_of(const CellReadiness& one) {
-  std::string text = html_text(in_words(to_text(one.state)));
+  std::string text = html_text(apart_words(to_text(one.state)));
   if (!one.why.empty()) text += "<br><span class=\"note\">" + html_text(one.why) + "</span>";
   return text;
 }
@@ -120,7 +115,7 @@ Row fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now
 std::string outcome_of(const StoredJob& job, const std::optional<JobProgress>& now) {
   if (now && now->stage == JobStage::kQueued) return now->what.empty() ? "waits" : "waits: " + html_text(now->what);
   if (now) return fmt::format("{}, {:.0f} %", html_text(now->what), 100 * now->share);
-  const std::string verdict = in_words(to_text(job.outcome.verdict));
+  const std::string verdict = apart_words(to_text(job.outcome.verdict));
   const std::string& why = job.outcome.why.empty() ? job.message : job.outcome.why;
   return html_text(why.empty() ? verdict : verdict + ": " + why);
 }
@@ -170,7 +165,7 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
     rows.push_back(
         {{html_link(model_address(cell, one->version), std::to_string(one->version)) + (now ? " in force" : ""),
           shown_time(one->trained_at), shown_time(one->measured_at), html_text(one->batch_id),
-          html_text(spaced(one->level)), std::to_string(one->training_poses), millimetres(one->validation_rms)},
+          html_text(level_in_words(one->level)), std::to_string(one->training_poses), millimetres(one->validation_rms)},
          now ? "now" : ""});
   }
   return table({"version", "trained (UTC)", "measured (UTC)", "batches", "error sources", "poses", "held-out rms, mm"},

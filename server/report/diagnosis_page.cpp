@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
@@ -33,7 +34,7 @@ std::string where_of(const Cause& cause) {
   return cause.joint >= 0 ? fmt::format("{}", cause.joint + 1) : "–";
 }
 
-std::string causes_in_words(const std::vector<Cause>& causes) {
+std::string all_in_words(const std::vector<Cause>& causes) {
   std::string list;
   for (const Cause& cause : causes) list += (list.empty() ? "" : ", ") + in_words(cause);
   return list;
@@ -75,7 +76,7 @@ std::string beginning_of(const Finding& finding) {
 
 /// What else it could be, for people.
 std::string others_of(const Finding& finding) {
-  return finding.whole ? causes_in_words(finding.could_also_be) : "more than this: the best known shape, not the whole";
+  return finding.whole ? all_in_words(finding.could_also_be) : "more than this: the best known shape, not the whole";
 }
 
 HtmlRow finding_row(const Finding& finding) {
@@ -173,7 +174,7 @@ std::string not_separable_text(const Diagnosis& diagnosis) {
   if (diagnosis.not_separable.empty()) return "<p>These poses tell all causes that were looked for apart.</p>\n";
   std::vector<HtmlRow> rows;
   for (const Inseparable& group : diagnosis.not_separable) {
-    rows.push_back({{html_text(causes_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
+    rows.push_back({{html_text(all_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
   }
   return table({"confusion", {"look the same at these poses", "canonical correlation"}, rows});
 }
@@ -202,7 +203,7 @@ std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   return fmt::format(
              "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with these "
              "poses</b>, by {} with as many random ones.</p>\n",
-             html_text(causes_in_words(next.separates)), uncertain_by(next.stddev_now),
+             html_text(all_in_words(next.separates)), uncertain_by(next.stddev_now),
              uncertain_by(next.stddev_expected), uncertain_by(next.stddev_random)) +
          next_poses_table(next.q, cell);
 }
@@ -302,8 +303,8 @@ std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
   add("poses", fmt::format("{} used, {} listed above", diagnosis.poses, diagnosis.suspects.size()));
   add(noise_name(diagnosis.noise, diagnosis.instrument) + ", per axis",
       fmt::format("{} ({})", micrometres(diagnosis.noise), diagnosis.noise_from));
-  add("error sources before", fmt::format("{}", fmt::join(diagnosis.sources_before, ", ")));
-  add("error sources after", fmt::format("{}", fmt::join(diagnosis.sources_after, ", ")));
+  add("error sources before", causes_in_words(diagnosis.sources_before));
+  add("error sources after", causes_in_words(diagnosis.sources_after));
   add("made by", fmt::format("trammel {}, seed {}", kProgramVersion, diagnosis.seed));
   return html_rows(rows);
 }

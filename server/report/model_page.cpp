@@ -10,6 +10,7 @@
 #include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
+#include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
@@ -135,7 +136,7 @@ std::string trained_ranges(const CompensatedModel& model) {
 }
 
 std::string refit_text(const RefitRecord& refit) {
-  return fmt::format("{} on {} poses of batch {}; all else is that of model {}", fmt::join(refit.sources, ","),
+  return fmt::format("{} on {} poses of batch {}; all else is that of model {}", causes_in_words(refit.sources),
                      refit.poses, refit.batch_id, refit.model);
 }
 
@@ -149,7 +150,7 @@ std::string provenance_rows(const CompensatedModel& model, const Evaluation& eva
   add("model", provenance.id);
   add("hash (SHA-256)", provenance.hash);
   add("robot", model.cell().robot.name());
-  add("error sources", provenance.level.empty() ? "none (nominal)" : provenance.level);
+  add("error sources", provenance.level.empty() ? "none (nominal)" : level_in_words(provenance.level));
   add("learned bias", bias_text(parts));
   add("batch", provenance.batch_id);
   add("batch hash (SHA-256)", provenance.batch_hash);

@@ -140,6 +140,11 @@ TEST(Sentence, OfModelsThatAreSpelledWrong) {
   EXPECT_EQ(said(calibrate(CalibrationProblem{make_physical_model(test::cell_7(), {"base"}).value(), {}},
                            CalibrateOptions{})),
             "batch : no measurements to calibrate with");
+  const auto cell = test::cell_7();
+  const CalibrationProblem without_sides{make_physical_model(cell, {"backlash:2"}).value(),
+                                         parse_batch(test::small_batch_csv(*cell, {}), "b.csv").value()};
+  EXPECT_EQ(said(calibrate(without_sides, CalibrateOptions{})),
+            "batch b: backlash in joint 2 needs an approach direction (dir2), which no pose has");
 }
 
 }  // namespace

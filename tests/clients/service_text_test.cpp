@@ -39,6 +39,9 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   model.trained_at_unix_s = 1'700'000'000;
   model.measured_at_unix_s = 1'699'917'200;
   EXPECT_NE(models_text({model}).find("2023-11-14 22:13  2023-11-13 23:13"), std::string::npos) << models_text({model});
+  model.level = "base,gear_transmission:3@48.5";
+  EXPECT_NE(models_text({model}).find("base position, gear ripple in joint 3\n"), std::string::npos);
+  EXPECT_EQ(models_json({model})[0]["level"], model.level) << "programs read the spelling";
   model.measured_at_unix_s.reset();
   EXPECT_NE(models_text({model}).find("2023-11-14 22:13  -  "), std::string::npos) << "nobody recorded it";
   EXPECT_TRUE(models_json({model})[0]["data_age_s"].is_null());

@@ -8,6 +8,7 @@
 
 #include "server/base/text_file.h"
 #include "server/error_sources/catalogue.h"
+#include "server/error_sources/cause_words.h"
 #include "server/error_sources/spelling.h"
 
 namespace trammel {
@@ -49,6 +50,26 @@ TEST(Causes, ARecordThatLeavesSomethingOutIsTold) {
   EXPECT_TRUE(misses([](CauseRecord& record) { record.forms.clear(); }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.acts = {}; }));
   EXPECT_TRUE(misses([](CauseRecord& record) { record.whole_batch.reset(); }));
+  EXPECT_TRUE(misses([](CauseRecord& record) { record.added_by_data = causes::AddedByData{"gremlins", nullptr, ""}; }));
+}
+
+TEST(Causes, RulesAboutOneCauseAreMembersOfItsRecord) {
+  const Cell cell = cell_7();
+  for (const causes::StandsFor what : {causes::StandsFor::kNoKnownCause, causes::StandsFor::kArmNotAsModelled})
+    EXPECT_TRUE(cause_that_stands_for(what).forms.empty()) << "no physics describes it";
+  for (const causes::Part part : {causes::Part::kBase, causes::Part::kTool, causes::Part::kPayload}) {
+    const CauseRecord& record = cause_correcting(part);
+    EXPECT_EQ(record.lasting, causes::Lasting::kAlways) << record.spelling;
+    EXPECT_TRUE(corrects({std::string(record.spelling)}, part));
+  }
+  int added = 0;
+  for (const CauseRecord* record : all_causes()) {
+    if (!record->added_by_data) continue;
+    ++added;
+    EXPECT_FALSE(cause_spelled(record->added_by_data->beside).forms.empty()) << record->spelling;
+    EXPECT_EQ(record->added_by_data->is_known(cell), cell.robot.has_link_masses());
+  }
+  EXPECT_EQ(added, 1);
 }
 
 TEST(Causes, SpellingsAndNamesForPeopleAreTheirOwn) {
@@ -108,6 +129,11 @@ TEST(Causes, PeopleReadPlainNamesAndFilesKeepTheSpelling) {
   EXPECT_EQ(in_words("geometry:d6"), "link geometry (d6)");
   EXPECT_EQ(in_words("compliance_linear"), "gearbox compliance");
   EXPECT_EQ(in_words("nominal"), "nominal");
+  EXPECT_EQ(causes_in_words({}), "");
+  EXPECT_EQ(causes_in_words({"geometry", "gear_transmission:3@48.5+97", "tracker_moved@40"}),
+            "link geometry, gear ripple in joint 3, the tracker moved from row 40 on");
+  EXPECT_EQ(level_in_words("base,geometry,backlash:2"), "base position, link geometry, backlash in joint 2");
+  EXPECT_EQ(level_in_words(""), "none");
 }
 
 TEST(Causes, FormsOfOneCauseAreToldFromOtherCauses) {

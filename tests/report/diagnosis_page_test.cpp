@@ -84,6 +84,14 @@ TEST_F(DiagnosisPage, ShowsTheVerdictTheFindingsAndWhereItAllComesFrom) {
   }
 }
 
+TEST_F(DiagnosisPage, CallsErrorSourcesByTheirPlainNames) {
+  diagnosis_.sources_after.emplace_back("gear_transmission:3@48.5");
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_TRUE(has(page, "base position, link geometry, gearbox compliance"));
+  EXPECT_TRUE(has(page, "gear ripple in joint 3"));
+  EXPECT_FALSE(has(page, "gear_transmission"));
+}
+
 TEST_F(DiagnosisPage, SpeaksOfOneKindOfIntervalOnly) {
   EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "half its 95 % interval"));
 }

@@ -13,6 +13,7 @@
 #include "server/compensate/model_file.h"
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
+#include "server/error_sources/cause_words.h"
 #include "server/report/model_page.h"
 #include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
@@ -57,7 +58,7 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
   return refused("{}", seen.sentence)
       .in("batch " + batch.id())
       .of("--refit")
-      .next(fmt::format("refitting {} would not learn that: train without --from", fmt::join(refit, ",")));
+      .next(fmt::format("refitting {} would not learn that: train without --from", causes_in_words(refit)));
 }
 
 /// What robots of the cell's type have in common, by the models of `paths`; empty where nobody wants to know.

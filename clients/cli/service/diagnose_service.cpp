@@ -6,6 +6,7 @@
 #include "clients/cli/text/diagnose_text.h"
 #include "server/base/json_guard.h"
 #include "server/base/text_file.h"
+#include "server/error_sources/cause_words.h"
 
 namespace trammel::cli {
 
@@ -90,9 +91,10 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
                        {"in_force", end->in_force},
                        {"version_in_force", now > 0 ? ordered_json(now) : ordered_json(nullptr)},
                        {"error_sources_in_force", found->in_force.level}};
-    say(fmt::format("\n{}{}\nin force now: {}\n",
-                    end->model_version > 0 ? fmt::format("version {}: ", end->model_version) : "", end->what,
-                    now > 0 ? fmt::format("version {} ({})", now, found->in_force.level) : "no version"),
+    say(fmt::format(
+            "\n{}{}\nin force now: {}\n", end->model_version > 0 ? fmt::format("version {}: ", end->model_version) : "",
+            end->what,
+            now > 0 ? fmt::format("version {} ({})", now, level_in_words(found->in_force.level)) : "no version"),
         arguments);
   }
   if (!arguments.report.empty() && found->page_html.empty()) {

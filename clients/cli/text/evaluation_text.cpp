@@ -4,6 +4,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/residual_structure.h"
+#include "server/error_sources/cause_words.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
 
@@ -173,13 +174,13 @@ std::string provenance_text(const CompensatedModel& model) {
   const auto identified = std::count_if(parts.parameters.begin(), parts.parameters.end(),
                                         [](const IdentifiedParameter& p) { return p.identified; });
   std::string text = fmt::format(
-      "model {} of cell {}: {}, bias {}\ntrained on {} poses of batch {}; {} of {} parameters identified (rank {})\n",
-      provenance.id, model.cell().name, provenance.level.empty() ? "nominal" : provenance.level,
-      parts.bias ? parts.bias->kernel : "none", provenance.training_poses, provenance.batch_id, identified,
-      parts.parameters.size(), parts.rank);
+      "model {} of cell {}: error sources: {}; bias {}\ntrained on {} poses of batch {}; {} of {} parameters "
+      "identified (rank {})\n",
+      provenance.id, model.cell().name, level_in_words(provenance.level), parts.bias ? parts.bias->kernel : "none",
+      provenance.training_poses, provenance.batch_id, identified, parts.parameters.size(), parts.rank);
   for (const RefitRecord& refit : provenance.refits) {
     text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
-                        fmt::join(refit.sources, ", "), refit.poses, refit.batch_id, refit.model);
+                        causes_in_words(refit.sources), refit.poses, refit.batch_id, refit.model);
   }
   return text;
 }

@@ -9,6 +9,7 @@
 #include "clients/cli/text/receipt_page_html.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/error_sources/cause_words.h"
 #include "server/report/html.h"
 
 namespace trammel::cli {
@@ -74,8 +75,8 @@ std::string facts(const CorrectedProgram& program, double tolerance_mm) {
   std::vector<std::string> names;
   for (const auto& [name, count] : tools) names.push_back(fmt::format("{} ({} targets)", html_text(name), count));
   std::vector<HtmlRow> rows = {
-      {{"Model",
-        html_text(fmt::format("{} of cell {}, {}", program.model_id, program.model.cell, program.model.level))}},
+      {{"Model", html_text(fmt::format("{} of cell {}", program.model_id, program.model.cell))}},
+      {{"Error sources in it", html_text(level_in_words(program.model.level))}},
       {{"Newest measurement in it", date_of(program.model.measured_at_unix_s)}},
       {{"Tools", fmt::format("{}", fmt::join(names, ", "))}},
       {{"Motions", fmt::format("{}, {} to corrected targets", program.moves, program.moves_corrected)}},

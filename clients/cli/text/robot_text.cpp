@@ -169,7 +169,7 @@ std::string left_out_text(const RigidRobot& robot) {
   std::string text = fmt::format("left out, at {} poses of the model's domain:\n  {:<34}{:>10}{:>10}\n", robot.poses,
                                  "what", "rms mm", "max mm");
   for (const LeftOut& one : robot.left_out)
-    text += fmt::format("  {:<34}{:>10.4f}{:>10.4f}\n", one.source, to_mm(one.rms), to_mm(one.most));
+    text += fmt::format("  {:<34}{:>10.4f}{:>10.4f}\n", one.plain, to_mm(one.rms), to_mm(one.most));
   return text + fmt::format("  {:<34}{:>10.4f}{:>10.4f}\n", "all together", to_mm(robot.rms), to_mm(robot.most));
 }
 

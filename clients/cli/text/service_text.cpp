@@ -4,6 +4,8 @@
 #include <map>
 #include <optional>
 
+#include "server/error_sources/cause_words.h"
+
 namespace trammel::cli {
 
 namespace {
@@ -123,13 +125,13 @@ ordered_json models_json(const std::vector<client::ModelInfo>& models) {
 std::string models_text(const std::vector<client::ModelInfo>& models) {
   if (models.empty()) return "no models\n";
   std::string text = fmt::format("  {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", "cell", "version", "id", "poses",
-                                 "held out mm", "trained", "data of", "level");
+                                 "held out mm", "trained", "data of", "error sources");
   for (const client::ModelInfo& model : models) {
     text += fmt::format("{} {:<16}{:>8}  {:<14}{:>7}{:>13}  {:<18}{:<18}{}\n", model.in_force ? '*' : ' ', model.cell,
                         model.version, model.id, model.training_poses,
                         model.validation_rms_mm ? fmt::format("{:.4f}", *model.validation_rms_mm) : "-",
                         date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
-                        model.level.empty() ? "nominal" : model.level);
+                        level_in_words(model.level));
   }
   return text + "  (* in force; dates in UTC)\n";
 }

@@ -16,7 +16,7 @@ bool has_unknown_tool(const Cell& cell) {
 
 std::vector<std::string> with_unknown_tool(std::vector<std::string> sources, const Cell& cell) {
   if (has_unknown_tool(cell) && corrects(sources, causes::Part::kLinks) && !corrects(sources, causes::Part::kTool))
-    sources.emplace_back("tool");
+    sources.emplace_back(cause_correcting(causes::Part::kTool).spelling);
   return sources;
 }
 

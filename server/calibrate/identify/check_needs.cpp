@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "server/error_sources/spelling.h"
+
 namespace trammel {
 
 namespace {
@@ -45,9 +47,10 @@ Status check_needs(const CalibrationProblem& problem) {
     for (const Need& need : needs_of(*source, *problem.model.cell)) {
       const auto has = [&](const Measurement& m) { return need.has(m.context); };
       if (!need.needed || std::any_of(poses.begin(), poses.end(), has)) continue;
-      return refused("error source {} needs {}{}, which no pose has", source->name(), need.what,
+      return refused("{} needs {}{}, which no pose has", in_words(source->name()), need.what,
                      need.column.empty() ? "" : " (" + need.column + ")")
           .of(need.column)
+          .with_text(source->name())
           .in("batch " + problem.batch.id);
     }
   }

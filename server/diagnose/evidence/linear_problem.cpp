@@ -6,6 +6,7 @@
 
 #include "server/base/check.h"
 #include "server/diagnose/evidence/background.h"
+#include "server/error_sources/spelling.h"
 #include "server/numerics/product.h"
 
 namespace trammel::cause_search {
@@ -46,7 +47,7 @@ Result<ErrorSourcePtr> possible(const std::string& spec, const PhysicalModel& mo
   const bool there = std::any_of(model.sources.begin(), model.sources.end(), [&](const ErrorSourcePtr& own) {
     return are_forms_of_one(own->name(), (*source)->name());
   });
-  if (there) return refused("error source {} is in the model", spec);
+  if (there) return refused("{} is in the model", in_words(spec)).with_text(spec);
   return source;
 }
 

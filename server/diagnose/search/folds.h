@@ -16,7 +16,8 @@ class Folds {
 
   [[nodiscard]] std::size_t count() const { return held_.size(); }
 
-  /// R: every row of `data` less what the poses of the other folds say of it by the columns in `chosen` (empty: all).
+  /// R: what is left of every row of `data` by a fit of the columns in `chosen` (empty: all) to the poses of the other
+  /// folds.
   [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data,
                                                   const std::vector<Eigen::Index>& chosen = {}) const;
 
@@ -30,8 +31,8 @@ class Folds {
 
  private:
   [[nodiscard]] Eigen::MatrixXd information_without(std::size_t fold) const;
-  /// R: `data` less what the rows that `keep` is 1 for say of it by the background and by `columns` beside it. First
-  /// the columns are fitted to what the background leaves, then the background to the rest.
+  /// R: what is left of `data` by a fit of the background and of `columns` to the rows for which `keep` is 1. First the
+  /// columns are fitted to what the background leaves, then the background to the rest.
   [[nodiscard]] Eigen::VectorXd rest_beside(const Background& background, const Eigen::VectorXd& keep,
                                             const Eigen::MatrixXd& columns, const Eigen::VectorXd& data) const;
 

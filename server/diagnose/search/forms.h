@@ -12,8 +12,9 @@ namespace trammel::cause_search {
 /// predicted no better than without it.
 [[nodiscard]] Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepted* poorer);
 
-/// Chooses the form of each cause in the model that has several, anew beside all that was found since. Chosen while
-/// much was missing it may be another one, and what a wrong form leaves over would be given other names. A cause of the
+/// Chooses the form of each cause in the model that has several, anew beside all that was found since. A form that
+/// was chosen while other causes were missing may be the wrong one, and what it leaves over would be given other names.
+/// A cause of the
 /// cell's own list is changed only where that list (`own_sources`) leaves its form open. False where none is changed.
 [[nodiscard]] bool choose_forms_again(SearchResult& result, const std::vector<std::string>& own_sources);
 

@@ -14,7 +14,7 @@ namespace trammel::cause_search {
 /// Whether `simple` is the one to name where it explains nearly as much as `general` does.
 [[nodiscard]] bool is_simpler_case(const Cause& simple, const Cause& general);
 
-/// Whether `special` is not sure where `general`, which describes it as well, is as likely: an order of a gear beside a
+/// Whether the name `special` is unsure if `general`, of which it is a case, is as likely: an order of a gear beside a
 /// map of its joint's angle.
 [[nodiscard]] bool is_doubtful_case(const Cause& general, const Cause& special);
 
@@ -24,7 +24,7 @@ struct Naming {
   std::vector<Cause> could_also_be;  ///< explain the data as well
 };
 
-/// Causes that the batch records nothing to test by, and that would look like `cause`.
+/// Causes that would look like `cause`, and for which the batch records nothing that could rule them out.
 [[nodiscard]] std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch);
 
 /// Doubts the family at `place` in `seen`: by repeating the batch in simulation with the effect as it was fitted, and

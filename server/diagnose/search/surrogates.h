@@ -4,16 +4,17 @@
 
 namespace trammel::cause_search {
 
-/// What a batch does not record, put in from the order of its rows, so that its causes are looked for all the same:
-/// the time goes on by the row, the arm warms up along it, and a joint comes from the side on which it was before.
+/// Stand-ins for what a batch does not record, made from the order of its rows. With them, causes that depend on it are
+/// searched for all the same: each row is later than the one before, the arm warms up from row to row, and a joint
+/// comes from the side on which it was before.
 struct Surrogates {
-  bool time = false, temperature = false, direction = false;  ///< were put in
+  bool time = false, temperature = false, direction = false;  ///< which were put in
 };
 /// Fills in what no row has. `batch` is in its order of measuring; nothing is put into a continuous path.
 [[nodiscard]] Surrogates put_in_surrogates(MeasurementBatch& batch);
 
-/// Gives rows of `whole` that went into `part` what was put in there: by then some have been set aside or merged, and
-/// none of them says where the joint was before.
+/// Copies what was put into the rows of `whole` to the same rows of `part`. In `part` rows have been set aside or
+/// merged since, so that the row before no longer says where a joint came from.
 void take_over_surrogates(const Surrogates& surrogates, const MeasurementBatch& whole, MeasurementBatch& part);
 
 /// Takes them out again.
@@ -24,8 +25,8 @@ void take_out_surrogates(const Surrogates& surrogates, MeasurementBatch& batch);
 /// Whether its numbers are per hour or per kelvin that a surrogate made up.
 [[nodiscard]] bool has_made_up_numbers(const Surrogates& surrogates, const Cause& cause);
 
-/// Causes whose circumstances were recorded and the same at all poses (one side of approach, one temperature), so that
-/// the geometry of `model` takes them over whole.
+/// Causes that depend on something that was recorded and never changed (one side of approach, one temperature). The
+/// geometry of `model` explains all of their effect.
 [[nodiscard]] std::vector<Inseparable> hidden_by_constancy(const PhysicalModel& model,
                                                            const MeasurementBatch& recorded);
 

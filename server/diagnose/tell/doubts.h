@@ -31,9 +31,8 @@ struct Judgement {
 /// - of a gear, where its joint has a map or more than two orders: an error with no single order has as many sines as
 ///   the poses show;
 /// - of what begins at a pose, where it begins a second time: a slow change is several steps;
-/// - of an encoder or a payload that is off by more than robots have it (`unlikely`): the weight of the arm itself, or
-/// a
-///   balancer, does the same through joints that give way;
+/// - of an encoder or a payload that is off by more than robots have it (`unlikely`): the weight of the arm itself,
+///   or a balancer, does the same through joints that give way;
 /// - where more than noise is left. It may be the best known shape of something else. Where half of the poses do not
 ///   show it by themselves (`in_both_halves`), it may be nothing at all.
 /// Of several doubts the action answers the one that comes last in this list.

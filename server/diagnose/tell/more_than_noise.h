@@ -8,8 +8,8 @@
 ///
 /// sigma is known to a tenth (one standard uncertainty), and the sum of squares left over sigma^2 is a chi-square of as
 /// many degrees of freedom as the fit has left. So the logarithm of what is left over what is stated has a standard
-/// deviation of hypot(0.1, 1/sqrt(2 degrees of freedom)); beyond two of them something is there that the poses do not
-/// say anything else of.
+/// deviation of hypot(0.1, 1/sqrt(2 degrees of freedom)); beyond two of them something is there of which
+/// the poses say nothing else.
 namespace trammel::cause_search {
 
 enum class NoiseVerdict {

@@ -255,7 +255,7 @@ void tell_tools_that_are_one(const Explained& explained, Diagnosis& diagnosis) {
       }
       diagnosis.limits.push_back(
           fmt::format("tool '{}' is found where tool '{}' is: are these tool_ids wrong? {}", rare, usual, listed(ids)));
-      doubt(diagnosis, cause_spelled("tool"), unknown_cause(),
+      doubt(diagnosis, cause_correcting(causes::Part::kTool), unknown_cause(),
             fmt::format("see whether the rows of tool '{}' were measured with '{}'", rare, usual));
     }
   }

@@ -88,7 +88,7 @@ std::vector<Alternative> Alternatives::with_the_tracker() const {
   std::vector<Alternative> all = from(0, "");
   std::erase_if(all, [](const Alternative& one) { return moves_base(record_of(one.cause)); });
   for (Alternative& one : all) {
-    one.tracker_elsewhere = set_free(one, "base", one.base);
+    one.tracker_elsewhere = set_free(one, std::string(cause_correcting(Part::kBase).spelling), one.base);
     one.model.X_WB = X_WB_;
   }
   return all;
@@ -101,7 +101,7 @@ bool Alternatives::carries() const {
 }
 
 void Alternatives::add_drift(std::vector<Alternative>& all) const {
-  Alternative one = started(cause_at(cause_spelled("drift")), physics_);
+  Alternative one = started(cause_at(cause_that_stands_for(causes::StandsFor::kArmNotAsModelled)), physics_);
   Eigen::Index first = 0;
   bool any = false;
   for (const ErrorSourcePtr& source : physics_.sources) {

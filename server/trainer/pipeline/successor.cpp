@@ -3,6 +3,7 @@
 #include <set>
 #include <utility>
 
+#include "server/error_sources/cause_words.h"
 #include "server/trainer/acceptance/gate.h"
 
 namespace trammel {
@@ -40,12 +41,12 @@ Result<Successor> train_successor(const std::shared_ptr<const Cell>& cell, const
   options.from = present->model;
   auto refitted = train(cell, batch, options);
   if (!refitted && refitted.error().code == ErrorCode::kRefused) {
-    options.refit = {"base"};
+    options.refit = {std::string(cause_correcting(causes::Part::kBase).spelling)};
     refitted = train(cell, batch, options);
   }
   if (!refitted) return tl::make_unexpected(refitted.error());
   return Successor{std::move(*refitted), fmt::format("{}: {} refitted, the rest is that of version {}", why,
-                                                     fmt::join(options.refit, " and "), present->version)};
+                                                     causes_in_words(options.refit), present->version)};
 }
 
 }  // namespace trammel
