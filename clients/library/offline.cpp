@@ -16,6 +16,7 @@
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/checked_batch.h"
 #include "server/measurement/files/batch_file.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/plan/plan.h"
@@ -309,6 +310,8 @@ Result<std::vector<CorrectedTarget>> Model::correct(std::span<const Target> targ
 Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
   const auto batch = checked(batches, inside_->model.cell(), drawn(0, 0));
   if (!batch) return passed_on(batch);
+  const auto positions = require_positions(batch->rows(), "the library's evaluate");
+  if (!positions) return passed_on(positions);
   const auto world = in_world_of(inside_->model, batch->rows());
   if (!world) return passed_on(world);
   return evaluation_of(inside_->model.evaluate(world->batch));

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/calibrate/orientation_check.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/reading_doubt.h"
 #include "server/measurement/sessions.h"
 
@@ -20,7 +21,8 @@ MeasurementBatch with_zeros(MeasurementBatch batch, const JointVector& zeros) {
 /// positions.
 template <typename Positions>
 std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell& cell, const Positions& positions) {
-  for (const MeasurementBatch& session : by_session(batch)) {
+  for (const MeasurementBatch& session : by_session(positions_of(batch))) {
+    if (session.measurements.empty()) continue;
     const ReadingLook seen = look_at_readings(session, cell);
     if (std::optional<Error> doubt = positions(seen)) return doubt;
     if (auto doubt = orientation_doubt(with_zeros(session, seen.zeros), cell, seen.X_WB)) return doubt;

@@ -5,12 +5,16 @@
 #include <map>
 
 #include "server/calibrate/frames/frames.h"
+#include "server/calibrate/gauges/campaign_limits.h"
+#include "server/calibrate/gauges/locate_anchors.h"
 #include "server/calibrate/identify/check_needs.h"
 #include "server/calibrate/identify/identify.h"
 #include "server/calibrate/identify/order_search.h"
 #include "server/calibrate/identify/weighting.h"
 #include "server/calibrate/sessions/locate_sessions.h"
+#include "server/error_sources/anchors.h"
 #include "server/error_sources/catalogue.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
@@ -21,6 +25,8 @@ constexpr double kWeighed = 20;            // nat: so much more likely must the 
 constexpr double kPerhapsStretched = 3;    // standard deviations of what a scale alone would explain: worth a trial
 constexpr double kStretched = 10;          // nat: so much more likely must the data be with scales of the sessions,
 constexpr double kStretchedOfSession = 3;  // and so much more for each of them
+constexpr double kZeroed = 10;             // the same with zero errors of the instruments
+constexpr double kZeroedOfInstrument = 3;
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
@@ -33,7 +39,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   if (!frames) return tl::make_unexpected(frames.error());
   frames->X_WB = model.X_WB;
   frames->tools = model.tools;
-  const Result<CalibrationResult> refined = identify({*frames, batch}, options);
+  const Result<CalibrationResult> refined = identify({*frames, positions_of(batch)}, options);
   if (!refined) return tl::make_unexpected(refined.error());
   for (auto& [tool, X_FT] : model.tools) {
     PoseContext anywhere;
@@ -84,6 +90,38 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
 }
 
+/// The first value of the model's `base`; -1: it has none.
+Eigen::Index place_of_base(const PhysicalModel& model) {
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    if (source->cause().part == causes::Part::kBase) return first;
+    first += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  return -1;
+}
+
+/// Anchors by the nominal arm; where known ones tell where the base is, base and anchors by all gauges together. Their
+/// priors are centred there.
+Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
+  if (!has_gauges(batch)) return {};
+  if (const Status located = locate_anchors(model, batch); !located) return located;
+  const Eigen::Index base = place_of_base(model);
+  if (base < 0 || has_positions(batch) || untold_motions(model, batch) > 0) return {};
+  auto anywhere = std::make_shared<Cell>(*model.cell);
+  anywhere->X_WB.reset();
+  Result<PhysicalModel> frames = make_physical_model(anywhere, {"base", std::string(kAnchors)});
+  if (!frames) return tl::make_unexpected(frames.error());
+  frames->X_WB = model.X_WB;
+  frames->tools = model.tools;
+  if (const Status located = locate_anchors(*frames, batch); !located) return located;
+  CalibrateOptions free = options;
+  free.held.clear();
+  const Result<CalibrationResult> found = identify({*frames, batch}, free);
+  if (!found) return tl::make_unexpected(found.error());
+  model.values.segment<6>(base) = found->model.values.segment<6>(place_of_base(found->model));
+  return locate_anchors(model, batch);
+}
+
 /// In the world of the last session.
 Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, const CalibrateOptions& options) {
   CalibrationProblem complete = problem;
@@ -102,6 +140,8 @@ Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, con
   }
   if (Status fit = check_needs(complete); !fit) return tl::make_unexpected(fit.error());
   localise_base(complete.model, complete.batch);
+  if (Status placed = place_instruments(complete.model, complete.batch, options); !placed)
+    return tl::make_unexpected(placed.error());
   if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
   return identify_with_sessions(complete, options).map([&](CalibrationResult found) {
     for (std::size_t s = 0; s < sessions.size(); ++s)
@@ -157,10 +197,14 @@ bool is_of_the_robot(const PhysicalModel& model) {
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
     return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
+  if (const Status told = check_gauges(problem.model, problem.batch); !told) return tl::make_unexpected(told.error());
   // Nobody says where the base stands: it is found by the session that tells most, not by the few poses of the newest.
   if (has_sessions(problem.batch) && !problem.model.cell->X_WB && is_of_the_robot(problem.model))
     return calibrate_by(largest_session(problem.batch), problem, options);
-  return calibrate_there(problem, options);
+  return calibrate_there(problem, options).map([&](CalibrationResult found) {
+    if (has_gauges(problem.batch)) add_campaign_limits(problem.batch, found);
+    return found;
+  });
 }
 
 namespace {
@@ -227,14 +271,47 @@ const CauseRecord* may_be_added(const Cell& cell, const std::vector<std::string>
 
 }  // namespace
 
-Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
-                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+namespace {
+
+/// With the links' weights where the data ask for them.
+Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& cell,
+                                            const std::vector<std::string>& specs, const MeasurementBatch& batch,
+                                            const CalibrateOptions& options) {
   Result<CalibrationResult> without = most_likely(cell, combinations(specs, *cell), batch, options);
   const CauseRecord* added = options.weigh_links ? may_be_added(*cell, specs) : nullptr;
   if (!without || added == nullptr) return without;
   Result<CalibrationResult> with = most_likely(cell, with_added(*without, *added), batch, options);
   const bool asked_for = with && with->log_evidence > without->log_evidence + kWeighed;
   return asked_for ? with : without;
+}
+
+/// With zero errors of the instruments, the other sources as they were found.
+Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without, const MeasurementBatch& batch,
+                                           const CalibrateOptions& options) {
+  std::vector<std::string> names;
+  for (const ErrorSourcePtr& source : without.model.sources) names.push_back(source->name());
+  names.emplace_back(kInstrumentZero);
+  return most_likely(without.model.cell, {names}, batch, options);
+}
+
+}  // namespace
+
+Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
+                                    const MeasurementBatch& batch, const CalibrateOptions& options) {
+  const Result<std::vector<std::string>> sources = with_instruments(specs, *cell, batch);
+  if (!sources) return tl::make_unexpected(sources.error());
+  Result<CalibrationResult> exact = calibrate_weighed(cell, *sources, batch, options);
+  const bool zeros_asked = std::find(sources->begin(), sources->end(), kInstrumentZero) != sources->end();
+  if (!has_gauges(batch) || zeros_asked) return exact;
+  std::vector<std::string> with_zeros = *sources;
+  with_zeros.emplace_back(kInstrumentZero);
+  // Values that are far too long fit nothing without a zero.
+  Result<CalibrationResult> zeroed =
+      exact ? calibrate_zeroed(*exact, batch, options) : calibrate_weighed(cell, with_zeros, batch, options);
+  if (!zeroed || !exact) return zeroed ? zeroed : exact;
+  const auto zeros = static_cast<double>(zeroed->parameters.size() - exact->parameters.size());
+  const double price = kZeroed + kZeroedOfInstrument * zeros;
+  return zeroed->log_likelihood > exact->log_likelihood + price ? zeroed : exact;
 }
 
 }  // namespace trammel

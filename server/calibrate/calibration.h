@@ -54,11 +54,11 @@ struct CalibrationResult {
   [[nodiscard]] Eigen::MatrixXd correlation() const;
   int rank = 0;  ///< directions with singular value >= 1
   std::vector<UnidentifiableCombination> unidentifiable;
-  double condition_number = 0;      ///< of the identified directions, prior units
-  double log_likelihood = 0;        ///< nat, of the residuals under sigma and discrepancy
-  double log_evidence = 0;          ///< nat: the same with the parameters integrated over their priors (Laplace)
-  double rms = 0;                   ///< m, Euclidean residual of the training positions
-  double discrepancy = 0;           ///< m per axis: what the model leaves beyond the measurement's sigma
+  double condition_number = 0;  ///< of the identified directions, prior units
+  double log_likelihood = 0;    ///< nat, of the residuals under sigma and discrepancy
+  double log_evidence = 0;      ///< nat: the same with the parameters integrated over their priors (Laplace)
+  double rms = 0;               ///< m, Euclidean residual of the training positions; of gauges alone: of their values
+  double discrepancy = 0;       ///< m per axis: what the model leaves beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;

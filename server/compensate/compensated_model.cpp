@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "server/base/check.h"
+#include "server/base/coverage.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/file/write_parts.h"
+#include "server/measurement/gauges.h"
 
 namespace trammel {
 
@@ -203,6 +207,7 @@ void CompensatedModel::add_rotations(const MeasurementBatch& batch, const std::v
 }
 
 CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch& batch) const {
+  TRAMMEL_CHECK(!has_gauges(batch));
   const PhysicalModel& physics = parts().physics;
   const Pose X_BW = physics.X_WB.inverse();
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
@@ -229,7 +234,35 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
   return errors;
 }
 
+namespace {
+
+GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors) {
+  const auto rms = [](const Eigen::VectorXd& e) { return std::sqrt(e.squaredNorm() / static_cast<double>(e.size())); };
+  const Eigen::ArrayXd inside =
+      (errors.compensated.array().abs() <= kInterval95 * errors.stddev.array()).cast<double>();
+  return {static_cast<int>(errors.rows.size()),
+          rms(errors.nominal),
+          rms(errors.calibrated),
+          rms(errors.compensated),
+          errors.compensated.cwiseAbs().maxCoeff(),
+          inside.mean(),
+          static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true))};
+}
+
+}  // namespace
+
 Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
+  if (!has_gauges(batch)) return evaluate_positions(batch);
+  const MeasurementBatch positions = positions_of(batch);
+  Evaluation evaluation;
+  evaluation.nominal = evaluation.calibrated = evaluation.compensated = no_figures();
+  evaluation.coverage_95 = std::numeric_limits<double>::quiet_NaN();
+  if (!positions.measurements.empty()) evaluation = evaluate_positions(positions);
+  evaluation.gauges = figures_of(gauge_errors(batch));
+  return evaluation;
+}
+
+Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) const {
   const LevelErrors errors = errors_B(batch);
   Evaluation evaluation;
   evaluation.poses = static_cast<int>(batch.measurements.size());

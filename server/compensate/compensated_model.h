@@ -71,13 +71,23 @@ class CompensatedModel {
     };
     Rotations rotation = {};
   };
+  /// All rows must have positions.
   [[nodiscard]] LevelErrors errors_B(const MeasurementBatch& batch) const;
+  /// Measured minus predicted of every gauge, m, at the three levels, and the standard deviation of compensated.
+  struct GaugeErrors {
+    std::vector<std::size_t> rows;  ///< of the batch
+    Eigen::VectorXd nominal, calibrated, compensated, stddev;
+    std::vector<bool> in_domain;
+  };
+  /// The model must know their anchors, or its cell file where they are (in_world_of()).
+  [[nodiscard]] GaugeErrors gauge_errors(const MeasurementBatch& batch) const;
   /// Figures of the errors on `batch`, which is checked against the cell and not empty. Poses of another batch than the
   /// model's own are predicted as in service: what began at a training pose has happened, and errors of the tracker do
   /// not count.
   [[nodiscard]] Evaluation evaluate(const MeasurementBatch& batch) const;
 
  private:
+  [[nodiscard]] Evaluation evaluate_positions(const MeasurementBatch& batch) const;
   struct Inside {
     explicit Inside(BiasPhysics physics) : bias_physics(std::move(physics)) {}
     Parts parts;

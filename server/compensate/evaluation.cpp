@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "server/base/check.h"
@@ -27,6 +28,11 @@ double quantile(const Eigen::VectorXd& sorted, double share) {
 }  // namespace
 
 double nlpd_in_mm(double nlpd_in_m) { return nlpd_in_m + std::log(to_mm(1.0)); }
+
+ErrorFigures no_figures() {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  return {kNone, kNone, kNone, kNone, Vector3::Constant(kNone), Vector3::Constant(kNone)};
+}
 
 ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B) {
   const auto n = e_B.cols();

@@ -13,6 +13,8 @@ struct ErrorFigures {
   double rms = 0, mean = 0, p997 = 0, max = 0;
   Vector3 axis_mean = Vector3::Zero(), axis_stddev = Vector3::Zero();  ///< in B
 };
+/// Of no position: none of them is a number.
+[[nodiscard]] ErrorFigures no_figures();
 /// For the errors in the columns of `e_B` (3 x N, m, not empty).
 [[nodiscard]] ErrorFigures figures_of(const Eigen::Matrix3Xd& e_B);
 
@@ -24,9 +26,19 @@ struct OrientationFigures {
       coverage_95;  ///< share of coordinates inside their 95 % interval; of models that learned orientations
 };
 
+/// Errors of rows that tell one number (Gauge), m: measured - predicted of that number. They are no position errors,
+/// and never compared with them.
+struct GaugeFigures {
+  int rows = 0;
+  double nominal = 0, calibrated = 0, compensated = 0;  ///< rms
+  double max = 0;                                       ///< of compensated, magnitude
+  double coverage_95 = 0;                               ///< share of rows inside their 95 % interval
+  int in_domain = 0;
+};
+
 /// The three levels of one model on the same poses.
 struct Evaluation {
-  int poses = 0;
+  int poses = 0;  ///< with a position; 0: of gauges alone, and all figures of positions are not numbers
   ErrorFigures nominal, calibrated, compensated;
   double coverage_95 = 0;  ///< share of coordinates inside their 95 % interval
   int in_domain = 0;
@@ -35,6 +47,7 @@ struct Evaluation {
   /// deviation is 0, and in models from before it was kept.
   std::optional<double> nlpd;
   std::optional<OrientationFigures> orientation;  ///< where orientations were measured
+  std::optional<GaugeFigures> gauges;             ///< where distances or touches were
   /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models from before it was
   /// kept.
   std::optional<double> bias_gain_z;

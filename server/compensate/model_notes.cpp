@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/compensate/paired_gain.h"
+#include "server/error_sources/anchors.h"
 
 namespace trammel {
 
@@ -110,7 +111,8 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<std::str
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    if (count > 0 && effect.segment(first, count).maxCoeff() < kNothing) notes.push_back(idle_sentence(parts, *source));
+    if (count > 0 && !is_of_instruments(*source) && effect.segment(first, count).maxCoeff() < kNothing)
+      notes.push_back(idle_sentence(parts, *source));
     first += count;
   }
 }

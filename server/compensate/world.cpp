@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "server/compensate/known_rows.h"
+#include "server/error_sources/anchors.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 #include "server/robot/rigid_fit.h"
 
@@ -83,7 +85,34 @@ MeasurementBatch of_one(const CompensatedModel& model, const MeasurementBatch& b
 
 }  // namespace
 
+namespace {
+
+/// Refuses gauges that the model cannot tell: where several set-ups are to be placed, and of an anchor whose place
+/// neither it nor its cell file knows.
+Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch) {
+  if (!has_gauges(batch)) return {};
+  if (has_sessions(batch)) return require_positions(batch, "placing several set-ups of the instrument");
+  const Result<Anchors> anchors = anchors_of(model.cell());
+  if (!anchors) return tl::make_unexpected(anchors.error());
+  for (const Measurement& m : batch.measurements) {
+    if (!m.gauge || placed_anchor(model.parts().physics, m.gauge->anchor).said != nullptr) continue;
+    const auto known = anchors->find(m.gauge->anchor);
+    if (known != anchors->end() && known->second.p_W) continue;
+    return refused("model {} does not know where anchor '{}' is", model.provenance().id, m.gauge->anchor)
+        .in("batch " + batch.id)
+        .at_row(m.row)
+        .of("anchor_id")
+        .with_text(m.gauge->anchor)
+        .next("give its xyz_mm in the cell file before training, or train with distances to it");
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch) {
+  if (const Status told = check_gauges(model, batch); !told) return tl::make_unexpected(told.error());
+  if (has_gauges(batch)) return InWorld{batch};
   if (!has_sessions(batch)) return InWorld{of_one(model, batch)};
   std::vector<SessionSetting> settings = settings_of(batch);
   std::vector<int> index(settings.size(), kAfterEverything);

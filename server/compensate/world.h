@@ -17,7 +17,8 @@ struct InWorld {
 /// the session and the rows fit it, as it was found in training; else, where the batch has several, as its own rows fit
 /// the model best. Poses of sessions that the model knows are placed in time, so that a change that came later does not
 /// count for them. A batch of one session that the model does not know was measured in that world. Refuses a session
-/// whose rows do not tell where its instrument stood.
+/// whose rows do not tell where its instrument stood, and gauges of several sessions or to an anchor whose place nobody
+/// knows.
 [[nodiscard]] Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch);
 
 }  // namespace trammel

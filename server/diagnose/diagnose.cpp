@@ -14,6 +14,7 @@
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel::cause_search {
@@ -51,6 +52,8 @@ std::vector<std::string> sources_of(const Cell& cell, const std::vector<SessionS
 
 Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
                               const std::vector<SessionSetting>& sessions) {
+  if (const Status positions = require_positions(batch.rows(), "diagnose"); !positions)
+    return tl::make_unexpected(positions.error());
   if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "server/base/near_miss.h"
+#include "server/error_sources/anchors.h"
 
 namespace trammel {
 
@@ -90,6 +91,7 @@ std::vector<std::string> alternatives(const std::string& spec, const Cell& cell)
 }
 
 Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell) {
+  if (is_of_instruments(spec)) return make_instrument_source(spec, cell);
   const CauseRecord* known = find_cause(spec);
   if (known == nullptr || known->forms.empty()) {
     std::vector<std::string> names = known_causes();

@@ -13,6 +13,7 @@
 #include "server/compensate/known_rows.h"
 #include "server/health/evidence/check_tests.h"
 #include "server/health/evidence/working_poses.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
@@ -412,6 +413,8 @@ std::string_view to_string(HealthVerdict verdict) {
 
 Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                  const HealthOptions& options) {
+  if (const Status positions = require_positions(batch.rows(), "a check"); !positions)
+    return tl::make_unexpected(positions.error());
   if (has_sessions(batch.rows())) {
     return refused("a check is one set-up of the instrument, the batch has {}", batch.rows().sessions.size())
         .in("batch " + batch.id())

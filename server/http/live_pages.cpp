@@ -108,7 +108,7 @@ Row fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now
   const auto& judged = model->model.parts().validation;
   row.cells.push_back(shown_time(made.trained_at));
   row.cells.push_back(made.measured_at ? shown_age(static_cast<double>(now - *made.measured_at)) : "–");
-  row.cells.push_back(millimetres(judged ? std::optional(judged->compensated.rms) : std::nullopt));
+  row.cells.push_back(millimetres(judged && judged->poses > 0 ? std::optional(judged->compensated.rms) : std::nullopt));
   return row;
 }
 

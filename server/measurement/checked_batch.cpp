@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/base/check.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/reading_doubt.h"
@@ -33,6 +34,8 @@ void rebase_times(std::vector<Measurement>& measurements) {
 }
 
 Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string& where) {
+  const Result<Anchors> anchors = anchors_of(cell);
+  if (!anchors) return tl::make_unexpected(anchors.error());
   for (Measurement& measurement : batch.measurements) {
     if (measurement.context.q.size() != cell.robot.size()) {
       return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
@@ -42,6 +45,8 @@ Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string&
     }
     const Status pose = check_pose(measurement.context, cell);
     if (!pose) return Failure(pose.error()).in(where).at_row(measurement.row);
+    const Status gauge = check_gauge(measurement, cell, *anchors);
+    if (!gauge) return Failure(gauge.error()).in(where).at_row(measurement.row);
   }
   return {};
 }
@@ -51,7 +56,8 @@ bool earlier(const Measurement& a, const Measurement& b) {
 }
 
 /// Of each session by itself: its positions are in a frame of its own.
-Status check_spreads(const MeasurementBatch& batch, const Cell& cell, const std::string& where) {
+Status check_spreads(const MeasurementBatch& recorded, const Cell& cell, const std::string& where) {
+  const MeasurementBatch batch = positions_of(recorded);
   if (!has_sessions(batch)) return check_spread(batch, cell, where);
   for (const MeasurementBatch& session : by_session(batch)) {
     const Status fine = check_spread(session, cell, fmt::format("{}, session {}", where, session.id));
@@ -195,10 +201,11 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   }
   divide_into_sessions(batch);
   rebase_times(batch.measurements);
-  if (const Status poses = check_poses(batch, cell, where); !poses)
-    return tl::make_unexpected(with_likely_reading(poses.error(), batch, cell));
-  if (const Status spread = check_spreads(batch, cell, where); !spread)
-    return tl::make_unexpected(with_likely_reading(spread.error(), batch, cell));
+  const auto with_reading = [&](const Error& why) {
+    return tl::make_unexpected(has_gauges(batch) ? why : with_likely_reading(why, batch, cell));
+  };
+  if (const Status poses = check_poses(batch, cell, where); !poses) return with_reading(poses.error());
+  if (const Status spread = check_spreads(batch, cell, where); !spread) return with_reading(spread.error());
   fill_velocity(batch);
   std::vector<bool> is_held_out = hold_out(batch);
   return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));

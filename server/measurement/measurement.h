@@ -7,6 +7,7 @@
 
 #include "server/base/result.h"
 #include "server/robot/cell.h"
+#include "server/robot/gauge.h"
 #include "server/robot/pose_context.h"
 
 /// Measured tool poses with the joints that were commanded.
@@ -17,9 +18,10 @@ enum class MeasurementSet { kUnassigned, kTrain, kValidation };
 struct Measurement {
   std::string pose_id;
   PoseContext context;
-  Vector3 p_W = Vector3::Zero();         ///< tool point as measured, m
+  Vector3 p_W = Vector3::Zero();         ///< tool point as measured, m; of a gauge it is not a number
   std::optional<Matrix3> R_WT;           ///< tool orientation as measured, active W <- T
-  std::optional<double> sigma;           ///< m, of one axis of this point
+  std::optional<Gauge> gauge;            ///< one number instead of a position (gauges.h)
+  std::optional<double> sigma;           ///< m, of one axis of this point, or of the gauge
   std::optional<double> sigma_rotation;  ///< rad, of one axis of this orientation, where it is not the tracker's
   MeasurementSet set = MeasurementSet::kUnassigned;
   std::string session_id;          ///< as recorded: one set-up of the instrument; empty: the batch is one
@@ -53,7 +55,9 @@ struct MeasurementBatch {
 /// Reads the batch CSV of DESIGN section 3. Refuses, naming `where`, row, column, value and limit: an empty file, a
 /// missing or doubled column, a row of another length, a number that is not finite, a quaternion that is not a unit one
 /// (limit 1e-3), a sigma that is not positive, a direction outside -1, 0, +1, two rows with one pose_id. In an optional
-/// column an empty field means that nothing was recorded. Joints are counted, not checked against a robot.
+/// column an empty field means that nothing was recorded. Joints are counted, not checked against a robot. A row tells
+/// a position, or one of `distance_mm` and `touch_mm` with `anchor_id`, perhaps against the pose `minus_pose_id`; a row
+/// that others name so may tell nothing, and is then no measurement.
 [[nodiscard]] Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_batch_csv(const std::string& path);
 /// The batch as parse_batch_csv() reads it; optional columns only where a row has them.

@@ -18,6 +18,7 @@ constexpr double kRotationStep = 1e-14;  // rad
 using Group = std::vector<const Measurement*>;
 
 bool are_repeats(const Measurement& a, const Measurement& b) {
+  if (a.gauge || b.gauge) return false;  // at one pose, several instruments tell different numbers
   if (a.context.velocity || b.context.velocity || a.set != b.set || a.session != b.session) return false;
   if (a.context.tool != b.context.tool || a.context.payload != b.context.payload) return false;
   if (a.context.direction != b.context.direction || a.context.q.size() != b.context.q.size()) return false;

@@ -31,20 +31,25 @@ struct Compared {
   std::string text;  ///< of which poses
 };
 
+/// Rows that were compared, with a position or without.
+int rows_of(const Evaluation& evaluation) {
+  return evaluation.poses + (evaluation.gauges ? evaluation.gauges->rows : 0);
+}
+
 Compared compared_with(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
   const CompensatedModel::Parts& parts = model.parts();
   if (batch) {
     Evaluation evaluation = model.evaluate(*batch);
-    return {evaluation, fmt::format("On the {} poses of batch {}.", evaluation.poses, batch->id)};
+    return {evaluation, fmt::format("On the {} poses of batch {}.", rows_of(evaluation), batch->id)};
   }
   if (parts.validation) {
     return {*parts.validation, fmt::format("On {} poses of batch {} that were held out from training.",
-                                           parts.validation->poses, parts.provenance.figures_batch_id())};
+                                           rows_of(*parts.validation), parts.provenance.figures_batch_id())};
   }
   return {parts.training,
           fmt::format("On the {} poses of batch {} that the model was trained on: the compensated error "
                       "is smaller here than on new poses.",
-                      parts.training.poses, parts.provenance.figures_batch_id())};
+                      rows_of(parts.training), parts.provenance.figures_batch_id())};
 }
 
 std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evaluation& evaluation) {
@@ -56,7 +61,19 @@ std::array<std::pair<const char*, const ErrorFigures*>, 3> levels_of(const Evalu
 /// What is no gain is not shown as one.
 bool is_doubtful(const Evaluation& evaluation) { return doubt_of_bias(evaluation).has_value(); }
 
+/// Of distances and touches: their values, where no position was measured.
+std::string gauge_tiles(const GaugeFigures& gauges) {
+  std::string html;
+  for (const auto& [level, rms] : {std::pair("nominal", gauges.nominal), std::pair("calibrated", gauges.calibrated),
+                                   std::pair("compensated", gauges.compensated)}) {
+    html += fmt::format(R"(<div class="tile {0}"><b>{1:.3f} mm</b><span>{0}, rms of distances</span></div>)", level,
+                        to_mm(rms));
+  }
+  return html;
+}
+
 std::string tiles(const Evaluation& evaluation) {
+  if (evaluation.poses == 0 && evaluation.gauges) return gauge_tiles(*evaluation.gauges);
   std::string html;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     const bool doubtful = figures == &evaluation.compensated && is_doubtful(evaluation);
@@ -76,6 +93,7 @@ std::string warnings(const CompensatedModel& model, const Evaluation& evaluation
 }
 
 std::string figures_table(const Evaluation& evaluation) {
+  if (evaluation.poses == 0) return "";
   std::vector<HtmlRow> rows;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     std::vector<std::string> cells = {level};
@@ -159,8 +177,15 @@ std::string provenance_rows(const CompensatedModel& model, const Evaluation& eva
                              provenance.training_poses, provenance.seed, provenance.program_version));
   for (const RefitRecord& refit : provenance.refits) add("identified anew", refit_text(refit));
   add("joints of the training", trained_ranges(model));
-  add("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses));
-  add("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95));
+  if (evaluation.poses > 0) {
+    add("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses));
+    add("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95));
+  }
+  if (const auto& gauges = evaluation.gauges) {
+    add("distances and touches",
+        fmt::format("{}: {:.4f} mm rms of the value, {:.1f} % inside their 95 % interval, {} in domain", gauges->rows,
+                    to_mm(gauges->compensated), 100 * gauges->coverage_95, gauges->in_domain));
+  }
   add("negative log predictive density",
       evaluation.nlpd ? fmt::format("{:.3f} nat a coordinate, mm", nlpd_in_mm(*evaluation.nlpd)) : "-");
   add("left over beyond the tracker's sigma", fmt::format("{:.4f} mm per axis, calibrated", to_mm(parts.discrepancy)));
@@ -285,7 +310,9 @@ ordered_json chart_data(const CompensatedModel& model, const std::optional<Measu
                         const Evaluation& evaluation) {
   ordered_json data;
   if (is_doubtful(evaluation)) data["doubtful"] = true;
+  data["levels"] = ordered_json::object();
   for (const auto& [level, figures] : levels_of(evaluation)) {
+    if (evaluation.poses == 0) break;
     data["levels"][level] = {to_mm(figures->rms), to_mm(figures->mean), to_mm(figures->p997), to_mm(figures->max)};
   }
   const auto& bias = model.bias();

@@ -11,6 +11,7 @@
 #include "server/robot/cell.h"
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
+#include "server/robot/gauge.h"
 
 namespace trammel {
 
@@ -162,6 +163,67 @@ void read_payloads(const YamlMap& map, Cell& cell) {
   }
 }
 
+/// A direction of length 1.
+Vector3 read_direction(const YamlMap& map, const std::string& key) {
+  const Vector3 direction = read_vector(map, key);
+  if (direction.norm() < 1e-9) map.refuse(key, "a direction of length 0");
+  return direction.normalized();
+}
+
+double read_radius(const YamlMap& map, const std::string& key) {
+  const double radius = map.number(key);
+  if (!(radius > 0)) map.refuse(key, refused("must be above 0").beyond(radius, 0));
+  return from_mm(radius);
+}
+
+/// A point where no key says that it is a sphere, a plane or a ring.
+void read_shape(const YamlMap& map, Anchor& anchor) {
+  const bool sphere = map.has("sphere_radius_mm"), plane = map.has("plane_normal"), ring = map.has("ring_axis");
+  if (sphere + plane + ring > 1)
+    map.refuse(plane ? "plane_normal" : "ring_axis", "an anchor is one of sphere, plane and ring");
+  if (ring != map.has("ring_radius_mm")) map.refuse("ring_radius_mm", "ring_axis and ring_radius_mm belong together");
+  if (sphere) {
+    anchor.shape = Anchor::Shape::kSphere;
+    anchor.radius = read_radius(map, "sphere_radius_mm");
+  } else if (plane) {
+    anchor.shape = Anchor::Shape::kPlane;
+    anchor.direction_W = read_direction(map, "plane_normal");
+  } else if (ring) {
+    anchor.shape = Anchor::Shape::kRing;
+    anchor.direction_W = read_direction(map, "ring_axis");
+    anchor.radius = read_radius(map, "ring_radius_mm");
+  }
+  if ((plane || ring) && !anchor.p_W) map.refuse("xyz_mm", "where a plane or a ring is must be known");
+}
+
+Anchor read_anchor(const YamlMap& map) {
+  map.only({"xyz_mm", "zero_mm", "sigma_mm", "sphere_radius_mm", "plane_normal", "ring_axis", "ring_radius_mm"});
+  Anchor anchor;
+  if (!map.is_null("xyz_mm")) anchor.p_W = read_vector(map, "xyz_mm") * from_mm(1);
+  if (!map.is_null("zero_mm")) anchor.zero = from_mm(map.number("zero_mm"));
+  anchor.zero_open = map.has("zero_mm") && map.is_null("zero_mm");
+  if (!map.is_null("sigma_mm")) {
+    const double sigma = map.number("sigma_mm");
+    if (!(sigma > 0)) map.refuse("sigma_mm", refused("must be above 0").beyond(sigma, 0));
+    anchor.sigma = from_mm(sigma);
+  }
+  read_shape(map, anchor);
+  return anchor;
+}
+
+Anchors read_anchors(const YamlMap& map) {
+  Anchors all;
+  if (map.is_null("anchors")) return all;
+  const YamlMap anchors = map.map("anchors");
+  for (const std::string& name : anchors.keys()) {
+    anchors.attempt([&] {
+      check_key(anchors, name, "anchor");
+      all[name] = anchors.is_null(name) ? Anchor{} : read_anchor(anchors.map(name));
+    });
+  }
+  return all;
+}
+
 void read_model(const YamlMap& map, Cell& cell) {
   if (!map.has("model")) return;
   const YamlMap model = map.map("model");
@@ -242,7 +304,7 @@ CellRules read_rules(const YamlMap& map) {
 
 Cell read_cell_map(const YamlMap& map) {
   map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior", "controller_compensates"});
+            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior", "controller_compensates", "anchors"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -258,6 +320,7 @@ Cell read_cell_map(const YamlMap& map) {
   read_surroundings(map, cell);
   map.attempt([&] { read_tools(map, cell); });
   map.attempt([&] { read_payloads(map, cell); });
+  map.attempt([&] { static_cast<void>(read_anchors(map)); });
   map.attempt([&] { read_model(map, cell); });
   static_cast<void>(read_rules(map));
   return cell;
@@ -363,6 +426,11 @@ std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
 Result<CellRules> rules_of(const Cell& cell) {
   if (cell.cell_yaml.empty()) return CellRules{};
   return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_rules(map); });
+}
+
+Result<Anchors> anchors_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return Anchors{};
+  return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_anchors(map); });
 }
 
 Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_yaml, const std::string& where) {

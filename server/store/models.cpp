@@ -119,7 +119,7 @@ void insert_model(SQLite::Database& database, const std::string& cell, int versi
          "INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
          "content) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
          cell, version, from.id, from.hash, from.level, from.batch_id, unix_now(), from.training_poses,
-         validation ? validation->compensated.rms : 0.0, content);
+         validation && validation->poses > 0 ? validation->compensated.rms : 0.0, content);
   insert_model_times(database, cell, version, from);
 }
 

@@ -13,6 +13,7 @@
 #include "server/calibrate/refit.h"
 #include "server/plan/plan.h"
 #include "tests/support/demand.h"
+#include "tests/support/gauged_arm.h"
 #include "tests/support/heavy_arm.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_robot.h"
@@ -149,6 +150,30 @@ void link_weights(int seeds) {
               1.05 * 0.013 * std::sqrt(3.0), longest);
 }
 
+/// Draw wires to three anchors, 200 distances, beside the Cramér-Rao bound and 200 positions of the same sigma.
+void draw_wires(int seeds) {
+  constexpr double kSigma = 0.05;  // mm
+  const auto anchors = test::three_corners();
+  for (const bool known : {true, false}) {
+    double missed = 0, least = 0, by_positions = 0;
+    for (int k = 1; k <= seeds; ++k) {
+      const auto seed = static_cast<std::uint64_t>(k);
+      const test::GaugedArm arm = test::gauged_arm(seed, anchors, known ? "" : test::unknown_places(anchors));
+      const auto rows = test::wire_rows(arm, 200, seed);
+      const auto found = [&](const std::vector<test::GaugeRow>& of) {
+        return test::demand(
+            calibrate(arm.cell, {"base", "geometry", "compliance"}, test::gauge_batch(arm, of, kSigma, seed), {}));
+      };
+      missed += std::pow(test::volumetric_mm(arm, found(rows), !known, 1000 + seed), 2);
+      least += std::pow(test::least_volumetric_mm(arm, rows, kSigma, known, !known, 1000 + seed), 2);
+      by_positions +=
+          std::pow(test::volumetric_mm(arm, found(test::position_rows(arm, 200, seed)), !known, 1000 + seed), 2);
+    }
+    std::printf("200 distances to %s anchors, rms over the bound: %.3f (aim 1.1), over 200 positions: %.3f (aim 2.5)\n",
+                known ? "known" : "unknown", std::sqrt(missed / least), std::sqrt(missed / by_positions));
+  }
+}
+
 }  // namespace
 }  // namespace trammel
 
@@ -158,4 +183,5 @@ int main(int argc, char** argv) {
   trammel::speed_beside_scipy();
   trammel::refit_beside_maps();
   trammel::link_weights(20);
+  trammel::draw_wires(20);
 }

@@ -40,6 +40,23 @@ TEST(EvaluationJson, HasAnOrientationInDegreesWhereOneWasMeasuredAndSoHasTheText
             std::string::npos);
 }
 
+TEST(EvaluationJson, TellsDistancesByThemselvesAndNoFigureOfPositionsWhereNoneWasMeasured) {
+  Evaluation wires;
+  wires.nominal = wires.calibrated = wires.compensated = no_figures();
+  wires.gauges = {12, 3e-3, 6e-5, 5e-5, 1e-4, .9, 11};
+  const auto alone = evaluation_json(wires);
+  EXPECT_FALSE(alone.contains("rms_mm"));
+  EXPECT_FALSE(alone.contains("levels"));
+  EXPECT_EQ(alone["gauges"]["rows"], 12);
+  EXPECT_NEAR(alone["gauges"]["rms_mm"], 0.05, 1e-12);
+  EXPECT_EQ(evaluation_table(wires).find("nan"), std::string::npos);
+  EXPECT_NE(evaluation_table(wires).find("mm rms of 12 values"), std::string::npos);
+  Evaluation both = evaluation();
+  both.gauges = wires.gauges;
+  EXPECT_NEAR(evaluation_json(both)["rms_mm"], 0.1, 1e-12) << "of positions, as before";
+  EXPECT_EQ(evaluation_json(both)["gauges"]["in_domain"], 11);
+}
+
 TEST(ResidualsCsv, HasARowAPoseInMillimetresAndMarksSuspects) {
   MeasurementBatch batch;
   for (const char* id : {"p1", "p,2"}) {

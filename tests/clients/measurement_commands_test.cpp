@@ -45,6 +45,64 @@ TEST_F(MeasurementCommands, ConvertJoinsPointsWithThePlan) {
   EXPECT_EQ(json("out.json")["not_measured"], 1);
 }
 
+TEST_F(MeasurementCommands, ConvertReadsLeicaTrackerPilotBesideThePlan) {
+  const std::string points =
+      folder_.write("leica.csv",
+                    "Leica Tracker Pilot;AT960\nOperator;Ada\n"
+                    "Point ID;X [mm];Y [mm];Z [mm];U95 [mm];Q0;Q1;Q2;Q3;Timestamp;Temperature [\xC2\xB0"
+                    "C];Pressure [hPa];Humidity [%]\n"
+                    "p2;1520,013;310,552;1204,871;0,0346410;0,5;0,5;0,5;0,5;2026-11-22 10:11:12.5;20,4;1013,2;41\n"
+                    "p1;-3,5;2;1;;1;0;0;0;22.11.2026 10:11:20;20,5;1013,2;41\n");
+  const std::string plan = folder_.write("plan.csv", "pose_id,q1_deg\np1,10\np2,20\n");
+  ASSERT_EQ(trammel({"convert", "--points", points, "--joints", plan, "-o", folder_.file("batch.csv")}), 0);
+  const MeasurementBatch read = test::demand(read_batch_csv(folder_.file("batch.csv")));
+  ASSERT_EQ(read.measurements.size(), 2u);
+  const Measurement& first = read.measurements[0];
+  EXPECT_EQ(first.pose_id, "p2");
+  EXPECT_TRUE(first.p_W.isApprox(Vector3(1.520013, 0.310552, 1.204871), 1e-12));
+  EXPECT_NEAR(first.sigma.value(), 1e-5, 1e-10) << "U95 of three axes, k = 2";
+  EXPECT_TRUE(first.R_WT.value().isApprox(Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5).toRotationMatrix(), 1e-12));
+  EXPECT_NEAR(first.context.time.value(), 1795342272.5, 1e-6);
+  EXPECT_NEAR(read.measurements[1].context.time.value() - first.context.time.value(), 7.5, 1e-6);
+  EXPECT_FALSE(read.measurements[1].sigma);
+  EXPECT_FALSE(first.context.temperature) << "the air is not the arm";
+  ASSERT_GE(read.extra_columns.size(), 3u);
+  EXPECT_EQ(read.extra_columns[0], "air_temperature_c");
+  EXPECT_EQ(first.extra[0], "20.4");
+}
+
+TEST_F(MeasurementCommands, ConvertJoinsPointsInTheirOrderWhereNamesSayNothing) {
+  const std::string points = folder_.write("leica.csv", "Point ID;X [mm];Y [mm];Z [mm]\n17;1;2;3\n18;4;5;6\n");
+  const std::string plan = folder_.write("plan.csv", "pose_id,q1_deg\na,10\nb,20\n");
+  const std::vector<std::string> by_name = {
+      "convert", "--points", points, "--joints", plan, "-o", folder_.file("batch.csv")};
+  EXPECT_EQ(trammel(by_name), 3);
+  std::vector<std::string> in_order = by_name;
+  in_order.emplace_back("--in-order");
+  ASSERT_EQ(trammel(in_order), 0);
+  const MeasurementBatch read = test::demand(read_batch_csv(folder_.file("batch.csv")));
+  EXPECT_EQ(read.measurements.at(1).pose_id, "b");
+  EXPECT_NEAR(read.measurements.at(1).p_W.x(), 4e-3, 1e-15);
+  folder_.write("plan.csv", "pose_id,q1_deg\na,10\nb,20\nc,30\n");
+  EXPECT_EQ(trammel(in_order), 3) << "another number of poses";
+}
+
+TEST_F(MeasurementCommands, ConvertReadsATableWithoutAHeaderByItsColumns) {
+  const std::string table =
+      folder_.write("log.txt", "# recorded by hand\n17 0.5 -1.5 1.52 0.31 1.2\n18 0.6 -1.4 1.5 0.3 1.1\n");
+  const std::string batch = folder_.file("batch.csv");
+  ASSERT_EQ(trammel({"convert", "--table", table, "--columns", "-,q1_rad,q2_rad,x_m,y_m,z_m", "-o", batch}), 0);
+  const MeasurementBatch read = test::demand(read_batch_csv(batch));
+  ASSERT_EQ(read.measurements.size(), 2u);
+  EXPECT_NEAR(read.measurements[0].context.q(1), -1.5, 1e-11);
+  EXPECT_NEAR(read.measurements[1].p_W.z(), 1.1, 1e-12);
+  EXPECT_EQ(trammel({"convert", "--table", table, "--columns", "q1_rad,q2_rad,x_m,y_m,z_m", "-o", batch}), 3);
+  EXPECT_EQ(trammel({"convert", "--table", table, "-o", batch}), 2);
+  const std::string commas = folder_.write("log2.txt", "0,5;-1,5;1520,5;310;1200\n");
+  ASSERT_EQ(trammel({"convert", "--table", commas, "--columns", "q1_deg,q2_deg,x_mm,y_mm,z_mm", "-o", batch}), 0);
+  EXPECT_NEAR(test::demand(read_batch_csv(batch)).measurements.at(0).p_W.x(), 1.5205, 1e-12);
+}
+
 TEST_F(MeasurementCommands, ConvertReadsRoboDk) {
   const std::string robodk = folder_.write("rdk.csv", "J1;X;Y;Z\n10;1,5;2;3\n");
   ASSERT_EQ(trammel({"convert", "--robodk", robodk, "-o", folder_.file("batch.csv")}), 0);

@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/files/references.h"
+#include "server/measurement/gauges.h"
 
 namespace trammel::cli {
 
@@ -16,8 +17,10 @@ namespace {
 using nlohmann::ordered_json;
 
 struct ConvertArguments {
-  std::string points, joints, robodk, unit, coordinates, behind, tool, payload, output, json;
+  std::string points, joints, robodk, table, unit, coordinates, behind, tool, payload, output, json;
+  std::vector<std::string> columns;
   double coverage = 1;
+  bool in_order = false;
 };
 
 const std::map<std::string, LengthUnit> kUnits = {
@@ -53,13 +56,18 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
   if (!arguments.robodk.empty()) {
     return read_robodk_csv(arguments.robodk).map([](MeasurementBatch batch) { return Converted{std::move(batch), 0}; });
   }
+  if (!arguments.table.empty()) {
+    return read_batch_table(arguments.table, arguments.columns).map([](MeasurementBatch batch) {
+      return Converted{std::move(batch), 0};
+    });
+  }
   const PointFileOptions options{said(kUnits, arguments.unit), said(kCoordinates, arguments.coordinates),
                                  said(kBehind, arguments.behind), arguments.coverage};
   const Result<PointList> points = read_points(arguments.points, options);
   if (!points) return tl::make_unexpected(points.error());
   const Result<JointList> joints = read_joint_csv(arguments.joints);
   if (!joints) return tl::make_unexpected(joints.error());
-  return join_points(*points, *joints).map([&](MeasurementBatch batch) {
+  return join_points(*points, *joints, arguments.in_order).map([&](MeasurementBatch batch) {
     const std::size_t not_measured = joints->poses.size() - batch.measurements.size();
     return Converted{std::move(batch), not_measured};
   });
@@ -155,6 +163,7 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
         .with_text(check.worst);
   }
   return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
+    if (Status positions = require_positions(batch, "references --batch"); !positions) return positions;
     const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
     return write_output(arguments.output, to_csv(localised(std::move(batch), X_WV)));
   });
@@ -181,13 +190,29 @@ void add_convert(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Make a batch of measurements that other programs exported");
   CLI::Option_group* what = command->add_option_group("Measurements");
-  CLI::Option* points = what->add_option("--points", arguments->points,
-                                         "Points or frames exported by SpatialAnalyzer (ASCII), with --joints");
+  CLI::Option* points =
+      what->add_option("--points", arguments->points,
+                       "Points or frames exported by SpatialAnalyzer (ASCII) or Leica Tracker Pilot (CSV), "
+                       "with --joints");
   what->add_option("--robodk", arguments->robodk, "Measurements exported by a RoboDK calibration project (CSV)");
+  CLI::Option* table =
+      what->add_option("--table", arguments->table, "A table without a header line, whose --columns you tell");
   what->require_option(1);
+  CLI::Option* columns =
+      command
+          ->add_option("--columns", arguments->columns,
+                       "Columns of --table in their order, joined by commas: q1_deg,...,x_mm,y_mm,z_mm and any other "
+                       "of a batch; _rad and _m for other units, - to pass one over")
+          ->delimiter(',')
+          ->needs(table);
+  table->needs(columns);
   command
       ->add_option("--joints", arguments->joints,
                    "Plan that was measured (CSV: joints in deg, rails in mm); its pose_id is the point's name")
+      ->needs(points);
+  command
+      ->add_flag("--in-order", arguments->in_order,
+                 "The first point measures the first pose, and so on: names do not count")
       ->needs(points);
   command->add_option("--unit", arguments->unit, "Unit of the points' lengths where the file does not say; else mm")
       ->check(one_of(kUnits))

@@ -14,6 +14,7 @@
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
 #include "server/error_sources/cause_words.h"
+#include "server/measurement/gauges.h"
 #include "server/report/model_page.h"
 #include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
@@ -25,6 +26,11 @@ namespace {
 
 std::int64_t unix_time() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+/// Rows that were compared, with a position or without.
+int rows_of(const Evaluation& evaluation) {
+  return evaluation.poses + (evaluation.gauges ? evaluation.gauges->rows : 0);
 }
 
 struct TrainArguments {
@@ -144,11 +150,11 @@ Status train_model(const TrainArguments& arguments) {
   const auto& parts = model->parts();
   const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
   tell(model_text(*model) + unlike_text(unlike) +
-           (parts.validation
-                ? fmt::format("on {} poses held out:\n", parts.validation->poses) + evaluation_table(*parts.validation)
-                : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
-                              parts.training.poses, parts.provenance.figures_batch_id()) +
-                      evaluation_table(parts.training)),
+           (parts.validation ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
+                                   evaluation_table(*parts.validation)
+                             : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
+                                           rows_of(parts.training), parts.provenance.figures_batch_id()) +
+                                   evaluation_table(parts.training)),
        {arguments.output, arguments.json});
   nlohmann::ordered_json json = model_json(*model);
   if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
@@ -186,13 +192,22 @@ Status evaluate(const EvaluateArguments& arguments) {
   const Result<InWorld> world = in_world_of(*model, batch->rows());
   if (!world) return tl::make_unexpected(world.error());
   const Evaluation evaluation = model->evaluate(world->batch);
-  const CompensatedModel::LevelErrors errors = model->errors_B(world->batch);
-  const std::string structure = structure_note(*model, world->batch, errors);
-  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, evaluation.poses, batch->id()) +
+  if (has_gauges(world->batch) && !arguments.residuals.empty() && has_positions(world->batch)) {
+    return failure(ErrorCode::kUsage, "residuals of positions and of distances or touches go into two files")
+        .of("--residuals")
+        .next("evaluate the rows of each kind by themselves");
+  }
+  const MeasurementBatch positions = positions_of(world->batch);
+  const CompensatedModel::LevelErrors errors = model->errors_B(positions);
+  const std::string structure = positions.measurements.empty() ? "" : structure_note(*model, positions, errors);
+  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, rows_of(evaluation), batch->id()) +
            evaluation_table(evaluation) + located_text(*world) + (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
-    const Status written = write_output(arguments.residuals, residuals_csv(world->batch, errors));
+    const Status written =
+        write_output(arguments.residuals, has_gauges(world->batch)
+                                              ? gauge_residuals_csv(world->batch, model->gauge_errors(world->batch))
+                                              : residuals_csv(positions, errors));
     if (!written) return written;
   }
   nlohmann::ordered_json json = evaluation_json(evaluation);
@@ -211,6 +226,7 @@ Status report(const ReportArguments& arguments) {
   if (!arguments.batch.empty()) {
     const Result<CheckedBatch> checked = read_checked_batches({arguments.batch}, model->cell());
     if (!checked) return tl::make_unexpected(checked.error());
+    if (const Status positions = require_positions(checked->rows(), "report --batch"); !positions) return positions;
     Result<InWorld> world = in_world_of(*model, checked->rows());
     if (!world) return tl::make_unexpected(world.error());
     batch = std::move(world->batch);

@@ -1,5 +1,7 @@
 #include "clients/cli/text/evaluation_text.h"
 
+#include <cmath>
+
 #include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
@@ -40,6 +42,28 @@ std::string orientation_lines(const std::optional<OrientationFigures>& orientati
   return text + "\n";
 }
 
+std::string gauge_lines(const std::optional<GaugeFigures>& gauges) {
+  if (!gauges) return "";
+  return fmt::format(
+      "  distances and touches, mm rms of {} values (of the value, not of a position): nominal {:.4f}, calibrated "
+      "{:.4f}, compensated {:.4f}, max {:.4f}; {} in domain; {:.1f} % inside their 95 % interval\n",
+      gauges->rows, to_mm(gauges->nominal), to_mm(gauges->calibrated), to_mm(gauges->compensated), to_mm(gauges->max),
+      gauges->in_domain, 100 * gauges->coverage_95);
+}
+
+ordered_json gauges_json(const GaugeFigures& gauges) {
+  const auto level = [](double rms) { return ordered_json{{"rms_mm", to_mm(rms)}}; };
+  return {{"rows", gauges.rows},
+          {"rms_mm", to_mm(gauges.compensated)},
+          {"max_mm", to_mm(gauges.max)},
+          {"levels",
+           {{"nominal", level(gauges.nominal)},
+            {"calibrated", level(gauges.calibrated)},
+            {"compensated", level(gauges.compensated)}}},
+          {"coverage_95", gauges.coverage_95},
+          {"in_domain", gauges.in_domain}};
+}
+
 ordered_json orientation_json(const OrientationFigures& orientation) {
   ordered_json json = {{"poses", orientation.poses}};
   const auto level = [](double rms) { return ordered_json{{"rms_deg", to_deg(rms)}}; };
@@ -53,12 +77,14 @@ ordered_json orientation_json(const OrientationFigures& orientation) {
 }  // namespace
 
 std::string evaluation_table(const Evaluation& evaluation) {
+  if (evaluation.poses == 0 && evaluation.gauges) return gauge_lines(evaluation.gauges);
   return fmt::format("  {:<12}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
          figures_line("nominal", evaluation.nominal) + figures_line("calibrated", evaluation.calibrated) +
          figures_line("compensated", evaluation.compensated) +
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
                      evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
-         nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + doubt_line(evaluation);
+         nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + gauge_lines(evaluation.gauges) +
+         doubt_line(evaluation);
 }
 
 std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors) {
@@ -84,6 +110,23 @@ std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel:
   return text;
 }
 
+std::string gauge_residuals_csv(const MeasurementBatch& batch, const CompensatedModel::GaugeErrors& errors) {
+  constexpr double kSuspect = 4.89;  // of one number, that 1 in 10^6 good ones exceeds
+  std::string text = "pose_id,row,anchor_id,value_mm,error_mm,s_mm,z,calibrated_mm,nominal_mm,in_domain,suspect\n";
+  const auto rounded = [](double value) { return fmt::format("{:.6g}", value); };
+  for (std::size_t i = 0; i < errors.rows.size(); ++i) {
+    const Measurement& m = batch.measurements[errors.rows[i]];
+    const auto at = static_cast<Eigen::Index>(i);
+    const double z = errors.compensated(at) / errors.stddev(at);
+    text +=
+        fmt::format("{},{},{},{:.6f},{},{},{},{},{},{},{}\n", csv_field(m.pose_id), m.row, csv_field(m.gauge->anchor),
+                    to_mm(m.gauge->value), rounded(to_mm(errors.compensated(at))), rounded(to_mm(errors.stddev(at))),
+                    rounded(z), rounded(to_mm(errors.calibrated(at))), rounded(to_mm(errors.nominal(at))),
+                    errors.in_domain[i] ? 1 : 0, std::abs(z) > kSuspect ? 1 : 0);
+  }
+  return text;
+}
+
 std::string structure_note(const CompensatedModel& model, const MeasurementBatch& batch,
                            const CompensatedModel::LevelErrors& errors) {
   const auto structured = most_structured(residual_orders(model, batch, errors.calibrated));
@@ -92,6 +135,8 @@ std::string structure_note(const CompensatedModel& model, const MeasurementBatch
 
 ordered_json evaluation_json(const Evaluation& evaluation) {
   ordered_json json = {{"poses", evaluation.poses}};
+  if (evaluation.gauges) json["gauges"] = gauges_json(*evaluation.gauges);
+  if (evaluation.poses == 0 && evaluation.gauges) return json;  // figures of positions would be of nothing
   json.update(figures_json(evaluation.compensated));
   json["levels"] = {{"nominal", figures_json(evaluation.nominal)},
                     {"calibrated", figures_json(evaluation.calibrated)},

@@ -38,7 +38,7 @@ struct ToolPoses {
 ToolPoses poses_of(const std::string& tool, const MeasurementBatch& batch, const Chain& robot) {
   ToolPoses poses;
   for (const Measurement& m : batch.measurements) {
-    if (m.context.tool != tool) continue;
+    if (m.gauge || m.context.tool != tool) continue;
     poses.X_BF.push_back(robot.flange_pose(m.context.q));
     poses.points_W.push_back(m.p_W);
     if (!m.R_WT) continue;
@@ -130,11 +130,15 @@ void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
     first += static_cast<Eigen::Index>(source->parameters().size());
   }
   if (first == model.values.size()) return;
-  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
+  std::vector<const Measurement*> placed;
+  for (const Measurement& m : batch.measurements) {
+    if (!m.gauge) placed.push_back(&m);
+  }
+  const auto n = static_cast<Eigen::Index>(placed.size());
   Eigen::Matrix3Xd measured(3, n);
   Eigen::Matrix3Xd nominal(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    const Measurement& m = *placed[static_cast<std::size_t>(i)];
     measured.col(i) = model.X_WB.inverse() * m.p_W;
     nominal.col(i) = model.X_WB.inverse() * model.nominal_pose_W(m.context).translation();
   }

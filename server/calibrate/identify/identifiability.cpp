@@ -49,8 +49,13 @@ UnidentifiableCombination in_words(double singular_value, const Eigen::VectorXd&
   }
   const std::string names = joined(combination.parameters);
   if (combination.parameters.size() > 1) {
-    combination.sentence =
-        fmt::format("{} move the tool the same way at these poses: only a combination of them is known", names);
+    // Of an anchor or a zero of an instrument, `ax[a1]`, `zero[a1]`: they move no tool.
+    const bool instruments =
+        std::any_of(combination.parameters.begin(), combination.parameters.end(), [](const std::string& name) {
+          return name.starts_with("zero[") || (name.size() > 3 && name[0] == 'a' && name[2] == '[');
+        });
+    combination.sentence = fmt::format("{} {} the same way at these poses: only a combination of them is known", names,
+                                       instruments ? "change what is measured" : "move the tool");
   } else if (strength(static_cast<Eigen::Index>(order.front())) < 1) {
     combination.sentence = fmt::format("{}: these poses do not show it; it stays at its prior", names);
   } else {

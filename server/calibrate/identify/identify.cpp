@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/identify/minimise.h"
 #include "server/calibrate/identify/own_noise.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
@@ -30,10 +31,9 @@ Information decomposed(const Eigen::MatrixXd& information) {
   return {eigen.eigenvalues().cwiseMax(0).cwiseSqrt(), eigen.eigenvectors()};
 }
 
-/// m: how far the positions are off but for the tenth that is farthest: single wrong rows make no batch wrong, and are
-/// suspects.
-double rms_of_most(const Eigen::Matrix3Xd& residuals) {
-  Eigen::VectorXd square = residuals.colwise().squaredNorm();
+/// m: how far positions or gauges are off (`square`, m²) but for the tenth that is farthest: single wrong rows make no
+/// batch wrong, and are suspects.
+double rms_of_most(Eigen::VectorXd square) {
   std::sort(square.begin(), square.end());
   const Eigen::Index most = square.size() - square.size() / 10;
   return std::sqrt(square.head(most).mean());
@@ -41,7 +41,7 @@ double rms_of_most(const Eigen::Matrix3Xd& residuals) {
 
 /// Refuses joints and positions that are not of one robot: `rms` (m), what identification leaves, is then a good part
 /// of the way that the tool went.
-Status check_belongs(const MeasurementBatch& batch, double rms) {
+Status check_positions_belong(const MeasurementBatch& batch, double rms) {
   Vector3 mean = Vector3::Zero();
   for (const Measurement& m : batch.measurements) mean += m.p_W / static_cast<double>(batch.measurements.size());
   double square = 0;
@@ -56,6 +56,37 @@ Status check_belongs(const MeasurementBatch& batch, double rms) {
       .of("x_mm")
       .beyond(to_mm(rms), to_mm(std::max(kNoModelError, kNoModelShare * spread)))
       .next("look at the order of the joints, their signs and zeros, and which row belongs to which position");
+}
+
+/// The same of gauges.
+Status check_gauges_belong(const MeasurementBatch& batch, double rms) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Measurement& m : batch.measurements) {
+    if (!m.gauge) continue;
+    low = std::min(low, m.gauge->value);
+    high = std::max(high, m.gauge->value);
+  }
+  const double limit = std::max(kNoModelError, kNoModelShare * (high - low));
+  if (rms < limit) return {};
+  return refused(
+             "{:.0f} mm rms are left after identification, of values between {:.0f} and {:.0f} mm: these joints do not "
+             "lead to these distances",
+             to_mm(rms), to_mm(low), to_mm(high))
+      .in("batch " + batch.id)
+      .of("distance_mm")
+      .beyond(to_mm(rms), to_mm(limit))
+      .next(
+          "look at the base and tool of the cell file, the joints' order, signs and zeros, and which row belongs to "
+          "which anchor");
+}
+
+Status check_belongs(const MeasurementBatch& batch, const Residuals& r) {
+  if (r.gauge.size() > 0) {
+    const Status gauges = check_gauges_belong(batch, rms_of_most(r.gauge.cwiseAbs2()));
+    if (!gauges || r.position.cols() == 0) return gauges;
+  }
+  return check_positions_belong(r.gauge.size() > 0 ? positions_of(batch) : batch,
+                                rms_of_most(r.position.colwise().squaredNorm().transpose()));
 }
 
 /// How well the directions are seen: their number, and the least and geometric mean of their singular values.
@@ -183,14 +214,13 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.discrepancy_rotation = found->weights.discrepancy_rotation;
   result.log_evidence = result.log_likelihood = log_likelihood(r, found->weights);
   result.suspects = suspects_of(problem.batch, r, found->weights);
-  result.rms = std::sqrt(r.position.squaredNorm() / static_cast<double>(r.position.cols()));
+  result.rms = r.rms();
   result.converged = found->minimum.converged;
   result.sessions = found->sessions;
   result.message = found->minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;
-  if (const Status belongs = check_belongs(problem.batch, rms_of_most(r.position)); !belongs)
-    return tl::make_unexpected(belongs.error());
+  if (const Status belongs = check_belongs(problem.batch, r); !belongs) return tl::make_unexpected(belongs.error());
   add_posterior(found->minimum.information, s, problem.batch.measurements.size(), result);
   return result;
 }

@@ -4,6 +4,7 @@
 
 #include "server/calibrate/identify/identify.h"
 #include "server/calibrate/identify/weighting.h"
+#include "server/error_sources/anchors.h"
 
 namespace trammel {
 
@@ -79,22 +80,54 @@ PhysicalModel without(const PhysicalModel& model, const std::vector<std::size_t>
   return less;
 }
 
+/// What a joint does to what was measured: weighted residual along its column, and weighted square of the column.
+struct AlongJoint {
+  double q = 0, along = 0, square = 0;
+};
+
+Vector3 joint_column(const PhysicalModel& model, const PoseContext& context, int joint) {
+  const Pose X_FT = model.tools.at(context.tool);
+  return model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(joint).head<3>();
+}
+
+AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joint, const Vector3& residual,
+                       double variance) {
+  const Vector3 column = joint_column(model, m.context, joint);
+  return {m.context.q(joint), column.dot(residual) / variance, column.squaredNorm() / variance};
+}
+
+/// Of a gauge that is told against another pose, as if the joint did nothing there: enough to find an order.
+AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint, double residual, double variance) {
+  const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
+  const GaugedLength length =
+      gauged_length(m.gauge->kind, *anchor.said, anchor.p_W(model.values), model.pose_W(m.context).translation());
+  const double column = length.by_point_W.dot(joint_column(model, m.context, joint));
+  return {m.context.q(joint), column * residual / variance, column * column / variance};
+}
+
 /// The order of `source` that explains most of the residuals through its joint's Jacobian column.
 FoundOrder best_order(const ErrorSource& source, const PhysicalModel& model, const MeasurementBatch& batch,
                       const Residuals& r, const Weights& weights) {
-  const auto n = r.position.cols();
-  Eigen::VectorXd q(n);
-  Eigen::VectorXd along(n);   // weighted residual along the column
-  Eigen::VectorXd square(n);  // weighted square of the column
+  const Eigen::Index positions = r.position.cols();
+  const Eigen::Index n = positions + r.gauge.size();
+  const double own = weights.discrepancy * weights.discrepancy;
+  const auto measurement = [&](Eigen::Index i) -> const Measurement& {
+    return batch.measurements[static_cast<std::size_t>(i)];
+  };
+  Eigen::VectorXd q(n), along(n), square(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
-    const Pose X_FT = model.tools.at(context.tool);
-    const Vector3 column =
-        model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(source.joint()).head<3>();
-    const double inverse_variance = 1 / (r.sigma(i) * r.sigma(i) + weights.discrepancy * weights.discrepancy);
-    q(i) = context.q(source.joint());
-    along(i) = inverse_variance * column.dot(r.position.col(i));
-    square(i) = inverse_variance * column.squaredNorm();
+    AlongJoint one;
+    if (i < positions) {
+      one = of_position(model, measurement(r.positions[static_cast<std::size_t>(i)]), source.joint(), r.position.col(i),
+                        r.sigma(i) * r.sigma(i) + own);
+    } else {
+      const Eigen::Index k = i - positions;
+      one = of_gauge(model, measurement(r.gauges[static_cast<std::size_t>(k)]), source.joint(), r.gauge(k),
+                     r.sigma_gauge(k) * r.sigma_gauge(k) + r.poses_of_gauge(k) * own);
+    }
+    q(i) = one.q;
+    along(i) = one.along;
+    square(i) = one.square;
   }
   return search_order(q, along, square, *source.search());
 }

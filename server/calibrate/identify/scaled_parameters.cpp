@@ -1,6 +1,7 @@
 #include "server/calibrate/identify/scaled_parameters.h"
 
 #include "server/calibrate/frames/frames.h"
+#include "server/error_sources/anchors.h"
 
 namespace trammel {
 
@@ -30,7 +31,8 @@ ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector
   Eigen::Index k = 0;
   for (const ErrorSourcePtr& source : model.sources) {
     const bool unknown = (source->cause().part == causes::Part::kBase && (!model.cell->X_WB || !held.empty())) ||
-                         (source->cause().part == causes::Part::kTool && has_unknown_tool(*model.cell));
+                         (source->cause().part == causes::Part::kTool && has_unknown_tool(*model.cell)) ||
+                         is_of_instruments(*source);
     for (Parameter parameter : source->parameters()) {
       const Eigen::Index place = k++;
       if (!held.empty() && held[static_cast<std::size_t>(place)]) continue;

@@ -25,8 +25,8 @@ struct ScaledParameters {
 };
 
 /// The priors are centred at the model's values. They are wide for a frame that the cell calls unknown, which was found
-/// with a chain that was still wrong, and for a base beside `held` parameters, which was just located. `held`: a flag
-/// for each parameter, or empty.
+/// with a chain that was still wrong, for what is unknown of the instruments, and for a base beside `held` parameters,
+/// which was just located. `held`: a flag for each parameter, or empty.
 [[nodiscard]] ScaledParameters scaled_parameters(const PhysicalModel& model, const std::vector<bool>& held);
 
 }  // namespace trammel

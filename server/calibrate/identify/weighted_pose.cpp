@@ -2,11 +2,14 @@
 
 #include <cmath>
 
+#include "server/error_sources/anchors.h"
+
 namespace trammel {
 
 namespace {
 
 // Norms that 1 in 1000 good poses exceeds: roots of quantiles of chi-squared.
+constexpr double kHuberGauge = 3.29;     // 1 axis
 constexpr double kHuberPosition = 4.03;  // 3 axes
 constexpr double kHuberPose = 4.74;      // 6 axes
 constexpr double kSmallAngle = 1e-4;     // rad: below it the closed form loses digits, and its limit is exact enough
@@ -26,12 +29,24 @@ WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s
     : model_(model),
       s_(s),
       measurement_(measurement),
-      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.discrepancy)),
+      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell),
+                                    std::sqrt(gauged_poses(measurement)) * weights.discrepancy)),
       inverse_rotation_sigma_(1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
+
+bool WeightedPose::evaluate_gauge(const Eigen::VectorXd& values, double* residuals, double* jacobian) const {
+  Eigen::RowVectorXd J;
+  const double told =
+      predicted_gauge(model_, measurement_.context, *measurement_.gauge, values, jacobian != nullptr ? &J : nullptr);
+  *residuals = inverse_sigma_ * (measurement_.gauge->value - told);
+  for (Eigen::Index k = 0; jacobian != nullptr && k < s_.scale.size(); ++k)
+    jacobian[k] = -inverse_sigma_ * s_.scale(k) * J(s_.free[static_cast<std::size_t>(k)]);
+  return std::isfinite(told);
+}
 
 bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian) const {
   const Eigen::Index F = s_.scale.size();
   const Eigen::VectorXd values = s_.values_at(Eigen::Map<const Eigen::VectorXd>(x, F));
+  if (measurement_.gauge) return evaluate_gauge(values, residuals, jacobian);
   Eigen::MatrixXd J;
   const Pose X_WT = model_.pose_W(measurement_.context, values, jacobian != nullptr ? &J : nullptr);
   Eigen::Map<Eigen::VectorXd> r(residuals, size());
@@ -54,6 +69,8 @@ bool WeightedPose::evaluate(const double* x, double* residuals, double* jacobian
   return X_WT.translation().allFinite();
 }
 
-double WeightedPose::huber_limit() const { return measurement_.R_WT ? kHuberPose : kHuberPosition; }
+double WeightedPose::huber_limit() const {
+  return measurement_.gauge ? kHuberGauge : measurement_.R_WT ? kHuberPose : kHuberPosition;
+}
 
 }  // namespace trammel

@@ -14,8 +14,8 @@ class WeightedPose {
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
                const Weights& weights);
 
-  /// How many equations: 6, or 3 without an orientation.
-  [[nodiscard]] int size() const { return measurement_.R_WT ? 6 : 3; }
+  /// How many equations: 6, 3 without an orientation, 1 of a gauge.
+  [[nodiscard]] int size() const { return measurement_.gauge ? 1 : measurement_.R_WT ? 6 : 3; }
   /// At `x` (F): `residuals` (size()), and `jacobian` (size() x F by rows) unless it is null. False: not finite.
   bool evaluate(const double* x, double* residuals, double* jacobian) const;
   [[nodiscard]] double inverse_sigma() const { return inverse_sigma_; }                    ///< 1/m
@@ -24,10 +24,12 @@ class WeightedPose {
   [[nodiscard]] double huber_limit() const;
 
  private:
+  bool evaluate_gauge(const Eigen::VectorXd& values, double* residuals, double* jacobian) const;
+
   const PhysicalModel& model_;
   const ScaledParameters& s_;
   const Measurement& measurement_;
-  double inverse_sigma_;           // 1/m, of one axis, discrepancy included
+  double inverse_sigma_;           // 1/m, of one axis or of the gauge, discrepancy included
   double inverse_rotation_sigma_;  // 1/rad
 };
 

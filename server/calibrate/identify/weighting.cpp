@@ -2,28 +2,45 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "server/base/units.h"
+#include "server/error_sources/anchors.h"
 
 namespace trammel {
 
 namespace {
 
 constexpr double kSuspect = 5.5;        // norm of 3 axes that 1 in 10^6 good poses exceeds
+constexpr double kSuspectGauge = 4.89;  // the same of 1 axis
 constexpr double kSettledSigma = 2e-3;  // relative: a sigma that changes by less weighs the same
 constexpr int kBisections = 100;        // more than a double has bits
 
+/// Squared residuals, each of so many axes, with their variances and how often the model's own enters them.
+struct Squares {
+  std::vector<double> square, variance, times;
+  double axes = 0;
+
+  void add(double squared, double sigma, double often, int of_axes) {
+    square.push_back(squared);
+    variance.push_back(sigma * sigma);
+    times.push_back(often);
+    axes += of_axes;
+  }
+};
+
 /// The surplus s with sum r^2 / (sigma_i^2 + s^2) = freedom (Paule and Mandel's between-laboratory variance); 0 where
 /// the residuals are no larger than their sigmas.
-double surplus(const Eigen::Matrix3Xd& r, const Eigen::VectorXd& sigma, double freedom) {
+double surplus(const Squares& r, double freedom) {
   const auto chi2 = [&](double s) {
     double sum = 0;
-    for (Eigen::Index i = 0; i < r.cols(); ++i) sum += r.col(i).squaredNorm() / (sigma(i) * sigma(i) + s * s);
+    for (std::size_t i = 0; i < r.square.size(); ++i) sum += r.square[i] / (r.variance[i] + r.times[i] * s * s);
     return sum;
   };
-  if (r.cols() == 0 || freedom <= 0 || chi2(0) <= freedom) return 0;
+  if (r.square.empty() || freedom <= 0 || chi2(0) <= freedom) return 0;
   double low = 0;
-  double high = std::sqrt(r.squaredNorm() / freedom) + 1e-15;
+  double high = std::sqrt(std::accumulate(r.square.begin(), r.square.end(), 0.0) / freedom) + 1e-15;
   for (int k = 0; k < kBisections; ++k) {
     const double middle = 0.5 * (low + high);
     (chi2(middle) > freedom ? low : high) = middle;
@@ -35,18 +52,34 @@ double sigmas_of(const Residuals& r, Eigen::Index i, const Weights& weights) {
   return r.position.col(i).norm() / std::hypot(r.sigma(i), weights.discrepancy);
 }
 
-/// The positions that are no suspects; rotations stay.
-Residuals without_suspects(const Residuals& r, const Weights& weights) {
-  Residuals kept{r.position, r.rotation, r.sigma, r.sigma_rotation};
-  Eigen::Index count = 0;
+double variance_of_gauge(const Residuals& r, Eigen::Index i, const Weights& weights) {
+  return std::pow(r.sigma_gauge(i), 2) + r.poses_of_gauge(i) * std::pow(weights.discrepancy, 2);
+}
+
+double sigmas_of_gauge(const Residuals& r, Eigen::Index i, const Weights& weights) {
+  return std::abs(r.gauge(i)) / std::sqrt(variance_of_gauge(r, i, weights));
+}
+
+/// Positions and gauges: the model's own error is the same in any direction. With `weights` without what is a suspect
+/// under them.
+Squares lengths_of(const Residuals& r, const std::optional<Weights>& weights) {
+  Squares lengths;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
-    if (sigmas_of(r, i, weights) > kSuspect) continue;
-    kept.position.col(count) = r.position.col(i);
-    kept.sigma(count++) = r.sigma(i);
+    if (weights && sigmas_of(r, i, *weights) > kSuspect) continue;
+    lengths.add(r.position.col(i).squaredNorm(), r.sigma(i), 1, 3);
   }
-  kept.position.conservativeResize(3, count);
-  kept.sigma.conservativeResize(count);
-  return kept;
+  for (Eigen::Index i = 0; i < r.gauge.size(); ++i) {
+    if (weights && sigmas_of_gauge(r, i, *weights) > kSuspectGauge) continue;
+    lengths.add(r.gauge(i) * r.gauge(i), r.sigma_gauge(i), r.poses_of_gauge(i), 1);
+  }
+  return lengths;
+}
+
+Squares turns_of(const Residuals& r) {
+  Squares turns;
+  for (Eigen::Index i = 0; i < r.rotation.cols(); ++i)
+    turns.add(r.rotation.col(i).squaredNorm(), r.sigma_rotation(i), 1, 3);
+  return turns;
 }
 
 }  // namespace
@@ -57,31 +90,51 @@ double rotation_sigma(const Measurement& m, const Cell& cell) {
   return m.sigma_rotation.value_or(cell.tracker.sigma_rotation);
 }
 
+double gauged_poses(const Measurement& m) { return m.gauge && m.gauge->minus != nullptr ? 2 : 1; }
+
+double Residuals::rms() const {
+  if (position.cols() > 0) return std::sqrt(position.squaredNorm() / static_cast<double>(position.cols()));
+  return gauge.size() == 0 ? 0 : std::sqrt(gauge.squaredNorm() / static_cast<double>(gauge.size()));
+}
+
 Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch, const Eigen::VectorXd& values) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Residuals r{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
-  Eigen::Index turned = 0;
+  Residuals r{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n), Eigen::VectorXd(n), {}, {},
+              Eigen::VectorXd(n),     Eigen::VectorXd(n),     Eigen::VectorXd(n)};
+  Eigen::Index turned = 0, placed = 0, gauged = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    if (m.gauge) {
+      r.gauges.push_back(i);
+      r.sigma_gauge(gauged) = position_sigma(m, *model.cell);
+      r.poses_of_gauge(gauged) = gauged_poses(m);
+      r.gauge(gauged++) = m.gauge->value - predicted_gauge(model, m.context, *m.gauge, values);
+      continue;
+    }
     const Pose X_WT = model.pose_W(m.context, values, nullptr);
-    r.position.col(i) = m.p_W - X_WT.translation();
-    r.sigma(i) = position_sigma(m, *model.cell);
+    r.positions.push_back(i);
+    r.sigma(placed) = position_sigma(m, *model.cell);
+    r.position.col(placed++) = m.p_W - X_WT.translation();
     if (!m.R_WT) continue;
     r.sigma_rotation(turned) = rotation_sigma(m, *model.cell);
     r.rotation.col(turned++) = rotation_log(*m.R_WT * X_WT.linear().transpose());
   }
+  r.position.conservativeResize(3, placed);
+  r.sigma.conservativeResize(placed);
   r.rotation.conservativeResize(3, turned);
   r.sigma_rotation.conservativeResize(turned);
+  r.gauge.conservativeResize(gauged);
+  r.sigma_gauge.conservativeResize(gauged);
+  r.poses_of_gauge.conservativeResize(gauged);
   return r;
 }
 
 Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects) {
-  const double positions = 3.0 * static_cast<double>(r.position.cols());
-  const double rotations = 3.0 * static_cast<double>(r.rotation.cols());
-  const double share = std::max(0.0, 1 - freedom / (positions + rotations));
-  const Residuals trusted = drop_suspects ? without_suspects(r, before) : r;
-  return {surplus(trusted.position, trusted.sigma, 3.0 * static_cast<double>(trusted.position.cols()) * share),
-          surplus(r.rotation, r.sigma_rotation, rotations * share), true};
+  const Squares turns = turns_of(r);
+  const double all = 3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size()) + turns.axes;
+  const double share = std::max(0.0, 1 - freedom / all);
+  const Squares trusted = lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
+  return {surplus(trusted, trusted.axes * share), surplus(turns, turns.axes * share), true};
 }
 
 bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker) {
@@ -96,8 +149,13 @@ std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residu
   std::vector<SuspectPose> suspects;
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
     const double sigmas = sigmas_of(r, i, weights);
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(r.positions[static_cast<std::size_t>(i)])];
     if (sigmas > kSuspect) suspects.push_back({m.pose_id, m.row, r.position.col(i).norm(), sigmas});
+  }
+  for (Eigen::Index i = 0; i < r.gauge.size(); ++i) {
+    const double sigmas = sigmas_of_gauge(r, i, weights);
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(r.gauges[static_cast<std::size_t>(i)])];
+    if (sigmas > kSuspectGauge) suspects.push_back({m.pose_id, m.row, std::abs(r.gauge(i)), sigmas});
   }
   std::sort(suspects.begin(), suspects.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   return suspects;
@@ -113,6 +171,10 @@ double log_likelihood(const Residuals& r, const Weights& weights) {
   for (Eigen::Index i = 0; i < r.position.cols(); ++i) add(r.position.col(i), r.sigma(i), weights.discrepancy);
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {
     add(r.rotation.col(i), r.sigma_rotation(i), weights.discrepancy_rotation);
+  }
+  for (Eigen::Index i = 0; i < r.gauge.size(); ++i) {
+    const double sigmas = std::min(sigmas_of_gauge(r, i, weights), kSuspectGauge);
+    sum -= 0.5 * sigmas * sigmas + 0.5 * std::log(2 * kPi * variance_of_gauge(r, i, weights));
   }
   return sum;
 }

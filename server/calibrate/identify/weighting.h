@@ -15,17 +15,27 @@ struct Weights {
   bool estimated = false;           ///< false: not yet, the measurement's sigma counts alone
 };
 
-/// Standard deviation of one axis of the measured position, m: the measurement's own, else the tracker's.
+/// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's own, else the
+/// tracker's.
 [[nodiscard]] double position_sigma(const Measurement& m, const Cell& cell);
 /// The same of the measured orientation, rad.
 [[nodiscard]] double rotation_sigma(const Measurement& m, const Cell& cell);
 
-/// Measured - predicted in W, SI.
+/// At how many poses the model's own error enters: 1, or 2 of a gauge that is told against another pose.
+[[nodiscard]] double gauged_poses(const Measurement& m);
+
+/// Measured - predicted in W, SI. Without gauges column i is of measurement i.
 struct Residuals {
-  Eigen::Matrix3Xd position;       ///< 3 x N
-  Eigen::Matrix3Xd rotation;       ///< 3 x M, rotation vectors of the poses that have an orientation
-  Eigen::VectorXd sigma;           ///< N, of the measured positions
-  Eigen::VectorXd sigma_rotation;  ///< M, of the measured orientations
+  Eigen::Matrix3Xd position;                    ///< 3 x N, of the measurements that have a position
+  Eigen::Matrix3Xd rotation;                    ///< 3 x M, rotation vectors of the poses that have an orientation
+  Eigen::VectorXd sigma;                        ///< N, of the measured positions
+  Eigen::VectorXd sigma_rotation;               ///< M, of the measured orientations
+  std::vector<Eigen::Index> positions, gauges;  ///< which measurement each is of; empty gauges: all have positions
+  Eigen::VectorXd gauge;                        ///< G, m
+  Eigen::VectorXd sigma_gauge, poses_of_gauge;  ///< G: standard deviations; gauged_poses()
+
+  /// m: rms of the Euclidean residuals of the positions; where there are none, of the gauges.
+  [[nodiscard]] double rms() const;
 };
 
 /// At the parameter `values` instead of the model's own.

@@ -31,9 +31,21 @@ OrientationFigures orientation_from(const Json& json) {
           .coverage_95 = number_if(json, "coverage_95")};
 }
 
+GaugeFigures gauges_from(const Json& json) {
+  return {count_from(json, "rows"),           number_from(json, "nominal_m"), number_from(json, "calibrated_m"),
+          number_from(json, "compensated_m"), number_from(json, "max_m"),     number_from(json, "coverage_95"),
+          count_from(json, "in_domain")};
+}
+
 Evaluation evaluation_from(const Json& json) {
   Evaluation e;
   e.poses = count_from(json, "poses");
+  if (json.contains("gauges")) e.gauges = gauges_from(json.at("gauges"));
+  if (e.poses == 0 && e.gauges) {
+    e.nominal = e.calibrated = e.compensated = no_figures();
+    e.coverage_95 = std::numeric_limits<double>::quiet_NaN();
+    return e;
+  }
   e.nominal = figures_from(json.at("nominal"));
   e.calibrated = figures_from(json.at("calibrated"));
   e.compensated = figures_from(json.at("compensated"));

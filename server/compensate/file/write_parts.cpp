@@ -26,7 +26,18 @@ Json json_of(const OrientationFigures& o) {
   return json;
 }
 
+Json json_of(const GaugeFigures& g) {
+  return {{"rows", g.rows},
+          {"nominal_m", g.nominal},
+          {"calibrated_m", g.calibrated},
+          {"compensated_m", g.compensated},
+          {"max_m", g.max},
+          {"coverage_95", g.coverage_95},
+          {"in_domain", g.in_domain}};
+}
+
 Json json_of(const Evaluation& e) {
+  if (e.poses == 0 && e.gauges) return {{"poses", 0}, {"gauges", json_of(*e.gauges)}};
   Json json = {{"poses", e.poses},
                {"nominal", json_of(e.nominal)},
                {"calibrated", json_of(e.calibrated)},
@@ -36,6 +47,7 @@ Json json_of(const Evaluation& e) {
   if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
   if (e.bias_gain_z) json["bias_gain_z"] = *e.bias_gain_z;
   if (e.orientation) json["orientation"] = json_of(*e.orientation);
+  if (e.gauges) json["gauges"] = json_of(*e.gauges);
   return json;
 }
 

@@ -112,7 +112,7 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
 
 /// The model's held-out poses say how large its errors really are.
 double held_out_factor(const CheckRows& rows, const ModelParts& parts) {
-  if (!parts.validation) return 1;
+  if (!parts.validation || parts.validation->poses == 0) return 1;
   double expected = 0;
   for (std::size_t i = 0; i < rows.poses(); ++i) expected += rows.covariance.diagonal().segment<3>(rows.first[i]).sum();
   expected = std::sqrt(expected / static_cast<double>(rows.poses()));

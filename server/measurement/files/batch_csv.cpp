@@ -1,11 +1,15 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <map>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/measurement/files/batch_file.h"
+#include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/measurement/files/text_lines.h"
 #include "server/measurement/measurement.h"
 #include "server/measurement/pose_columns.h"
 
@@ -25,7 +29,26 @@ struct BatchColumns {
   PoseColumns pose;
   std::vector<std::size_t> position, quaternion, extra;
   std::optional<std::size_t> sigma, set, session;
+  std::optional<std::size_t> distance, touch, anchor, minus_pose;
+
+  [[nodiscard]] bool has_gauges() const { return distance || touch; }
 };
+
+/// The position, which a batch of gauges may be without.
+Status find_position(const CsvTable& table, BatchColumns& columns) {
+  if (columns.has_gauges()) {
+    Result<std::vector<std::size_t>> position = table.all_or_none(kPositionColumns);
+    if (!position) return tl::make_unexpected(position.error());
+    columns.position = std::move(*position);
+    return {};
+  }
+  for (const std::string& name : kPositionColumns) {
+    const Result<std::size_t> column = table.require(name);
+    if (!column) return tl::make_unexpected(column.error());
+    columns.position.push_back(*column);
+  }
+  return {};
+}
 
 Result<BatchColumns> find_columns(const CsvTable& table) {
   Result<PoseColumns> pose = PoseColumns::find(table);
@@ -33,13 +56,18 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   if (const Status has_joints = pose->require_joints(table); !has_joints) {
     return tl::make_unexpected(has_joints.error());
   }
-  BatchColumns columns{std::move(*pose),        {}, {}, {}, table.find("sigma_mm"), table.find("set"),
-                       table.find("session_id")};
-  for (const std::string& name : kPositionColumns) {
-    const Result<std::size_t> column = table.require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns.position.push_back(*column);
-  }
+  BatchColumns columns{std::move(*pose),
+                       {},
+                       {},
+                       {},
+                       table.find("sigma_mm"),
+                       table.find("set"),
+                       table.find("session_id"),
+                       table.find("distance_mm"),
+                       table.find("touch_mm"),
+                       table.find("anchor_id"),
+                       table.find("minus_pose_id")};
+  if (const Status position = find_position(table, columns); !position) return tl::make_unexpected(position.error());
   Result<std::vector<std::size_t>> quaternion = table.all_or_none(kQuaternionColumns);
   if (!quaternion) return tl::make_unexpected(quaternion.error());
   columns.quaternion = std::move(*quaternion);
@@ -48,7 +76,8 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   for (const std::size_t column : columns.pose.used()) used[column] = true;
   for (const std::size_t column : columns.position) used[column] = true;
   for (const std::size_t column : columns.quaternion) used[column] = true;
-  for (const auto& column : {columns.sigma, columns.set, columns.session}) {
+  for (const auto& column : {columns.sigma, columns.set, columns.session, columns.distance, columns.touch,
+                             columns.anchor, columns.minus_pose}) {
     if (column) used[*column] = true;
   }
   for (std::size_t column = 0; column < used.size(); ++column) {
@@ -57,26 +86,79 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
   return columns;
 }
 
+/// Whether the row has anything in one of these columns.
+bool says(const CsvTable& table, std::size_t row, const std::vector<std::size_t>& columns) {
+  return std::any_of(columns.begin(), columns.end(),
+                     [&](std::size_t column) { return !table.field(row, column).empty(); });
+}
+
+bool says(const CsvTable& table, std::size_t row, const std::optional<std::size_t>& column) {
+  return column && !table.field(row, *column).empty();
+}
+
 Status read_position(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
   for (std::size_t k = 0; k < 3; ++k) {
     const Result<double> value = table.number(row, columns.position[k], kPositionLimitMm);
     if (!value) return tl::make_unexpected(value.error());
     measurement.p_W(static_cast<Eigen::Index>(k)) = from_mm(*value);
   }
-  const auto empty = [&](std::size_t column) { return table.field(row, column).empty(); };
-  if (!std::all_of(columns.quaternion.begin(), columns.quaternion.end(), empty)) {
-    const Result<Matrix3> R_WT = table.rotation(row, columns.quaternion);
-    if (!R_WT) return tl::make_unexpected(R_WT.error());
-    measurement.R_WT = *R_WT;
-  }
-  if (columns.sigma && !empty(*columns.sigma)) {
-    const Result<double> sigma = table.number(row, *columns.sigma, kSigmaLimitMm);
-    if (!sigma) return tl::make_unexpected(sigma.error());
-    if (*sigma <= 0)
-      return table.refuse(row, "sigma_mm is {:g}, must be above 0", *sigma).of("sigma_mm").beyond(*sigma, 0);
-    measurement.sigma = from_mm(*sigma);
-  }
+  if (!says(table, row, columns.quaternion)) return {};
+  const Result<Matrix3> R_WT = table.rotation(row, columns.quaternion);
+  if (!R_WT) return tl::make_unexpected(R_WT.error());
+  measurement.R_WT = *R_WT;
   return {};
+}
+
+/// The one number of the row. Refuses a position beside it.
+Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
+  const bool distance = says(table, row, columns.distance);
+  const char* name = distance ? "distance_mm" : "touch_mm";
+  if (distance && says(table, row, columns.touch))
+    return table.refuse(row, "distance_mm and touch_mm in one row").of("touch_mm").next("write a row for each");
+  if (says(table, row, columns.position) || says(table, row, columns.quaternion))
+    return table.refuse(row, "{} beside a position", name).of(name).next("write a row for each");
+  Gauge gauge;
+  gauge.kind = distance ? Gauge::Kind::kDistance : Gauge::Kind::kTouch;
+  const Result<double> value = table.number(row, distance ? *columns.distance : *columns.touch, kPositionLimitMm);
+  if (!value) return tl::make_unexpected(value.error());
+  gauge.value = from_mm(*value);
+  if (says(table, row, columns.anchor)) {
+    Result<std::string> anchor = table.name(row, *columns.anchor);
+    if (!anchor) return tl::make_unexpected(anchor.error());
+    gauge.anchor = std::move(*anchor);
+  }
+  if (says(table, row, columns.minus_pose)) gauge.minus_pose = table.field(row, *columns.minus_pose);
+  if (distance && gauge.minus_pose.empty() && gauge.value <= 0)
+    return table.refuse(row, "distance_mm is {:g}, must be above 0", *value).of(name).beyond(*value, 0);
+  return gauge;
+}
+
+Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
+  if (!says(table, row, columns.sigma)) return {};
+  const Result<double> sigma = table.number(row, *columns.sigma, kSigmaLimitMm);
+  if (!sigma) return tl::make_unexpected(sigma.error());
+  if (*sigma <= 0)
+    return table.refuse(row, "sigma_mm is {:g}, must be above 0", *sigma).of("sigma_mm").beyond(*sigma, 0);
+  measurement.sigma = from_mm(*sigma);
+  return {};
+}
+
+/// What was measured: a gauge, or a position.
+Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
+  const bool gauged = says(table, row, columns.distance) || says(table, row, columns.touch);
+  if (!gauged && says(table, row, columns.minus_pose))
+    return table.refuse(row, "minus_pose_id is told, but neither distance_mm nor touch_mm").of("minus_pose_id");
+  if (gauged) {
+    Result<Gauge> gauge = read_gauge(table, row, columns);
+    if (!gauge) return tl::make_unexpected(gauge.error());
+    measurement.gauge = std::move(*gauge);
+  }
+  if (gauged || (columns.has_gauges() && !says(table, row, columns.position))) {
+    measurement.p_W.setConstant(std::numeric_limits<double>::quiet_NaN());
+  } else if (const Status position = read_position(table, row, columns, measurement); !position) {
+    return position;
+  }
+  return read_sigma(table, row, columns, measurement);
 }
 
 Result<MeasurementSet> read_set(const CsvTable& table, std::size_t row, const std::optional<std::size_t>& column) {
@@ -96,8 +178,8 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   if (!pose_id) return tl::make_unexpected(pose_id.error());
   measurement.pose_id = std::move(*pose_id);
   measurement.row = table.line(row);
-  if (const Status position = read_position(table, row, columns, measurement); !position) {
-    return tl::make_unexpected(position.error());
+  if (const Status measured = read_measured(table, row, columns, measurement); !measured) {
+    return tl::make_unexpected(measured.error());
   }
   const Result<MeasurementSet> set = read_set(table, row, columns.set);
   if (!set) return tl::make_unexpected(set.error());
@@ -107,10 +189,34 @@ Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, con
   return measurement;
 }
 
-}  // namespace
+/// Gives the gauges that are told against another pose that pose, and takes out the rows that tell nothing themselves.
+/// Refuses one that is not there, and a row that tells nothing and that nobody names.
+Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& line_of_pose) {
+  std::map<std::string, std::shared_ptr<const PoseContext>> named;
+  for (Measurement& m : batch.measurements) {
+    if (!m.gauge || m.gauge->minus_pose.empty()) continue;
+    const std::string& other = m.gauge->minus_pose;
+    const auto fail = [&](Failure why) { return std::move(why).in(batch.where).at_row(m.row).of("minus_pose_id"); };
+    if (!line_of_pose.contains(other)) return fail(refused("no row has the pose_id '{}'", other).with_text(other));
+    if (other == m.pose_id) return fail(refused("pose '{}' is told against itself", other).with_text(other));
+    auto& context = named[other];
+    if (context == nullptr) {
+      const auto row = std::find_if(batch.measurements.begin(), batch.measurements.end(),
+                                    [&](const Measurement& one) { return one.pose_id == other; });
+      context = std::make_shared<const PoseContext>(row->context);
+    }
+    m.gauge->minus = context;
+  }
+  for (const Measurement& m : batch.measurements) {
+    if (m.gauge || m.p_W.allFinite() || named.contains(m.pose_id)) continue;
+    return refused("neither a position nor distance_mm nor touch_mm").in(batch.where).at_row(m.row).of("distance_mm");
+  }
+  std::erase_if(batch.measurements, [](const Measurement& m) { return !m.gauge && !m.p_W.allFinite(); });
+  return {};
+}
 
-Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where, kMostMeasurements);
+/// The rows of a table whose columns have our names.
+Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::string& text, const std::string& where) {
   if (!table) return tl::make_unexpected(table.error());
   const Result<BatchColumns> columns = find_columns(*table);
   if (!columns) return tl::make_unexpected(columns.error());
@@ -134,7 +240,96 @@ Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::str
     }
     batch.measurements.push_back(std::move(*measurement));
   }
+  if (columns->has_gauges()) {
+    if (const Status settled = settle_gauges(batch, line_of_pose); !settled)
+      return tl::make_unexpected(settled.error());
+  }
   return batch;
+}
+
+}  // namespace
+
+Result<MeasurementBatch> parse_batch_csv(const std::string& text, const std::string& where) {
+  return batch_of(CsvTable::parse(text, where, kMostMeasurements), text, where);
+}
+
+namespace {
+
+/// A column of a table that has no header: our name of it, and by what its numbers are to be multiplied.
+struct ToldColumn {
+  std::string name;  ///< empty: passed over
+  double scale = 1;
+};
+
+/// `q1_rad` is `q1_deg` in another unit, and `x_m` `x_mm`.
+ToldColumn told_column(const std::string& name) {
+  if (name == "-" || name.empty()) return {};
+  const auto in = [&](std::string_view unit) {
+    return name.size() > unit.size() && name.ends_with(unit) ? name.substr(0, name.size() - unit.size()) : "";
+  };
+  if (const std::string stem = in("_rad"); !stem.empty()) return {stem + "_deg", to_deg(1)};
+  if (const std::string stem = in("_m"); !stem.empty()) return {stem + "_mm", to_mm(1)};
+  return {name, 1};
+}
+
+/// The rows as the columns say: in our units, without those that are passed over.
+Result<std::vector<CsvTable::Row>> told_rows(const std::vector<CsvTable::Row>& rows,
+                                             const std::vector<ToldColumn>& columns, const std::string& where) {
+  std::vector<CsvTable::Row> all;
+  for (const CsvTable::Row& row : rows) {
+    if (row.fields.size() != columns.size())
+      return refused("{} values, {} columns are told", row.fields.size(), columns.size())
+          .in(where)
+          .at_row(row.line)
+          .beyond(row.fields.size(), columns.size());
+    CsvTable::Row& kept = all.emplace_back(CsvTable::Row{row.line, {}});
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (columns[k].name.empty()) continue;
+      std::string field = row.fields[k];
+      if (columns[k].scale != 1 && !field.empty()) {
+        const std::string pointed = with_decimal_point(field);
+        if (!is_number(pointed))
+          return refused("{} is '{}', which is not a number", columns[k].name, field)
+              .in(where)
+              .at_row(row.line)
+              .of(columns[k].name)
+              .with_text(field);
+        field = fmt::format("{:.15g}", std::stod(pointed) * columns[k].scale);
+      }
+      kept.fields.push_back(std::move(field));
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<MeasurementBatch> parse_batch_table(const std::string& text, const std::vector<std::string>& columns,
+                                           const std::string& where) {
+  const Result<std::vector<TextLine>> lines = text_lines(text, where);
+  if (!lines) return tl::make_unexpected(lines.error());
+  const std::vector<TextLine> first = first_lines(text, 1);
+  const char separator = first.empty() ? ',' : separator_of(first.front().text);
+  const Result<std::vector<CsvTable::Row>> rows = data_rows(*lines, separator, where);
+  if (!rows) return tl::make_unexpected(rows.error());
+  std::vector<ToldColumn> told;
+  CsvTable::Row header{1, {}};
+  for (const std::string& column : columns) {
+    told.push_back(told_column(column));
+    if (!told.back().name.empty()) header.fields.push_back(told.back().name);
+  }
+  const Result<std::vector<CsvTable::Row>> kept = told_rows(*rows, told, where);
+  if (!kept) return tl::make_unexpected(kept.error());
+  return batch_of(CsvTable::from_rows(where, header, *kept, separator), "", where).map([](MeasurementBatch batch) {
+    batch.source_text = to_csv(batch);
+    return batch;
+  });
+}
+
+Result<MeasurementBatch> read_batch_table(const std::string& path, const std::vector<std::string>& columns) {
+  return read_text_file(path)
+      .and_then([&](const std::string& text) { return parse_batch_table(text, columns, path); })
+      .map([&](MeasurementBatch batch) { return dated(std::move(batch), written_at(path)); });
 }
 
 Result<MeasurementBatch> read_batch_csv(const std::string& path) {
@@ -165,8 +360,9 @@ void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>&
                        [j, type](const Measurement& m) { return csv_number(joint_to_column(m.context.q(j), type)); }});
   }
   for (int k = 0; k < 3; ++k) {
-    columns.push_back({kPositionColumns[static_cast<std::size_t>(k)],
-                       [k](const Measurement& m) { return csv_number(to_mm(m.p_W(k))); }});
+    columns.push_back({kPositionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) {
+                         return m.p_W.allFinite() && !m.gauge ? csv_number(to_mm(m.p_W(k))) : "";
+                       }});
   }
   for (int k = 0; k < 4; ++k) {
     columns.push_back({kQuaternionColumns[static_cast<std::size_t>(k)], [k](const Measurement& m) -> std::string {
@@ -175,6 +371,18 @@ void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>&
                          return csv_number(k == 0 ? R.w() : R.vec()(k - 1));
                        }});
   }
+}
+
+void add_gauge_columns(std::vector<WrittenColumn>& columns) {
+  for (const auto& [name, kind] :
+       {std::pair("distance_mm", Gauge::Kind::kDistance), std::pair("touch_mm", Gauge::Kind::kTouch)}) {
+    columns.push_back({name, [kind](const Measurement& m) {
+                         return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value)) : "";
+                       }});
+  }
+  columns.push_back({"anchor_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->anchor) : ""; }});
+  columns.push_back(
+      {"minus_pose_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->minus_pose) : ""; }});
 }
 
 void add_circumstance_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>& columns) {
@@ -204,9 +412,33 @@ void add_circumstance_columns(const MeasurementBatch& batch, std::vector<Written
 
 }  // namespace
 
-std::string to_csv(const MeasurementBatch& batch) {
+namespace {
+
+/// The batch with the poses that gauges are told against and that tell nothing themselves, which are no measurements.
+MeasurementBatch with_named_poses(MeasurementBatch batch) {
+  std::map<std::string, const PoseContext*> missing;
+  for (const Measurement& m : batch.measurements) {
+    if (m.gauge && m.gauge->minus != nullptr) missing[m.gauge->minus_pose] = m.gauge->minus.get();
+  }
+  for (const Measurement& m : batch.measurements) missing.erase(m.pose_id);
+  std::vector<Measurement> named;
+  for (const auto& [id, context] : missing) {
+    Measurement& one = named.emplace_back();
+    one.pose_id = id;
+    one.context = *context;
+    one.p_W.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  batch.measurements.insert(batch.measurements.begin(), named.begin(), named.end());
+  return batch;
+}
+
+}  // namespace
+
+std::string to_csv(const MeasurementBatch& given) {
+  const MeasurementBatch batch = with_named_poses(given);
   std::vector<WrittenColumn> columns;
   add_pose_columns(batch, columns);
+  add_gauge_columns(columns);
   add_circumstance_columns(batch, columns);
   std::erase_if(columns, [&](const WrittenColumn& column) {
     return std::all_of(batch.measurements.begin(), batch.measurements.end(),

@@ -1,11 +1,17 @@
 #include "server/measurement/files/point_list.h"
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <regex>
 
+#include "server/base/coverage.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/files/point_table.h"
 #include "server/measurement/files/text_lines.h"
@@ -18,11 +24,30 @@ constexpr double kPositionLimit = 1e3;   // m, beyond the range of any tracker
 constexpr double kUncertaintyLimit = 1;  // m
 constexpr double kAngleLimit = 360;      // deg
 constexpr double kInch = 0.0254;         // m
+constexpr std::size_t kLongestTime = 40;
 
 /// `p1` of `Collection::Group::p1`, as SpatialAnalyzer writes the whole name of a point.
 std::string last_component(const std::string& name) {
   const auto at = name.rfind("::");
   return at == std::string::npos ? name : name.substr(at + 2);
+}
+
+/// Of a moment as programs write it, taken for UTC; nothing where it may be read in two ways.
+std::optional<double> unix_time_of(const std::string& text) {
+  if (is_number(text)) return std::stod(text);
+  static const std::regex kYearFirst(R"((\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?)Z?)");
+  static const std::regex kDayFirst(R"((\d\d)\.(\d\d)\.(\d{4}) (\d\d):(\d\d):(\d\d(?:[.,]\d{1,9})?))");
+  std::smatch part;
+  const bool year_first = text.size() < kLongestTime && std::regex_match(text, part, kYearFirst);
+  if (!year_first && !(text.size() < kLongestTime && std::regex_match(text, part, kDayFirst))) return std::nullopt;
+  const auto number = [&](int k) { return std::stoi(part[static_cast<std::size_t>(k)].str()); };
+  const std::chrono::year_month_day day{std::chrono::year(number(year_first ? 1 : 3)),
+                                        std::chrono::month(static_cast<unsigned>(number(2))),
+                                        std::chrono::day(static_cast<unsigned>(number(year_first ? 3 : 1)))};
+  if (!day.ok() || number(4) > 23 || number(5) > 59) return std::nullopt;
+  const double seconds = std::stod(with_decimal_point(part[6].str()));
+  const auto midnight = std::chrono::sys_days(day).time_since_epoch();
+  return static_cast<double>(std::chrono::seconds(midnight).count()) + 3600 * number(4) + 60 * number(5) + seconds;
 }
 
 /// Reads rows of a table whose columns have our names.
@@ -47,8 +72,10 @@ class PointReader {
     uncertainties_ = std::move(*uncertainties);
     angles_ = std::move(*angles);
     sigma_ = table_.find("sigma");
-    return {};
+    return find_beside();
   }
+
+  [[nodiscard]] const std::vector<std::string>& extra_columns() const { return extra_names_; }
 
   [[nodiscard]] Result<NamedPoint> read(std::size_t row) const {
     NamedPoint point;
@@ -73,10 +100,59 @@ class PointReader {
     point.p_W = cartesian(*native);
     if (const Status rotation = read_rotation(row, point); !rotation) return tl::make_unexpected(rotation.error());
     if (const Status sigma = read_sigma(row, *native, point); !sigma) return tl::make_unexpected(sigma.error());
+    if (const Status u95 = read_u95(row, point); !u95) return tl::make_unexpected(u95.error());
+    if (time_) point.time = unix_time_of(table_.field(row, *time_));
+    for (const std::size_t column : extra_) point.extra.push_back(table_.field(row, column));
+    if (time_) point.extra.push_back(point.time ? "" : table_.field(row, *time_));
     return point;
   }
 
  private:
+  /// What the software of trackers writes beside coordinates.
+  [[nodiscard]] Status find_beside() {
+    auto quaternion = table_.all_or_none({"qw", "qx", "qy", "qz"});
+    if (!quaternion) return tl::make_unexpected(quaternion.error());
+    auto axes = table_.all_or_none({kU95Axes.begin(), kU95Axes.end()});
+    if (!axes) return tl::make_unexpected(axes.error());
+    quaternion_ = std::move(*quaternion);
+    u95_axes_ = std::move(*axes);
+    u95_ = table_.find(kU95);
+    time_ = table_.find(kTimeStamp);
+    constexpr std::array kNames = {"air_temperature_c", "air_pressure_hpa", "air_humidity_percent"};
+    for (std::size_t k = 0; k < kWeather.size(); ++k) {
+      const auto column = table_.find(kWeather[k]);
+      if (!column) continue;
+      extra_.push_back(*column);
+      extra_names_.emplace_back(kNames[k]);
+    }
+    if (time_) extra_names_.emplace_back("time_stamp");
+    return {};
+  }
+
+  [[nodiscard]] Result<double> expanded(std::size_t row, std::size_t column) const {
+    const Result<double> u = table_.number(row, column, kUncertaintyLimit / length_);
+    if (!u || *u >= 0) return u.map([&](double value) { return value * length_ / kExpanded; });
+    return table_.refuse(row, "{} is {:g}, must not be below 0", table_.columns()[column], *u)
+        .of(table_.columns()[column])
+        .beyond(*u, 0);
+  }
+
+  /// Expanded uncertainties; nothing where they are 0 or not recorded.
+  [[nodiscard]] Status read_u95(std::size_t row, NamedPoint& point) const {
+    double square = 0;  // m², of the three axes together
+    const std::vector<std::size_t> columns = !u95_axes_.empty() ? u95_axes_
+                                             : u95_             ? std::vector<std::size_t>{*u95_}
+                                                                : std::vector<std::size_t>();
+    for (const std::size_t column : columns) {
+      if (table_.field(row, column).empty()) return {};
+      const Result<double> sigma = expanded(row, column);
+      if (!sigma) return tl::make_unexpected(sigma.error());
+      square += *sigma * *sigma;
+    }
+    if (square > 0) point.sigma = std::sqrt(square / 3);
+    return {};
+  }
+
   static double unit_length(LengthUnit unit) {
     return unit == LengthUnit::kMetre ? 1 : unit == LengthUnit::kInch ? kInch : from_mm(1);
   }
@@ -107,6 +183,14 @@ class PointReader {
   }
 
   [[nodiscard]] Status read_rotation(std::size_t row, NamedPoint& point) const {
+    const bool turned = std::any_of(quaternion_.begin(), quaternion_.end(),
+                                    [&](std::size_t column) { return !table_.field(row, column).empty(); });
+    if (turned) {
+      const Result<Eigen::Matrix3d> R_W = table_.rotation(row, quaternion_);
+      if (!R_W) return tl::make_unexpected(R_W.error());
+      point.R_W = *R_W;
+      return {};
+    }
     if (angles_.empty()) return {};
     Vector3 angles;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -154,7 +238,9 @@ class PointReader {
   double coverage_;
   std::size_t name_ = 0;
   std::vector<std::size_t> position_, uncertainties_, angles_;
-  std::optional<std::size_t> sigma_;
+  std::optional<std::size_t> sigma_, u95_, time_;
+  std::vector<std::size_t> quaternion_, u95_axes_, extra_;
+  std::vector<std::string> extra_names_;
 };
 
 }  // namespace
@@ -169,7 +255,7 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
   if (!parts) return tl::make_unexpected(parts.error());
   PointReader reader(*parts, options.coverage);
   if (const Status found = reader.find_columns(); !found) return tl::make_unexpected(found.error());
-  PointList list{where, {}};
+  PointList list{where, {}, reader.extra_columns()};
   std::map<std::string, int> row_of_name;
   for (std::size_t row = 0; row < parts->table.size(); ++row) {
     Result<NamedPoint> point = reader.read(row);
@@ -190,7 +276,39 @@ Result<PointList> read_points(const std::string& path, const PointFileOptions& o
   return read_text_file(path).and_then([&](const std::string& text) { return parse_points(text, path, options); });
 }
 
-Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded) {
+namespace {
+
+/// The point as what was measured at that pose.
+Measurement measured_at(const CommandedPose& pose, const NamedPoint& point, int index) {
+  Measurement measurement;
+  measurement.pose_id = pose.pose_id;
+  measurement.context = pose.context;
+  measurement.context.index = index;
+  if (point.time) measurement.context.time = point.time;
+  measurement.p_W = point.p_W;
+  measurement.R_WT = point.R_W;
+  measurement.sigma = point.sigma;
+  measurement.row = point.row;
+  measurement.extra = point.extra;
+  return measurement;
+}
+
+Status check_as_long(const PointList& points, const JointList& commanded) {
+  const std::size_t n = points.points.size(), poses = commanded.poses.size();
+  if (n == poses) return {};
+  return refused("{} points for the {} poses of {}: which belong together in their order is not known", n, poses,
+                 commanded.where)
+      .in(points.where)
+      .beyond(n, poses)
+      .next("name the points as the poses, and join them by name");
+}
+
+}  // namespace
+
+Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded, bool in_order) {
+  if (points.points.empty()) return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
+  if (const Status fits = in_order ? check_as_long(points, commanded) : Status(); !fits)
+    return tl::make_unexpected(fits.error());
   std::map<std::string, const CommandedPose*> pose_of_id;
   for (const CommandedPose& pose : commanded.poses) {
     const auto [earlier, is_new] = pose_of_id.emplace(last_component(pose.pose_id), &pose);
@@ -201,12 +319,17 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
         .of("pose_id")
         .with_text(pose.pose_id);
   }
-  if (points.points.empty()) return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
   MeasurementBatch batch;
   batch.id = std::filesystem::path(points.where).stem().string();
   batch.where = points.where;
   batch.joint_types = commanded.joint_types;
+  batch.extra_columns = points.extra_columns;
   for (const NamedPoint& point : points.points) {
+    const auto index = static_cast<int>(batch.measurements.size());
+    if (in_order) {
+      batch.measurements.push_back(measured_at(commanded.poses[batch.measurements.size()], point, index));
+      continue;
+    }
     const auto pose = pose_of_id.find(point.name);
     if (pose == pose_of_id.end()) {
       return refused("point '{}' has no pose of that pose_id in {}", point.name, commanded.where)
@@ -216,15 +339,7 @@ Result<MeasurementBatch> join_points(const PointList& points, const JointList& c
           .with_text(point.name)
           .next("measure under the names of the plan, or name the plan that was measured");
     }
-    Measurement measurement;
-    measurement.pose_id = pose->second->pose_id;
-    measurement.context = pose->second->context;
-    measurement.context.index = static_cast<int>(batch.measurements.size());
-    measurement.p_W = point.p_W;
-    measurement.R_WT = point.R_W;
-    measurement.sigma = point.sigma;
-    measurement.row = point.row;
-    batch.measurements.push_back(std::move(measurement));
+    batch.measurements.push_back(measured_at(*pose->second, point, index));
   }
   batch.source_text = to_csv(batch);
   return batch;

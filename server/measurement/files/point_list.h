@@ -12,16 +12,19 @@
 namespace trammel {
 
 struct NamedPoint {
-  std::string name;               ///< of the target or frame
-  Vector3 p_W = Vector3::Zero();  ///< m, in the file's working frame
-  std::optional<Matrix3> R_W;     ///< of a frame, active W <- frame
-  std::optional<double> sigma;    ///< m, of one axis
-  int row = 0;                    ///< line in its file, for messages
+  std::string name;                ///< of the target or frame
+  Vector3 p_W = Vector3::Zero();   ///< m, in the file's working frame
+  std::optional<Matrix3> R_W;      ///< of a frame, active W <- frame
+  std::optional<double> sigma;     ///< m, of one axis
+  std::optional<double> time;      ///< s, Unix time
+  std::vector<std::string> extra;  ///< values of the list's extra columns
+  int row = 0;                     ///< line in its file, for messages
 };
 
 struct PointList {
   std::string where;  ///< the file as messages name it
   std::vector<NamedPoint> points;
+  std::vector<std::string> extra_columns;  ///< what the software of a tracker recorded beside: the air, time stamps
 };
 
 /// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points", "Export Frames"), and
@@ -49,7 +52,14 @@ struct PointList {
 /// coordinates), columns in any order, found by name without regard to case, blanks and underscores: `name` (`point`,
 /// `target`, `frame`, each also with `name`), `x y z`, `r theta z` or `r theta phi`; optional `ux uy uz` (`ur utheta
 /// uz`, `ur utheta uphi`), `sigma`, `rx ry rz` (in this order or as `rz ry rx`). Others are passed over. Units may
-/// stand in brackets or behind an underscore: `X (mm)`, `x_mm`, `theta [rad]`.
+/// stand in brackets or behind an underscore: `X (mm)`, `x_mm`, `theta [rad]`. Up to 30 lines above the header, in
+/// which a program tells of itself, are passed over.
+///
+/// Of Leica Tracker Pilot, also `pointid`; `u95` of the point (k = 2, of its three axes together: sigma of one axis is
+/// U95 / (2 sqrt 3)) or `u95x u95y u95z`; a unit quaternion `qw qx qy qz` or `q0 q1 q2 q3`, active W <- frame; a
+/// `timestamp` (`2026-11-22 10:11:12.3`, `22.11.2026 10:11:12`, taken for UTC, or Unix time), which else stays as text;
+/// `temperature`, `pressure`, `humidity` of the air, which are kept as `air_temperature_c`, `air_pressure_hpa`,
+/// `air_humidity_percent`.
 ///
 /// Coordinates: cartesian; cylindrical R, theta (from +x about +z), z; spherical R, theta (the same), phi (from +z). A
 /// comment with `cylindric`, `spherical` or `polar` says so. Angles are deg unless `Angular units: rad` or the header
@@ -65,9 +75,11 @@ struct PointList {
 [[nodiscard]] Result<PointList> read_points(const std::string& path, const PointFileOptions& options = {});
 
 /// A batch of the points and the commanded poses: each point measures the pose whose pose_id is the name of the point
-/// (of both the last component counts).
+/// (of both the last component counts). With `in_order` the first point measures the first pose, and so on: names do
+/// not count, and both lists must be as long.
 /// The batch has the order of the points, which is the order in time. Poses without a point are left out. Refuses a
 /// point without a pose, a pose_id twice, and lists without a point.
-[[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded);
+[[nodiscard]] Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded,
+                                                   bool in_order = false);
 
 }  // namespace trammel

@@ -102,11 +102,35 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
 
 /// Our name for a column of another program; empty for a column that is ignored.
 std::string known_column(const std::string& name) {
-  static const std::map<std::string, std::string> kNames = {
-      {"name", "name"},       {"point", "name"}, {"pointname", "name"}, {"target", "name"},
-      {"targetname", "name"}, {"frame", "name"}, {"framename", "name"}, {"radius", "r"}};
-  static const std::vector<std::string> kSame = {"x",  "y",  "z",      "r",    "theta", "phi", "ux", "uy",
-                                                 "uz", "ur", "utheta", "uphi", "sigma", "rx",  "ry", "rz"};
+  static const std::map<std::string, std::string> kNames = {{"name", "name"},
+                                                            {"point", "name"},
+                                                            {"pointname", "name"},
+                                                            {"pointid", "name"},
+                                                            {"pointnumber", "name"},
+                                                            {"target", "name"},
+                                                            {"targetname", "name"},
+                                                            {"frame", "name"},
+                                                            {"framename", "name"},
+                                                            {"radius", "r"},
+                                                            {"u95", kU95},
+                                                            {"u953d", kU95},
+                                                            {"u95xyz", kU95},
+                                                            {"u95total", kU95},
+                                                            {"u95point", kU95},
+                                                            {"u95x", kU95Axes[0]},
+                                                            {"u95y", kU95Axes[1]},
+                                                            {"u95z", kU95Axes[2]},
+                                                            {"timestamp", kTimeStamp},
+                                                            {"datetime", kTimeStamp},
+                                                            {"temperature", kWeather[0]},
+                                                            {"airtemperature", kWeather[0]},
+                                                            {"pressure", kWeather[1]},
+                                                            {"airpressure", kWeather[1]},
+                                                            {"humidity", kWeather[2]},
+                                                            {"relativehumidity", kWeather[2]}};
+  static const std::vector<std::string> kSame = {"x",  "y",  "z",  "r",      "theta", "phi",   "ux",
+                                                 "uy", "uz", "ur", "utheta", "uphi",  "sigma", "rx",
+                                                 "ry", "rz", "qw", "qx",     "qy",    "qz"};
   if (const auto known = kNames.find(name); known != kNames.end()) return known->second;
   return std::find(kSame.begin(), kSame.end(), name) != kSame.end() ? name : "";
 }
@@ -124,6 +148,12 @@ std::optional<Coordinates> coordinates_of(const std::vector<std::string>& column
   return std::nullopt;
 }
 
+/// Whether the unit of the column is neither that of lengths nor that of angles.
+bool has_no_length(const std::string& column) {
+  return column == kTimeStamp || std::find(kWeather.begin(), kWeather.end(), column) != kWeather.end() ||
+         (column.size() == 2 && column.starts_with('q')) || column == "name";
+}
+
 /// A parsed header line; `columns` is empty if the line is no header.
 struct Header {
   std::vector<std::string> columns;  // our names; an ignored column has its position as a name
@@ -133,12 +163,17 @@ struct Header {
 Header header_of(std::string_view line, char separator) {
   static const std::regex kTwoWords("(point|target|frame|group|collection)\\s+name", std::regex::icase);
   const std::string text = std::regex_replace(std::string(line), kTwoWords, "$1");
+  const std::vector<std::string> fields = split_fields(text, separator);
+  std::vector<std::string> names;
+  for (const std::string& field : fields) names.push_back(column_name(field).name);
+  const bool numbered_quaternion = has_all(names, {"q0", "q1", "q2", "q3"});
   Header header;
-  for (const std::string& field : split_fields(text, separator)) {
-    const ColumnName column = column_name(field);
-    const std::string known = known_column(column.name);
-    header.columns.push_back(known.empty() ? fmt::format("({}) {}", header.columns.size() + 1, field) : known);
-    header.units.push_back(known.empty() ? "" : column.unit);
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const bool of_quaternion = numbered_quaternion && names[k].size() == 2 && names[k][0] == 'q';
+    const std::string known =
+        of_quaternion && names[k][1] <= '3' ? fmt::format("q{}", "wxyz"[names[k][1] - '0']) : known_column(names[k]);
+    header.columns.push_back(known.empty() ? fmt::format("({}) {}", header.columns.size() + 1, fields[k]) : known);
+    header.units.push_back(known.empty() || has_no_length(known) ? "" : column_name(fields[k]).unit);
   }
   if (!has_all(header.columns, {"name"}) || !coordinates_of(header.columns)) return {};
   return header;
@@ -227,6 +262,21 @@ Status check_commas(const std::vector<CsvTable::Row>& rows, const std::string& w
       .next("name the columns in a first line (name,x,y,z), or separate values by ';'");
 }
 
+/// The header where there is one among the first lines, whatever a program wrote above it of itself; else the first
+/// line of data.
+std::vector<TextLine>::const_iterator first_of_table(const std::vector<TextLine>& lines) {
+  constexpr int kMostAbove = 30;
+  const auto is_data = [](const TextLine& line) { return !line.comment; };
+  const auto first = std::find_if(lines.begin(), lines.end(), is_data);
+  int above = 0;
+  for (auto line = first; line != lines.end() && above < kMostAbove;
+       line = std::find_if(line + 1, lines.end(), is_data)) {
+    if (!header_of(line->text, separator_of(line->text)).columns.empty()) return line;
+    ++above;
+  }
+  return first;
+}
+
 Status check_comments(const std::vector<TextLine>& lines, const std::string& where) {
   const auto comments = static_cast<std::size_t>(
       std::count_if(lines.begin(), lines.end(), [](const TextLine& line) { return line.comment; }));
@@ -255,11 +305,11 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
   if (!read) return tl::make_unexpected(read.error());
   const std::vector<TextLine>& lines = *read;
   if (const Status few = check_comments(lines, where); !few) return tl::make_unexpected(few.error());
-  const auto first = std::find_if(lines.begin(), lines.end(), [](const TextLine& line) { return !line.comment; });
+  const auto first = first_of_table(lines);
   if (first == lines.end()) return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
   const char separator = separator_of(first->text);
   PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
-  Result<std::vector<CsvTable::Row>> data = data_rows(lines, separator, where);
+  Result<std::vector<CsvTable::Row>> data = data_rows({first, lines.end()}, separator, where);
   if (!data) return tl::make_unexpected(data.error());
   std::vector<CsvTable::Row>& rows = *data;
   Header header = header_of(first->text, separator);

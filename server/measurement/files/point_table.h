@@ -10,6 +10,13 @@
 /// Finds the layout of a list of points.
 namespace trammel {
 
+/// Our names of columns that the software of trackers writes beside coordinates: expanded uncertainties (U95, k = 2) of
+/// the point and of its axes, when it was measured, and the air. Brackets say that they hold numbers.
+inline const std::string kU95 = "u95 [point]";
+inline const std::array<std::string, 3> kU95Axes = {"u95x [axis]", "u95y [axis]", "u95z [axis]"};
+inline const std::string kTimeStamp = "timestamp";
+inline const std::array<std::string, 3> kWeather = {"air_temperature [c]", "air_pressure [hpa]", "air_humidity [%]"};
+
 /// What the file and the caller state about the layout.
 struct Statements {
   std::optional<LengthUnit> unit;

@@ -5,6 +5,7 @@
 
 #include "server/base/hash.h"
 #include "server/measurement/files/batch_file.h"
+#include "server/measurement/gauges.h"
 
 namespace trammel {
 
@@ -23,6 +24,8 @@ Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, con
   auto parsed = parse_batch(text.csv, "batch " + id);
   if (!parsed) return tl::make_unexpected(parsed.error());
   parsed->id = id;
+  if (const Status positions = require_positions(*parsed, "the service"); !positions)
+    return tl::make_unexpected(positions.error());
   return check_against_cell(dated(std::move(*parsed), text.taken_in), cell, hold_out);
 }
 

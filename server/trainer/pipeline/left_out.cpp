@@ -25,6 +25,7 @@ MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
 std::vector<const Measurement*> observations(const CalibrationResult& found, const MeasurementBatch& batch) {
   std::vector<const Measurement*> poses;
   for (const Measurement& m : batch.measurements) {
+    if (m.gauge) continue;
     const bool suspect = std::any_of(found.suspects.begin(), found.suspects.end(), [&](const SuspectPose& pose) {
       return pose.pose_id == m.pose_id && pose.row == m.row;
     });

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/measurement/gauges.h"
 #include "server/trainer/pipeline/lasting_sources.h"
 #include "server/trainer/pipeline/leftover.h"
 
@@ -45,6 +46,7 @@ std::vector<std::string> names_of(const CompensatedModel& model) {
 
 Status check_may_start_from(const CompensatedModel& from, const Cell& cell, const MeasurementBatch& batch,
                             const std::vector<std::string>& only) {
+  if (const Status positions = require_positions(batch, "identifying anew in a model"); !positions) return positions;
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
     return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);

@@ -7,6 +7,7 @@
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/orientation_check.h"
 #include "server/compensate/world.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/repeats.h"
 #include "server/measurement/sessions.h"
 #include "server/measurement/split.h"
@@ -23,6 +24,9 @@ namespace trammel {
 namespace {
 
 constexpr const char* kProgramVersion = "0.1.0";
+constexpr const char* kNoBias = "none";
+constexpr const char* kNoBiasOfGauges =
+    "no bias: one is learned from positions, and the batch has distances or touches";
 
 /// The rows to learn from, repeats merged, and those to validate by, as they were measured.
 BatchSplit prepared(const CheckedBatch& batch, double sigma) {
@@ -184,12 +188,30 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, con
   CompensatedModel::Parts parts = calibrated_parts(std::move(found->calibration), left_out);
   parts.changes = std::move(found->changes);
   parts.sessions_left_out = std::move(unplaced);
-  const Status learned = add_bias(parts, split.train, options.bias.value_or(cell->model.bias), left_out, options.seed,
+  const std::string asked = options.bias.value_or(cell->model.bias);
+  const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
+  const Status learned = add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
                                   [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
   if (!learned) return tl::make_unexpected(learned.error());
+  if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
   if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
   return validated(std::move(parts), split);
+}
+
+/// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of the position, three
+/// numbers a pose; several set-ups; what twins have in common.
+Status check_gauges(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
+  if (!has_gauges(batch)) return {};
+  if (has_sessions(batch)) return require_positions(batch, "a training from several set-ups of the instrument");
+  if (options.fleet) return require_positions(batch, "a training with prior: fleet");
+  const std::string& bias = options.bias ? *options.bias : cell.model.bias;
+  if (bias == kNoBias || bias == kAutoBias) return {};
+  return refused("a bias ({}) is learned from positions, and the batch has distances or touches", bias)
+      .in("batch " + batch.id)
+      .of("distance_mm")
+      .with_text(bias)
+      .next("train with --bias none (model: {bias: none} in the cell file): the physics is identified from all rows");
 }
 
 /// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell file.
@@ -213,6 +235,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
     const Status fits = check_may_start_from(*options.from, *cell, batch.rows(), options.refit);
     if (!fits) return tl::make_unexpected(fits.error());
   }
+  if (const Status gauges = check_gauges(batch.rows(), *cell, options); !gauges)
+    return tl::make_unexpected(gauges.error());
   if (const Status read = check_read(batch.rows(), *cell, options); !read) return tl::make_unexpected(read.error());
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
   if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
@@ -227,6 +251,8 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
 Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const CheckedBatch& batch,
                                     const TrainOptions& options) {
   const Cell& cell = calibrated.cell();
+  if (const Status positions = require_positions(batch.rows(), "a bias"); !positions)
+    return tl::make_unexpected(positions.error());
   if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
     return tl::make_unexpected(oriented.error());
   const Result<InWorld> here = in_world_of(calibrated, batch.rows());

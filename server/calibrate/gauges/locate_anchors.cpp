@@ -1,0 +1,204 @@
+#include "server/calibrate/gauges/locate_anchors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+
+#include "server/base/units.h"
+#include "server/calibrate/frames/frames.h"
+#include "server/error_sources/anchors.h"
+#include "server/measurement/gauges.h"
+#include "server/measurement/sessions.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr std::size_t kFewest = 4;     // values that tell the three numbers of a place, and one beside
+constexpr double kLeastBeside = 1e-2;  // m rms: tool points nearer to one line do not tell what is around it
+constexpr int kRefinements = 50;
+constexpr double kLastStep = 1e-9;  // m
+
+/// What was measured to one anchor.
+struct Lengths {
+  std::vector<Vector3> points_W;
+  std::vector<double> lengths;  ///< m, from the anchor's point
+};
+
+std::map<std::string, Lengths> lengths_of(const PhysicalModel& model, const MeasurementBatch& batch) {
+  std::map<std::string, Lengths> all;
+  for (const Measurement& m : batch.measurements) {
+    if (!m.gauge) continue;
+    const PlacedAnchor anchor = placed_anchor(model, m.gauge->anchor);
+    if (anchor.place < 0) continue;
+    Lengths& one = all[m.gauge->anchor];
+    if (m.gauge->minus != nullptr) continue;
+    one.points_W.push_back(model.pose_W(m.context).translation());
+    const double surface = m.gauge->kind == Gauge::Kind::kTouch ? anchor.said->radius : 0;
+    one.lengths.push_back(m.gauge->value + surface - anchor.said->zero.value_or(0));
+  }
+  return all;
+}
+
+/// How the points spread: their mean, and singular vectors and rms along them, largest first.
+struct Spread {
+  Vector3 mean = Vector3::Zero();
+  Matrix3 axes = Matrix3::Identity();
+  Vector3 rms = Vector3::Zero();
+};
+
+Spread spread_of(const std::vector<Vector3>& points) {
+  const auto n = static_cast<Eigen::Index>(points.size());
+  const Eigen::Map<const Eigen::Matrix3Xd> p(points.front().data(), 3, n);
+  Spread spread;
+  spread.mean = p.rowwise().mean();
+  const Eigen::Matrix3Xd from_mean = p.colwise() - spread.mean;
+  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(from_mean, Eigen::ComputeFullU);
+  spread.axes = svd.matrixU();
+  spread.rms = svd.singularValues() / std::sqrt(static_cast<double>(n));
+  return spread;
+}
+
+/// |p - a|² = d² is linear in a and |a|².
+Vector3 linear_place(const Lengths& of, const Vector3& mean) {
+  const auto n = static_cast<Eigen::Index>(of.lengths.size());
+  Eigen::MatrixXd A(n, 4);
+  Eigen::VectorXd b(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vector3 p = of.points_W[at] - mean;
+    A.row(i) << -2 * p.transpose(), 1;
+    b(i) = of.lengths[at] * of.lengths[at] - p.squaredNorm();
+  }
+  return mean + A.completeOrthogonalDecomposition().solve(b).head<3>();
+}
+
+struct Refined {
+  Vector3 p_W = Vector3::Zero();
+  double square = std::numeric_limits<double>::infinity();  ///< m², sum
+};
+
+/// Gauss-Newton steps, damped where one leads uphill.
+Refined refined_from(Vector3 a, const Lengths& of) {
+  const auto square_at = [&](const Vector3& place) {
+    double sum = 0;
+    for (std::size_t i = 0; i < of.lengths.size(); ++i)
+      sum += std::pow(of.lengths[i] - (of.points_W[i] - place).norm(), 2);
+    return sum;
+  };
+  double square = square_at(a), damping = 1e-6;
+  for (int k = 0; k < kRefinements; ++k) {
+    Matrix3 normal = Matrix3::Zero();
+    Vector3 right = Vector3::Zero();
+    for (std::size_t i = 0; i < of.lengths.size(); ++i) {
+      const Vector3 d = of.points_W[i] - a;
+      const Vector3 u = d / std::max(d.norm(), kLastStep);
+      normal += u * u.transpose();
+      right -= (of.lengths[i] - d.norm()) * u;
+    }
+    normal.diagonal() *= 1 + damping;
+    normal.diagonal().array() += 1e-12;
+    const Vector3 step = normal.ldlt().solve(right);
+    const double next = square_at(a + step);
+    if (next <= square) {
+      a += step;
+      square = next;
+      damping /= 10;
+      if (step.norm() < kLastStep) break;
+    } else {
+      damping = std::max(10 * damping, 1e-6);
+    }
+  }
+  return {a, square};
+}
+
+/// From the linear solution and from its mirror image behind the points: nearly in a plane, they fit both alike.
+Vector3 place_of(const Lengths& of, const Spread& spread) {
+  const Vector3 linear = linear_place(of, spread.mean);
+  const Vector3 n = spread.axes.col(2);
+  const double mean_length =
+      std::sqrt(std::inner_product(of.lengths.begin(), of.lengths.end(), of.lengths.begin(), 0.0) /
+                static_cast<double>(of.lengths.size()));
+  const Vector3 within = linear - n.dot(linear - spread.mean) * n;
+  Refined best;
+  for (const Vector3& start : {linear, Vector3(linear - 2 * n.dot(linear - spread.mean) * n),
+                               Vector3(within + mean_length * n), Vector3(within - mean_length * n)}) {
+    const Refined found = refined_from(start, of);
+    if (found.square < best.square) best = found;
+  }
+  return best.p_W;
+}
+
+Status check_told(const std::string& id, const Lengths& of) {
+  if (of.lengths.size() < kFewest) {
+    return refused("anchor '{}': {} values told of themselves, at least {} are needed to find where it is", id,
+                   of.lengths.size(), kFewest)
+        .of("anchor_id")
+        .beyond(of.lengths.size(), kFewest)
+        .with_text(id)
+        .next("measure more poses, or give its xyz_mm in the cell file");
+  }
+  const double beside = spread_of(of.points_W).rms(1);
+  if (beside >= kLeastBeside) return {};
+  return refused(
+             "anchor '{}': the tool points lie on one line within {:.1f} mm, limit {:g} mm: they do not tell where "
+             "it is",
+             id, to_mm(beside), to_mm(kLeastBeside))
+      .of("anchor_id")
+      .with_text(id)
+      .beyond(to_mm(beside), to_mm(kLeastBeside))
+      .next("measure from all sides, or give its xyz_mm in the cell file");
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> with_instruments(std::vector<std::string> specs, const Cell& cell,
+                                                  const MeasurementBatch& batch) {
+  if (!has_gauges(batch)) return specs;
+  const Result<Anchors> anchors = anchors_of(cell);
+  if (!anchors) return tl::make_unexpected(anchors.error());
+  const bool open = std::any_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+    const auto anchor = m.gauge ? anchors->find(m.gauge->anchor) : anchors->end();
+    return anchor != anchors->end() && anchor->second.zero_open;
+  });
+  const auto add = [&](std::string_view spec) {
+    if (std::find(specs.begin(), specs.end(), spec) == specs.end()) specs.emplace_back(spec);
+  };
+  add(kAnchors);
+  if (open) add(kInstrumentZero);
+  return specs;
+}
+
+Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
+  if (!has_gauges(batch)) return {};
+  if (has_sessions(batch)) {
+    return refused("distances or touches in a batch of {} set-ups of the instrument", batch.sessions.size())
+        .in("batch " + batch.id)
+        .of("session_id")
+        .next("give each set-up that has them to a training of its own");
+  }
+  for (const Measurement& m : batch.measurements) {
+    if (m.gauge && placed_anchor(model, m.gauge->anchor).said == nullptr)
+      return refused("no anchor '{}' in the cell file", m.gauge->anchor).in("batch " + batch.id).at_row(m.row);
+  }
+  const Cell& cell = *model.cell;
+  if (has_positions(batch) || (cell.X_WB && !has_unknown_tool(cell))) return {};
+  return refused("distances alone do not tell where {} is that cell {} calls unknown",
+                 !cell.X_WB ? "the base" : "a tool", cell.name)
+      .in("batch " + batch.id)
+      .of(!cell.X_WB ? "base" : "tools")
+      .next(!cell.X_WB ? "write base: {xyz_mm: [0, 0, 0]}, and give anchors' places in the base's frame or as null"
+                       : "write where it sits to some mm, or measure some positions");
+}
+
+Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch) {
+  for (const auto& [id, of] : lengths_of(model, batch)) {
+    if (const Status told = check_told(id, of); !told) return Failure(told.error()).in("batch " + batch.id);
+    model.values.segment<3>(placed_anchor(model, id).place) = place_of(of, spread_of(of.points_W));
+  }
+  return {};
+}
+
+}  // namespace trammel

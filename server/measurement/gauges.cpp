@@ -1,0 +1,83 @@
+#include "server/measurement/gauges.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "server/measurement/pose_check.h"
+
+namespace trammel {
+
+namespace {
+
+/// The anchor that is named, or the only one.
+Result<std::string> resolved(const std::string& name, const Cell& cell, const Anchors& anchors) {
+  std::vector<std::string> ids;
+  for (const auto& [id, anchor] : anchors) ids.push_back(id);
+  const std::string known = ids.empty() ? "none" : fmt::format("{}", fmt::join(ids, ", "));
+  if (name.empty() && ids.size() == 1) return ids.front();
+  Failure why = name.empty() ? refused("cell {}: no anchor named, and the cell has {}", cell.name, ids.size())
+                             : refused("cell {}: unknown anchor '{}'", cell.name, name);
+  if (!name.empty() && anchors.contains(name)) return name;
+  return std::move(why)
+      .of("anchor_id")
+      .with_text(name)
+      .next(fmt::format("known: {}; anchors stand in the cell file, anchors: {{a1: {{xyz_mm: null}}}}", known));
+}
+
+/// The pose that it is told against, as the cell has it.
+Status check_minus(Gauge& gauge, const Cell& cell) {
+  if (gauge.minus == nullptr) return {};
+  PoseContext other = *gauge.minus;
+  if (const Status pose = check_pose(other, cell); !pose) return pose;
+  gauge.minus = std::make_shared<const PoseContext>(std::move(other));
+  return {};
+}
+
+}  // namespace
+
+bool has_gauges(const MeasurementBatch& batch) {
+  return std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                     [](const Measurement& m) { return m.gauge.has_value(); });
+}
+
+bool has_positions(const MeasurementBatch& batch) {
+  return std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                     [](const Measurement& m) { return !m.gauge; });
+}
+
+MeasurementBatch positions_of(const MeasurementBatch& batch) {
+  MeasurementBatch positions = batch;
+  std::erase_if(positions.measurements, [](const Measurement& m) { return m.gauge.has_value(); });
+  return positions;
+}
+
+Status require_positions(const MeasurementBatch& batch, const std::string& who) {
+  const auto gauged = std::find_if(batch.measurements.begin(), batch.measurements.end(),
+                                   [](const Measurement& m) { return m.gauge.has_value(); });
+  if (gauged == batch.measurements.end()) return {};
+  const std::string column = gauged->gauge->kind == Gauge::Kind::kDistance ? "distance_mm" : "touch_mm";
+  return refused("a row has {} and no position, {} works with positions alone", column, who)
+      .in(batch.where.empty() ? "batch " + batch.id : batch.where)
+      .at_row(gauged->row)
+      .of(column)
+      .next("distances and touches are for train --bias none, and for evaluate");
+}
+
+Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& anchors) {
+  if (!measurement.gauge) return {};
+  Gauge& gauge = *measurement.gauge;
+  Result<std::string> id = resolved(gauge.anchor, cell, anchors);
+  if (!id) return tl::make_unexpected(id.error());
+  gauge.anchor = std::move(*id);
+  const Anchor& anchor = anchors.at(gauge.anchor);
+  if (gauge.kind == Gauge::Kind::kTouch && anchor.shape == Anchor::Shape::kPoint) {
+    return refused("touch_mm of anchor '{}', which is a point", gauge.anchor)
+        .of("touch_mm")
+        .with_text(gauge.anchor)
+        .next("say in the cell file what is touched: sphere_radius_mm, plane_normal, or ring_axis and ring_radius_mm");
+  }
+  if (!measurement.sigma) measurement.sigma = anchor.sigma;
+  return check_minus(gauge, cell);
+}
+
+}  // namespace trammel

@@ -1,0 +1,34 @@
+#include "server/robot/gauge.h"
+
+namespace trammel {
+
+namespace {
+
+/// The length of `d`, with the derivative where it has one.
+GaugedLength length_of(const Vector3& d) {
+  const double length = d.norm();
+  return {length, length > 0 ? Vector3(d / length) : Vector3::Zero()};
+}
+
+}  // namespace
+
+GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA, const Vector3& p_W) {
+  const Vector3 d = p_W - p_WA;
+  if (kind == Gauge::Kind::kDistance) return length_of(d);
+  const Vector3& n = anchor.direction_W;
+  switch (anchor.shape) {
+    case Anchor::Shape::kPlane:
+      return {n.dot(d), n};
+    case Anchor::Shape::kRing: {
+      const GaugedLength across = length_of(d - n.dot(d) * n);
+      return {across.value - anchor.radius, across.by_point_W};
+    }
+    case Anchor::Shape::kPoint:
+    case Anchor::Shape::kSphere:
+      break;
+  }
+  const GaugedLength from_centre = length_of(d);
+  return {from_centre.value - anchor.radius, from_centre.by_point_W};
+}
+
+}  // namespace trammel

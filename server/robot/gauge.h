@@ -1,0 +1,56 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/base/result.h"
+#include "server/robot/cell.h"
+#include "server/robot/pose_context.h"
+
+/// Instruments that tell one number of a pose instead of a position: draw wires, ballbars and ranges, which measure a
+/// distance; dial gauges and probes, which touch a surface.
+namespace trammel {
+
+/// What an instrument measures to, as the cell file has it under `anchors`.
+struct Anchor {
+  enum class Shape { kPoint, kSphere, kPlane, kRing };
+  Shape shape = Shape::kPoint;
+  std::optional<Vector3> p_W;              ///< m: the point, a point of the plane, of the ring's axis; empty: unknown
+  Vector3 direction_W = Vector3::UnitZ();  ///< unit vector: normal of the plane, away from its body; axis of the ring
+  double radius = 0;                       ///< m, of sphere or ring
+  std::optional<double> sigma;             ///< m, of one value of this instrument
+  std::optional<double> zero;              ///< m: what it tells too much; empty: it is looked for
+  bool zero_open = false;                  ///< it is unknown for certain; else the data decide whether there is one
+};
+/// By their ids.
+using Anchors = std::map<std::string, Anchor>;
+
+/// The anchors of the cell file; none where the cell has no file.
+[[nodiscard]] Result<Anchors> anchors_of(const Cell& cell);
+
+/// One number that an instrument told.
+struct Gauge {
+  enum class Kind {
+    kDistance,  ///< from the tool point to the anchor's point
+    kTouch,     ///< from the anchor's surface to the tool point, positive outside of a sphere, above a plane, and
+                ///< beyond the wall of a ring that is touched from within
+  };
+  Kind kind = Kind::kDistance;
+  std::string anchor;
+  double value = 0;                          ///< m
+  std::string minus_pose;                    ///< id of the pose that the value is told against; empty: of itself
+  std::shared_ptr<const PoseContext> minus;  ///< that pose
+};
+
+/// A distance, and its derivative by the tool point. That by the anchor's point is the negative.
+struct GaugedLength {
+  double value = 0;  ///< m
+  Vector3 by_point_W = Vector3::Zero();
+};
+/// From `p_W` to the anchor whose point is `p_WA`, without any zero error.
+[[nodiscard]] GaugedLength gauged_length(Gauge::Kind kind, const Anchor& anchor, const Vector3& p_WA,
+                                         const Vector3& p_W);
+
+}  // namespace trammel
