@@ -402,6 +402,28 @@ Complaints check_causes(const SourceTree& tree) {
   return complaints;
 }
 
+/// Complains of whoever decides by the words of a message: by what an error's sentence holds, or by a text of several
+/// words anywhere. Readers of files of other programs may: what they read has no other form.
+Complaints check_words(const SourceTree& tree) {
+  const std::string asks = R"(\.(find|rfind|starts_with|ends_with|contains|compare)\()";
+  static const std::regex kOfAMessage(R"((\bmessage|\bsentence(\([^()]*\))?|\bwhat\(\)\)*|\bwhy|\bverdict|\bnext))" +
+                                      asks + R"(|(\.message|\bsentence(\([^()]*\))?) *[=!]= *")");
+  static const std::regex kOfWords(asks + R"re("[^"]*[A-Za-z'] [A-Za-z][^"]*")re");
+  static const std::regex kReaders(R"(^(server/measurement/files|clients/cam/\w+)/.*|^server/robot/branch_hint\.cpp$)");
+  Complaints complaints;
+  for (const auto& [path, text] : tree) {
+    if (!is_source(path) || !(is_under(path, "server") || is_under(path, "clients"))) continue;
+    if (std::regex_match(path, kReaders)) continue;
+    std::istringstream lines(text);
+    std::string line;
+    for (int number = 1; std::getline(lines, line); ++number) {
+      if (std::regex_search(line, kOfAMessage) || std::regex_search(line, kOfWords))
+        complaints.push_back(path + ":" + std::to_string(number) + ": decides by the words of a message");
+    }
+  }
+  return complaints;
+}
+
 Complaints check_threads(const SourceTree& tree) {
   static const std::regex kThread(R"(\bstd\s*::\s*(j?thread|async)\b|\bpthread_create\b)");
   static const std::regex kMayStart(
@@ -646,6 +668,8 @@ TEST(Tidy, NobodyAsksForACauseByItsSpelling) {
   EXPECT_EQ(shown(check_causes(tree)), "");
 }
 
+TEST(Tidy, NobodyDecidesByTheWordsOfAMessage) { EXPECT_EQ(shown(check_words(read_source_tree())), ""); }
+
 TEST(Tidy, OnlyMainTrainerAndDdsStartThreads) { EXPECT_EQ(shown(check_threads(read_source_tree())), ""); }
 
 TEST(Tidy, NobodySleeps) { EXPECT_EQ(shown(check_sleeps(read_source_tree())), ""); }
@@ -830,6 +854,22 @@ TEST(TidyChecks, FindWhoeverAsksForACauseByItsSpelling) {
   EXPECT_EQ(complaints("server/plan/a.cpp", "if (&source.cause() == &cause_spelled(\"joint_map\")) return;"), 1u);
   EXPECT_EQ(complaints("server/plan/a.cpp", "sources.emplace_back(record.spelling);"), 0u);
   EXPECT_EQ(complaints("server/error_sources/tool.cpp", "if (cause == \"tool\") return;"), 0u);
+}
+
+TEST(TidyChecks, FindWhoeverDecidesByTheWordsOfAMessage) {
+  const auto complaints = [](const std::string& path, const std::string& line) {
+    return check_words({{path, line}}).size();
+  };
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (error.message.find(\"written\") != npos) return;"), 1u);
+  EXPECT_EQ(complaints("server/dds/a.cpp", "if (sentence(error).starts_with(kBusy)) return;"), 1u);
+  EXPECT_EQ(complaints("server/store/a.cpp", "if (std::string(error.what()).find(kFull) == 0) return;"), 1u);
+  EXPECT_EQ(complaints("server/store/a.cpp", "if (std::string_view(e.what()).find(\"disk is full\")) return;"), 1u);
+  EXPECT_EQ(complaints("server/bias/a.cpp", "other.verdict.starts_with(\"not\")"), 1u);
+  EXPECT_EQ(complaints("server/bias/a.cpp", "text.contains(\"not clearly\")"), 1u);
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (answer.message == \"no model\") return;"), 1u);
+  EXPECT_EQ(complaints("clients/cli/a.cpp", "if (row.status == \"out_of_domain\" || text.find(\": \") > 0) return;"),
+            0u);
+  EXPECT_EQ(complaints("server/measurement/files/a.cpp", "line.starts_with(\"Point Name\")"), 0u);
 }
 
 TEST(TidyChecks, FindThreadsInCodeAndNotInComments) {

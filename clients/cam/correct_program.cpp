@@ -14,6 +14,7 @@
 #include "clients/cam/path_check.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/robot/branch_hint.h"
 
 namespace trammel::cam {
 
@@ -24,7 +25,6 @@ constexpr double kLeastRoundingMm = 1e-6;    // no digits beyond
 constexpr double kDefaultRoundingMm = 1e-3;  // where no sigma is known
 constexpr double kRotationRounding = 1e-6;   // rad: 1 µm at 1 m
 constexpr double kReach = 3;                 // m, the lever of a joint
-constexpr const char* kSuggestion = "; conf ";
 
 Pose from_wire(const client::PoseMm& pose) {
   const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
@@ -119,9 +119,9 @@ class Correcting {
     ReceiptRow& row = rows_[t];
     row.status = item.status;
     row.message = item.message;
-    if (const std::size_t at = row.message.find(kSuggestion); at != std::string::npos) {
-      row.suggestion = row.message.substr(at + 2);
-      row.message.erase(at);
+    if (const BranchHint hint = branch_hint_in(item.message); !hint.branches.empty()) {
+      row.message = hint.before;
+      row.suggestion = fmt::format("{} would reach it", branch_list(hint.branches));
     }
     if (const std::string& doubt = nominal_.targets[t].doubt; !doubt.empty())
       row.message += row.message.empty() ? doubt : "; " + doubt;
@@ -259,16 +259,17 @@ class Correcting {
       if (!result_.rows[r].motion.empty()) by_line.emplace(std::pair(result_.rows[r].file, result_.rows[r].line), r);
     }
     std::set<std::string> said;
+    std::set<std::pair<std::size_t, std::string>> told;  // rows, and what they move with
     for (const Reading& reading : program_.readings) {
       const auto first = written.lower_bound({reading.file, reading.of.begin});
       if (first == written.end() || first->first != reading.file || first->second >= reading.of.end) continue;
       const std::string& by_file = program_.files[reading.by_file].name;
-      const std::string moves = fmt::format("it moves with {}, which is corrected", shown(reading.name));
       bool found = reading.motion;
       const auto tell = [&](auto rows) {
         for (auto row = rows.first; row != rows.second; ++row) {
-          std::string& message = result_.rows[row->second].message;
-          if (message.find(moves) == std::string::npos) message += "; " + moves;
+          if (told.insert({row->second, reading.name}).second)
+            result_.rows[row->second].message +=
+                fmt::format("; it moves with {}, which is corrected", shown(reading.name));
           found = true;
         }
       };

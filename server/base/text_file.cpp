@@ -9,6 +9,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 
 namespace trammel {
@@ -91,8 +92,21 @@ void remove_parts(const std::vector<FileView>& files) {
   }
 }
 
-Failure cannot_be_written(const std::string& path, const std::string& why) {
-  return refused("cannot be written: {}", why).in(path);
+/// What to do about a file that cannot be written.
+std::string other_place(const std::string& path) {
+  std::error_code error;
+  const fs::path folder = fs::path(path).parent_path();
+  if (fs::is_directory(path, error)) return "name a file in it";
+  if (!folder.empty() && !fs::exists(folder, error))
+    return fmt::format("make the folder first: mkdir -p {}", shown(folder.string()));
+  return "name a file that you may write, in a folder with room";
+}
+
+/// `done`: files that were renamed before, each after a blank.
+Failure cannot_be_written(const std::string& path, const std::string& why, const std::string& done = "") {
+  return refused("cannot be written: {}", why)
+      .in(path)
+      .next(done.empty() ? other_place(path) : "already written:" + done);
 }
 
 Status write_views(const std::vector<FileView>& files) {
@@ -115,7 +129,7 @@ Status write_views(const std::vector<FileView>& files) {
     }
     if (!why.empty()) {
       remove_parts(files);
-      return cannot_be_written(file.path, why).next(done.empty() ? "" : "already written:" + done);
+      return cannot_be_written(file.path, why, done);
     }
     done += " " + file.path;
   }

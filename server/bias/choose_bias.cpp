@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
@@ -253,6 +254,7 @@ class Choosing {
     const double hyperparameters = hyperparameters_of(*model);
     if (!clearly_likelier(nlpd, best_.nlpd, hyperparameters - best_.hyperparameters)) {
       candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
+      not_likelier_.insert(choice_.candidates.size() - 1);
     } else if (gain.value <= kStandardErrors * gain.stddev) {
       candidate.verdict = "does not help beyond chance where neighbours in time are left out";
     } else if (far.value < -kStandardErrors * far.stddev) {
@@ -287,10 +289,11 @@ class Choosing {
           std::min_element(choice_.candidates.begin() + 1, choice_.candidates.end(), [](const auto& a, const auto& b) {
             return a.skipped != b.skipped ? b.skipped : a.leave_one_out_nlpd < b.leave_one_out_nlpd;
           });
+      const bool likelier = !not_likelier_.contains(static_cast<std::size_t>(other - choice_.candidates.begin()));
       choice_.sentence =
           fmt::format("no bias helps: the residual is {:.4f} mm, leave-one-out {:.4f} mm with {}, which {}; left out",
                       to_mm(none.leave_one_out_rms), to_mm(other->leave_one_out_rms), other->kernel,
-                      other->verdict.starts_with("not clearly") ? "is not clearly likelier" : other->verdict);
+                      likelier ? other->verdict : "is not clearly likelier");
     }
     if (const std::size_t unjudged = 2 * kBlocks - in_time_.size() - in_joint_space_.size(); unjudged > 0) {
       choice_.sentence += fmt::format("; {} of {} blocks do not judge: without them the physics cannot be identified",
@@ -314,6 +317,7 @@ class Choosing {
   std::vector<Fold> in_time_, in_joint_space_;
   Missed without_in_time_, without_in_joint_space_;  // by `none`
   BiasChoice choice_;
+  std::set<std::size_t> not_likelier_;  // candidates
   Best best_;
   int asked_ = 0;
 };

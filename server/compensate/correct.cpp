@@ -5,6 +5,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/correct_in_wrist.h"
 #include "server/measurement/pose_columns.h"
+#include "server/robot/branch_hint.h"
 #include "server/robot/flange_motion.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/robot/wrist.h"
@@ -50,15 +51,6 @@ std::string limits_text(const Chain& robot, const JointVector& q) {
   const auto named = std::min<std::size_t>(outside.size(), kJointsNamed);
   const std::string text = fmt::format("{}", fmt::join(outside.begin(), outside.begin() + named, "; "));
   return outside.size() == named ? text : fmt::format("{} and {} more", text, outside.size() - named);
-}
-
-/// `; conf 1, 3 or 7 would reach it`; nothing where none would.
-std::string reached_by(const std::vector<int>& branches) {
-  if (branches.empty()) return "";
-  std::string list = fmt::format("{}", branches.front());
-  for (std::size_t i = 1; i < branches.size(); ++i)
-    list += fmt::format("{}{}", i + 1 == branches.size() ? " or " : ", ", branches[i]);
-  return fmt::format("; conf {} would reach it", list);
 }
 
 CorrectionStatus status_of(InverseStatus status) {
@@ -255,8 +247,8 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   };
   const auto not_reached = [&](const InverseResult& joints) {
     return end(status_of(joints.status),
-               why_not(cell().robot, joints, target.conf) +
-                   reached_by(branches_that_reach(target, result.X_BT_wanted, context, options)));
+               with_branch_hint(why_not(cell().robot, joints, target.conf),
+                                branches_that_reach(target, result.X_BT_wanted, context, options)));
   };
 
   const Result<InverseResult> start = nominal_joints(target, parts().physics.tools.at(tool).inverse());

@@ -203,8 +203,8 @@ std::string next_poses_text(const Diagnosis& diagnosis, const Cell& cell) {
   return fmt::format(
              "<p>They tell {} apart. What is confounded is uncertain by {} now, <b>by {} with these "
              "poses</b>, by {} with as many random ones.</p>\n",
-             html_text(all_in_words(next.separates)), uncertain_by(next.stddev_now),
-             uncertain_by(next.stddev_expected), uncertain_by(next.stddev_random)) +
+             html_text(all_in_words(next.separates)), uncertain_by(next.stddev_now), uncertain_by(next.stddev_expected),
+             uncertain_by(next.stddev_random)) +
          next_poses_table(next.q, cell);
 }
 

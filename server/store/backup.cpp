@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPagesAtOnce = 256;  // between two looks at the progress
+constexpr const char* kElsewhere = "name a file that you may write, in a folder with room";
 
 /// Removes the file in which a copy is made; one that is whole has another name by then.
 class Unfinished {
@@ -46,7 +47,9 @@ Status on_disk(const std::string& path) {
   const int why = errno;
   if (file >= 0) ::close(file);
   if (is_there) return {};
-  return failure(ErrorCode::kInternal, "cannot be written to the disk: {}", std::strerror(why)).in(path);
+  return failure(ErrorCode::kInternal, "cannot be written to the disk: {}", std::strerror(why))
+      .in(path)
+      .next(kElsewhere);
 }
 
 Status check_is_store(SQLite::Database& database, const std::string& path) {
@@ -164,7 +167,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
   if (!copy) return copy;
   if (const Status there = on_disk(part); !there) return tl::make_unexpected(there.error());
   if (::link(part.c_str(), to.c_str()) != 0)  // unlike a rename it replaces nothing
-    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(to);
+    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(to).next(kElsewhere);
   const fs::path folder = fs::path(to).parent_path();
   if (const Status there = on_disk(folder.empty() ? "." : folder.string()); !there)
     return tl::make_unexpected(there.error());

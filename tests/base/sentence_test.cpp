@@ -124,7 +124,10 @@ TEST(Sentence, OfFilesThatCannotBeReadOrWritten) {
   const std::string large = folder.write("large", "12345");
   EXPECT_EQ(said(read_text_file(large, 4)), large + ": 5 bytes, limit 4");
   const std::string path = folder.file("no/such/a.txt");
-  EXPECT_EQ(said(write_text_file(path, "x")), path + ": cannot be written: No such file or directory");
+  EXPECT_EQ(said(write_text_file(path, "x")),
+            path + ": cannot be written: No such file or directory; make the folder first: mkdir -p " +
+                folder.file("no/such"));
+  EXPECT_EQ(check_writable(folder.file("")).error().next, "name a file in it");
   const std::string store = folder.file("nowhere/t.db");
   EXPECT_EQ(said(check_store(store)),
             store + ": its folder " + folder.file("nowhere") + " is not there; create it, or name another");

@@ -50,7 +50,8 @@ TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
 TEST_F(ModelPage, CallsErrorSourcesByTheirPlainNames) {
   CompensatedModel::Parts parts = trained("none").parts();
   parts.provenance.level = "base,geometry,compliance_linear,gear_transmission:3@48.5";
-  parts.provenance.refits = {RefitRecord{.model = "m", .sources = {"base", "tool"}, .batch_id = "b", .batch_hash = "", .poses = 9}};
+  parts.provenance.refits = {
+      RefitRecord{.model = "m", .sources = {"base", "tool"}, .batch_id = "b", .batch_hash = "", .poses = 9}};
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
   EXPECT_TRUE(has(page, "base position, link geometry, gearbox compliance, gear ripple in joint 3"));
   EXPECT_TRUE(has(page, "base position, tool position on 9 poses"));

@@ -40,8 +40,10 @@ Status write_output(const std::string& path, const std::string& text) {
   if (path != "-") return write_text_file(path, text);
   standard_output_is_taken() = true;
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
-  if (!written) return refused("cannot be written: {}", std::strerror(errno)).in("standard output");
-  return {};
+  if (written) return {};
+  return refused("cannot be written: {}", std::strerror(errno))
+      .in("standard output")
+      .next("see where it goes: the disk may be full, or the reader gone");
 }
 
 nlohmann::ordered_json error_json(const Error& error) {

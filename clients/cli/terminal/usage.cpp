@@ -73,21 +73,40 @@ bool is_option(const std::string& word) {
   return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
 }
 
-/// What kind of file each option takes, by its ending.
+/// What kind of file each option takes, by its ending, and the keys that stand at the top of this kind alone.
 struct FileKind {
-  const char* option;
+  const char* option;  ///< nullptr: none takes it
   std::array<const char*, 4> endings;
   const char* what;
+  std::array<const char*, 2> keys = {};
 };
 constexpr std::array kKinds = {
-    FileKind{"--cell", {".yaml", ".yml"}, "a cell file (YAML)"},
-    FileKind{"--robot", {".yaml", ".yml"}, "a robot file (YAML)"},
-    FileKind{"--truth", {".yaml", ".yml"}, "the truth of a virtual robot (YAML)"},
+    FileKind{"--cell", {".yaml", ".yml"}, "a cell file (YAML)", {"robot", "tracker"}},
+    FileKind{"--robot", {".yaml", ".yml"}, "a robot file (YAML)", {"joints", "coupling"}},
+    FileKind{"--truth", {".yaml", ".yml"}, "the truth of a virtual robot (YAML)", {"noise"}},
     FileKind{"--model", {".model", ".json"}, "a model file, as trammel train writes it"},
     FileKind{"--batch", {".csv", ".txt", ".tsv", ".CSV"}, "measurements (CSV)"},
     FileKind{"--joints", {".csv", ".txt", ".tsv", ".CSV"}, "a table of joints (CSV)"},
     FileKind{"--plan", {".csv", ".txt", ".tsv", ".CSV"}, "a plan (CSV), as trammel plan writes it"},
+    FileKind{nullptr, {}, "a server file (YAML)", {"cells", "store"}},
 };
+
+/// The kind of file that the option takes; null where the table does not have it.
+const FileKind* kind_taken_by(const CLI::Option& option) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& kind) {
+    return kind.option != nullptr && option.check_name(kind.option);
+  });
+  return found == kKinds.end() ? nullptr : found;
+}
+
+/// The kind of file that has such a key at its top; null where it may be of several.
+const FileKind* kind_with_key(const std::string& key) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& kind) {
+    return std::any_of(kind.keys.begin(), kind.keys.end(),
+                       [&](const char* one) { return one != nullptr && key == one; });
+  });
+  return found == kKinds.end() ? nullptr : found;
+}
 
 bool takes(const FileKind& kind, const std::string& ending) {
   return std::any_of(kind.endings.begin(), kind.endings.end(),
@@ -128,47 +147,36 @@ std::string of_missing_file(const std::string& file, const CLI::App& command) {
   return fmt::format("paths count from the folder you are in, {}", fs::current_path(error).string());
 }
 
-std::string of_unwritable(const std::string& file) {
-  std::error_code error;
-  const fs::path folder = fs::path(file).parent_path();
-  if (fs::is_directory(file, error)) return "name a file in it";
-  if (!folder.empty() && !fs::exists(folder, error))
-    return fmt::format("make the folder first: mkdir -p {}", shown(folder.string()));
-  return "name a file that you may write, in a folder with room";
-}
-
-/// What stands at the top of the files that people mix up.
-std::string kind_of_keys(const Error& error) {
-  const auto has_key = [&](const char* key) { return error.field == key || error.field == std::string(key); };
-  if (has_key("joints") || has_key("coupling")) return "a robot file";
-  if (has_key("cells") || has_key("store")) return "a server file";
-  if (has_key("robot") || has_key("tracker")) return "a cell file";
-  if (has_key("noise")) return "the truth of a virtual robot";
-  return "";
-}
-
 /// What the option takes that named this file, where its ending is that of another kind; else empty.
-std::string of_wrong_kind(const std::string& file, const CLI::App& command) {
+std::string of_wrong_kind(const std::string& file, const CLI::Option& option) {
   std::error_code ignored;
-  const CLI::Option* option = fs::is_regular_file(file, ignored) ? named_by(command, file) : nullptr;
   const std::string ending = fs::path(file).extension().string();
   const auto right =
       std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& kind) { return takes(kind, ending); });
-  if (option == nullptr || right == kKinds.end()) return "";
-  for (const FileKind& kind : kKinds) {
-    if (option->check_name(kind.option) && !takes(kind, ending))
-      return fmt::format("{} takes {}; a {} file goes to {}", kind.option, kind.what, ending, right->option);
-  }
-  return "";
+  const FileKind* taken = kind_taken_by(option);
+  if (!fs::is_regular_file(file, ignored) || right == kKinds.end() || taken == nullptr || takes(*taken, ending))
+    return "";
+  return fmt::format("{} takes {}; a {} file goes to {}", taken->option, taken->what, ending, right->option);
+}
+
+/// What the option takes that named this file, where keys that are wrong are those of one other kind; else empty.
+std::string of_other_keys(const Error& error, const CLI::Option& option) {
+  const FileKind* taken = kind_taken_by(option);
+  std::set<const FileKind*> kinds;
+  for (const Error& one : apart(error)) kinds.insert(kind_with_key(one.field));
+  kinds.erase(nullptr);
+  kinds.erase(taken);  // its own keys may be wrong or missing
+  if (taken == nullptr || error.also.empty() || kinds.size() != 1) return "";
+  return fmt::format("this looks like {}; {} takes {}", (*kinds.begin())->what, taken->option, taken->what);
 }
 
 std::string of_file(const Error& error, const CLI::App& command) {
   std::error_code ignored;
   if (fs::is_directory(error.file, ignored)) return "name a file in it";
-  if (error.message.find("cannot be written") != std::string::npos) return of_unwritable(error.file);
-  if (!fs::exists(error.file, ignored) && error.message.find("no such file") != std::string::npos)
-    return of_missing_file(error.file, command);
   const CLI::Option* option = named_by(command, error.file);
+  const bool is_of_all_of_it = error.code == ErrorCode::kRefused && !error.row && error.field.empty();
+  if (option != nullptr && is_of_all_of_it && !fs::exists(error.file, ignored))
+    return of_missing_file(error.file, command);
   const std::string ending = fs::path(error.file).extension().string();
   if (option != nullptr && option->check_name("--model"))
     return "train it anew, or fetch it again: the file is not whole";
@@ -216,12 +224,14 @@ std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::st
 }
 
 Error usage_error(const CLI::ParseError& error, const std::string& command) {
+  // The parser tells the option in its sentence alone: `Could not convert: --seed = x`, `--cell is required`.
   std::string what = error.what();
-  what = what.substr(0, what.find("\nRun with"));
-  const std::string field = what.substr(0, what.find_first_of(": "));
-  const std::string said = what.starts_with("Could not convert: ") ? what.substr(19) : "";
-  const std::string option = !said.empty() ? said.substr(0, said.find(' ')) : field.starts_with('-') ? field : "";
-  return failure(ErrorCode::kUsage, "{}", said.empty() ? what : said + ": not a number, or out of range")
+  const std::size_t behind = what.find(": ");
+  const bool unconverted =
+      dynamic_cast<const CLI::ConversionError*>(&error) != nullptr && behind != std::string::npos && !is_option(what);
+  if (unconverted) what.erase(0, behind + 2);
+  const std::string option = is_option(what) ? what.substr(0, what.find_first_of(": ")) : "";
+  return failure(ErrorCode::kUsage, "{}", unconverted ? what + ": not a number, or out of range" : what)
       .of(option)
       .next(command.empty() ? "trammel help lists commands and topics"
                             : fmt::format("trammel {} --help tells its options, with examples", command))
@@ -230,22 +240,13 @@ Error usage_error(const CLI::ParseError& error, const std::string& command) {
 
 Error advised(Error error, const CLI::App& command) {
   for (Error& other : error.also) other = advised(std::move(other), command);
-  std::set<std::string> kinds;
-  for (const Error& one : apart(error)) {
-    if (one.message.find("unknown key") != std::string::npos) kinds.insert(kind_of_keys(one));
-  }
-  kinds.erase("");
-  const CLI::Option* option = error.file.empty() ? nullptr : named_by(command, error.file);
-  if (kinds.size() == 1 && !error.also.empty() && option != nullptr) {  // a whole file of another kind
-    const auto kind =
-        std::find_if(kKinds.begin(), kKinds.end(), [&](const FileKind& one) { return option->check_name(one.option); });
-    if (kind != kKinds.end()) {
+  if (const CLI::Option* option = error.file.empty() ? nullptr : named_by(command, error.file); option != nullptr) {
+    if (std::string other = of_other_keys(error, *option); !other.empty()) {
       error.also.clear();
-      error.next = fmt::format("this looks like {}; {} takes {}", *kinds.begin(), kind->option, kind->what);
+      error.next = std::move(other);
     }
+    if (std::string other = of_wrong_kind(error.file, *option); !other.empty()) error.next = std::move(other);
   }
-  if (std::string other = error.file.empty() ? "" : of_wrong_kind(error.file, command); !other.empty())
-    error.next = std::move(other);
   if (!error.next.empty()) return error;
   if (!error.file.empty()) error.next = of_file(error, command);
   if (error.next.empty()) error.next = of_kind(error, command.get_name());

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Branches (conf) that would reach a target, at the end of the message that says why its own does not:
+/// `joint 5 would be at 121.3 deg, limit 120; conf 1, 3 or 7 would reach it`. On the wire and in files they stand
+/// nowhere else, so this form is written and read here alone.
+namespace trammel {
+
+/// A message taken apart. Without branches `before` is all of it.
+struct BranchHint {
+  std::string before;
+  std::vector<int> branches;
+};
+
+/// `before` with the branches at its end; `before` alone without any.
+[[nodiscard]] std::string with_branch_hint(const std::string& before, const std::vector<int>& branches);
+/// The reverse.
+[[nodiscard]] BranchHint branch_hint_in(std::string_view message);
+
+/// `conf 1, 3 or 7`. `branches` is not empty.
+[[nodiscard]] std::string branch_list(const std::vector<int>& branches);
+
+}  // namespace trammel
