@@ -5,9 +5,11 @@
 #include <limits>
 #include <utility>
 
+#include "server/calibrate/change_kinds.h"
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/calibrate/sessions/session_blocks.h"
 #include "server/measurement/sessions.h"
+#include "server/numerics/chi_square.h"
 
 namespace trammel {
 
@@ -24,74 +26,6 @@ constexpr double kLeastInflation = 1;
 constexpr std::size_t kFewestToWander = 4;  // sessions
 constexpr double kSlowest = 1e-4;           // prior standard deviations a session
 constexpr int kRates = 60;
-
-/// The chance that chi-squared of that many degrees of freedom exceeds x.
-double chi_square_tail(int freedom, double x) {
-  const double half = 0.5 * x;
-  double tail = freedom % 2 == 1 ? std::erfc(std::sqrt(half)) : std::exp(-half);
-  for (int k = freedom % 2 == 1 ? 3 : 4; k <= freedom; k += 2)
-    tail += std::exp((0.5 * k - 1) * std::log(half) - half - std::lgamma(0.5 * k));
-  return tail;
-}
-
-/// A kind of change; its columns among those of all kinds.
-struct Kind {
-  std::string spelling, behind;  ///< up to the pose at which it begins, and behind it
-  Index first = 0, count = 0;
-
-  [[nodiscard]] std::string from(int index) const { return fmt::format("{}@{}{}", spelling, index + 1, behind); }
-};
-
-/// A model that has every kind of change from the first pose on, at nothing, behind the parameters of `model`.
-class AllKinds {
- public:
-  explicit AllKinds(const PhysicalModel& model) : probe_(model) {
-    for (const CauseRecord* cause : all_causes()) {
-      // What belongs to a session alone, such as where its tracker stood, is no change of the arm.
-      if (cause->lasting != causes::Lasting::kFromAPose || cause->scope == causes::Scope::kSession) continue;
-      if (cause->scope != causes::Scope::kJoint) add_of_arm(*cause);
-      for (int j = 0; cause->scope == causes::Scope::kJoint && j < model.cell->robot.size(); ++j)
-        add(fmt::format("{}:{}", cause->spelling, j + 1));
-    }
-  }
-  [[nodiscard]] const std::vector<Kind>& kinds() const { return kinds_; }
-  [[nodiscard]] const PhysicalModel& probe() const { return probe_; }
-  /// Of the probe's parameters: those of the model, and those of the kinds, in the order of kinds().
-  [[nodiscard]] std::vector<Index> own() const { return sorted(false); }
-  [[nodiscard]] std::vector<Index> changes() const { return sorted(true); }
-
- private:
-  /// Of several tools each by itself, where the cause takes one.
-  void add_of_arm(const CauseRecord& cause) {
-    const std::size_t tools = probe_.cell->tools.size();
-    const bool each = cause.takes_numbers && tools > 1;
-    for (std::size_t k = 1; k <= (each ? tools : 1); ++k)
-      add(std::string(cause.spelling), each ? fmt::format("+{}", k) : "");
-  }
-  void add(const std::string& spelling, const std::string& behind = "") {
-    Result<ErrorSourcePtr> source = make_error_source(spelling + "@1" + behind, *probe_.cell);
-    if (!source) return;
-    const auto count = static_cast<Index>((*source)->parameters().size());
-    const Index first = add_source(probe_, std::move(*source));
-    for (Index& at : places_) at += at >= first ? count : 0;
-    Index next = 0;
-    for (const Kind& kind : kinds_) next += kind.count;
-    kinds_.push_back({spelling, behind, next, count});
-    for (Index k = 0; k < count; ++k) places_.push_back(first + k);
-  }
-  [[nodiscard]] std::vector<Index> sorted(bool of_kinds) const {
-    if (of_kinds) return places_;
-    std::vector<Index> own;
-    for (Index i = 0; i < probe_.values.size(); ++i) {
-      if (std::find(places_.begin(), places_.end(), i) == places_.end()) own.push_back(i);
-    }
-    return own;
-  }
-
-  PhysicalModel probe_;
-  std::vector<Kind> kinds_;
-  std::vector<Index> places_;
-};
 
 /// Normal equations of some rows of one session: of the changes (K), of the shared parameters (P), of its motion.
 struct Sums {
@@ -137,7 +71,7 @@ struct Seen {
 class ChangeSearch {
  public:
   ChangeSearch(const CalibrationResult& found, std::vector<SessionSetting> sessions, const MeasurementBatch& batch)
-      : kinds_(found.model),
+      : kinds_(found.model, ChangesOf::kArm),
         sessions_(std::move(sessions)),
         s_(scaled_parameters(kinds_.probe(), {})),
         own_(kinds_.own()),
@@ -168,10 +102,11 @@ class ChangeSearch {
     Seen seen;
     for (std::size_t s = sessions_.size() - 1; s >= 1; --s) {
       seen.add(whole_[s], block(s));
-      for (const Kind& kind : kinds_.kinds()) {
+      for (const ChangeKind& kind : kinds_.kinds()) {
         const Scored scored = score(kind, s, seen, inflation);
         if (scored.gain > 0) all.push_back(scored);
       }
+      add_alone(s, inflation, all);
     }
     const auto best = std::max_element(all.begin(), all.end(),
                                        [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
@@ -180,35 +115,55 @@ class ChangeSearch {
     if (best == all.end()) return std::nullopt;
     const double chance = chance_of(static_cast<int>(best->kind->count), best->gain, all.size());
     if (chance > kChance) return std::nullopt;
-    Change change{best->kind->from(first_of(best->session)), best->session, best->gain, chance, {}};
+    Change change{spelled(*best), best->session, best->gain, chance, {}};
     for (const Scored& other : all) {
-      if (&other != &*best && other.gain > best->gain - kAsGood)
-        change.could_also_be.push_back(other.kind->from(first_of(other.session)));
+      if (&other != &*best && other.gain > best->gain - kAsGood) change.could_also_be.push_back(spelled(other));
     }
     return change;
   }
 
  private:
   struct Scored {
-    const Kind* kind = nullptr;
+    const ChangeKind* kind = nullptr;
     std::size_t session = 0;
     double gain = 0, evidence = 0;
+    bool alone = false;  // it held in that session only
   };
 
   struct Wandering {
-    const Kind* kind = nullptr;
+    const ChangeKind* kind = nullptr;
     double rate = 0, gain = 0;  // prior standard deviations a session; twice the log likelihood
   };
 
   static double chance_of(int freedom, double gain, std::size_t candidates) {
-    return std::min(1.0, static_cast<double>(candidates) * chi_square_tail(freedom, gain));
+    return std::min(1.0, static_cast<double>(candidates) * chi_square_tail(gain, freedom));
+  }
+
+  [[nodiscard]] std::string spelled(const Scored& one) const {
+    if (!one.alone) return one.kind->from(first_of(one.session));
+    const std::string tool = one.kind->behind.empty() ? "+1" : one.kind->behind;
+    return fmt::format("{}@{}{}+{}", one.kind->spelling, first_of(one.session) + 1, tool, first_of(one.session + 1));
+  }
+
+  /// What held in one session only: a reflector that sat elsewhere that day. Of the first session that is a change at
+  /// the second one, of the newest it is how the tool sits today.
+  void add_alone(std::size_t session, double inflation, std::vector<Scored>& all) const {
+    if (session + 1 >= sessions_.size()) return;
+    Seen seen;
+    seen.add(whole_[session], block(session));
+    for (const ChangeKind& kind : kinds_.kinds()) {
+      if (kind.joint >= 0 || !kind.cause->takes_numbers) continue;  // a tool, which may be named
+      Scored scored = score(kind, session, seen, inflation);
+      scored.alone = true;
+      if (scored.gain > 0) all.push_back(scored);
+    }
   }
 
   /// The one number that a random walk from session to session explains best, where that is beyond chance.
   [[nodiscard]] Wandering most_wandering(double inflation) const {
     Wandering best;
     if (sessions_.size() < kFewestToWander) return best;
-    for (const Kind& kind : kinds_.kinds()) {
+    for (const ChangeKind& kind : kinds_.kinds()) {
       if (kind.count != 1) continue;
       const Wandering one = wandering_of(kind, inflation);
       if (one.gain > best.gain) best = one;
@@ -217,7 +172,7 @@ class ChangeSearch {
     return best;
   }
   /// Steps z of unit variance times the rate, summed up: the evidence of the rate is that of a Gaussian prior.
-  [[nodiscard]] Wandering wandering_of(const Kind& kind, double inflation) const {
+  [[nodiscard]] Wandering wandering_of(const ChangeKind& kind, double inflation) const {
     const auto S = static_cast<Index>(sessions_.size());
     const auto P = static_cast<Index>(own_.size());
     VectorXd own(S - 1), along(S - 1);
@@ -326,7 +281,7 @@ class ChangeSearch {
     return along.dot(left.ldlt().solve(along));
   }
 
-  [[nodiscard]] Scored score(const Kind& kind, std::size_t session, const Seen& seen, double inflation) const {
+  [[nodiscard]] Scored score(const ChangeKind& kind, std::size_t session, const Seen& seen, double inflation) const {
     const double gained = gain(kind.first, kind.count, seen) / inflation;
     double rows = 0;
     for (const SessionSetting& one : sessions_) rows += 3.0 * one.poses;
@@ -352,7 +307,7 @@ class ChangeSearch {
     return count > 0 ? std::max(kLeastInflation, sum / count) : kLeastInflation;
   }
 
-  const AllKinds kinds_;
+  const ChangeKinds kinds_;
   const std::vector<SessionSetting> sessions_;
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;

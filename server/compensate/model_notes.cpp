@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/calibrate/one_session.h"
 #include "server/compensate/paired_gain.h"
 #include "server/error_sources/anchors.h"
 
@@ -177,8 +178,14 @@ void add_changes(const CompensatedModel::Parts& parts, std::vector<std::string>&
       continue;
     }
     const SessionSetting& since = parts.sessions[change.session];
-    std::string note = fmt::format("since session {} (pose {}): {} ({}; U, k=2)", since.id, since.first_pose,
-                                   cause_in_words(change.source), size_of(parts, change));
+    std::string note =
+        is_of_one_session(change)
+            ? fmt::format(
+                  "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat elsewhere "
+                  "({}; U, k=2): the sessions after it are as those before",
+                  since.id, since.first_pose, size_of(parts, change))
+            : fmt::format("since session {} (pose {}): {} ({}; U, k=2)", since.id, since.first_pose,
+                          cause_in_words(change.source), size_of(parts, change));
     std::vector<std::string> others;
     for (const std::string& other : change.could_also_be) others.push_back(cause_in_words(other));
     if (!others.empty()) note += fmt::format("; ambiguous: it could also be {}", fmt::join(others, " or "));

@@ -8,6 +8,8 @@
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
+#include "server/calibrate/identify_sessions.h"
+#include "server/calibrate/one_session.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
@@ -24,12 +26,27 @@ namespace {
 constexpr std::size_t kFewestPoses =
     12;  // a base and a tool are 12 numbers; with fewer poses little is left to look at
 
-/// Of a batch of several sessions: where the instrument of each stood, by the arm as the cell's sources have it.
-Result<std::vector<SessionSetting>> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch) {
-  if (!has_sessions(batch.rows())) return std::vector<SessionSetting>();
+/// Of a batch of several sessions.
+struct Placed {
+  std::vector<SessionSetting> sessions;  ///< where the instrument of each stood
+  std::vector<Change> changes;           ///< of the arm between them
+};
+
+/// By the arm as the cell's sources have it, and what changed on it between two sessions: what a change does is no
+/// noise of the sessions after it.
+Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                      const DiagnoseOptions& options) {
+  if (!has_sessions(batch.rows())) return Placed();
   const MeasurementBatch merged = merge_repeats(batch.training(), cell->tracker.sigma).batch;
-  return calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), merged, {})
-      .map([](CalibrationResult found) { return std::move(found.sessions); });
+  const Identify identify = [&](const std::vector<std::string>& sources) {
+    return calibrate(cell, sources, merged, {});
+  };
+  return identify_sessions(
+             identify, with_unknown_tool(cell->model.error_sources, *cell), merged,
+             [&](double) { return report_progress(options, "asking what changed between the sessions", 0); })
+      .map([](IdentifiedSessions found) {
+        return Placed{std::move(found.calibration.sessions), std::move(found.changes)};
+      });
 }
 
 /// What stands for an instrument that was set up anew.
@@ -42,11 +59,19 @@ const CauseRecord& set_up_anew() {
   return **found;
 }
 
+/// Whether the search has no cause that acts as the change does: it looks for what begins at a pose and stays.
+bool is_beside_the_search(const Change& change) { return is_of_one_session(change) || change.rate > 0; }
+
 /// The cell's sources, and from each session on a tracker that was set up anew: nothing that this explains is evidence.
-std::vector<std::string> sources_of(const Cell& cell, const std::vector<SessionSetting>& sessions) {
+/// So is what the search could not name of what changed between the sessions.
+std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
   std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
-  for (std::size_t s = 1; s < sessions.size(); ++s)
-    sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, sessions[s].first + 1));
+  for (std::size_t s = 1; s < placed.sessions.size(); ++s)
+    sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, placed.sessions[s].first + 1));
+  for (const Change& change : placed.changes) {
+    if (!is_beside_the_search(change)) continue;
+    for (std::string& source : change.sources()) sources.push_back(std::move(source));
+  }
   return sources;
 }
 
@@ -100,10 +125,10 @@ Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
 }
 
 Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const PreparedBatch& prepared,
-                              const std::vector<SessionSetting>& sessions, const DiagnoseOptions& options) {
+                              const Placed& placed, const DiagnoseOptions& options) {
   const Status wanted = report_progress(options, "calibrating", 0);
   if (!wanted) return tl::make_unexpected(wanted.error());
-  Result<SearchResult> result = search_causes(cell, sources_of(*cell, sessions), prepared.train, options);
+  Result<SearchResult> result = search_causes(cell, sources_of(*cell, placed), prepared.train, options);
   if (!result) return result;
   const Status go_on = report_progress(options, "measuring the gain", 0.65);
   if (!go_on) return tl::make_unexpected(go_on.error());
@@ -122,6 +147,40 @@ void tell_since(const MeasurementBatch& batch, Diagnosis& diagnosis) {
   }
 }
 
+/// `since session day-3 (pose day-3/1): lost zero in joint 3`
+std::string in_words(const Change& change, const Placed& placed) {
+  const auto words = [](const std::string& source) { return trammel::in_words(source.substr(0, source.find('@'))); };
+  const SessionSetting& since = placed.sessions[change.rate > 0 ? 1 : change.session];
+  if (is_of_one_session(change)) {
+    return fmt::format(
+        "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat elsewhere: the sessions "
+        "after it are as those before",
+        since.id, since.first_pose);
+  }
+  if (change.rate > 0) {
+    return fmt::format("from session {} on (pose {}) {} wanders by {:.4f} mrad a session", since.id, since.first_pose,
+                       words(change.source), 1e3 * change.rate);
+  }
+  std::vector<std::string> causes = {words(change.source)};
+  for (const std::string& other : change.could_also_be) {
+    if (std::find(causes.begin(), causes.end(), words(other)) == causes.end()) causes.push_back(words(other));
+  }
+  return fmt::format("since session {} (pose {}): {}", since.id, since.first_pose, fmt::join(causes, ", or "));
+}
+
+/// What changed on the arm between two sessions and is no finding: what the search has no cause for, or did not name.
+std::string told_of_sessions(const Placed& placed, const Diagnosis& diagnosis) {
+  std::string text;
+  for (const Change& change : placed.changes) {
+    const std::string& since = placed.sessions[change.session].id;
+    const bool is_found = !is_beside_the_search(change) &&
+                          std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                                      [&](const Finding& finding) { return finding.since_session == since; });
+    if (!is_found) text += "; " + in_words(change, placed);
+  }
+  return text;
+}
+
 /// What was done to which files.
 void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed, Diagnosis& diagnosis) {
   diagnosis.batch_hash = batch.hash();
@@ -131,11 +190,11 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
 
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
-  const Result<std::vector<SessionSetting>> sessions = placed(cell, batch);
-  if (!sessions) return tl::make_unexpected(sessions.error());
-  const Result<PreparedBatch> prepared = prepare(*cell, batch, *sessions);
+  const Result<Placed> together = placed(cell, batch, options);
+  if (!together) return tl::make_unexpected(together.error());
+  const Result<PreparedBatch> prepared = prepare(*cell, batch, together->sessions);
   if (!prepared) return tl::make_unexpected(prepared.error());
-  Result<SearchResult> result = searched(cell, *prepared, *sessions, options);
+  Result<SearchResult> result = searched(cell, *prepared, *together, options);
   if (!result) return tl::make_unexpected(result.error());
   const Explained explained(*cell, std::move(*result));
   const SearchResult& found = explained.found;
@@ -168,7 +227,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                      tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
                    }});
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
-  diagnosis.sentence = sentence_for(diagnosis);
+  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(*together, diagnosis);
   return diagnosis;
 }
 

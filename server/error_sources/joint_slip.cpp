@@ -29,7 +29,11 @@ class JointSlip final : public JointError {
   const int first_;
 };
 
-Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) { return std::make_shared<JointSlip>(spec); }
+Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell&) {
+  if (spec.at.size() > 2)
+    return failure(ErrorCode::kUsage, "error source '{}': a pose, and how far zeros usually slip, mrad", spec.text);
+  return std::make_shared<JointSlip>(spec);
+}
 
 }  // namespace
 

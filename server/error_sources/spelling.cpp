@@ -54,7 +54,7 @@ Result<SourceSpec> parse_spec(const std::string& text, const CauseRecord& known,
       spec.at.push_back(value);
     }
   }
-  const std::size_t most = known.takes_numbers ? 2 : 1;
+  const std::size_t most = known.takes_numbers ? 3 : 1;
   if (known.lasting == Lasting::kFromAPose &&
       (spec.at.empty() || spec.at.size() > most || spec.at[0] != std::floor(spec.at[0]) || spec.at[0] > kMostPoses)) {
     return failure(ErrorCode::kUsage, "error source '{}': expected {}@pose, the row of the batch at which it begins",

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "server/error_sources/frame_motion.h"
@@ -9,6 +10,8 @@
 namespace trammel {
 
 namespace {
+
+constexpr double kMostRows = 1e6;  // of a batch
 
 void add_six(std::vector<Parameter>& parameters, const std::string& suffix) {
   for (const char* name : {"tx", "ty", "tz"}) parameters.push_back(length_parameter(name + suffix, 2));
@@ -45,29 +48,37 @@ class Tool final : public ErrorSource {
 };
 
 /// From a pose on, a tool sits elsewhere on the flange: it was changed, or knocked. `tool` is its name; empty: any.
+/// With a third number only up to that pose: the tool, or the reflector on it, was put back, and no request is served
+/// so.
 class ToolChanged final : public ErrorSource {
  public:
   ToolChanged(const SourceSpec& spec, std::string tool)
       : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1), tool_(std::move(tool)) {
-    add_six(parameters_, fmt::format("@{}{}", first_ + 1, tool_.empty() ? "" : "[" + tool_ + "]"));
+    if (spec.at.size() > 2) back_ = static_cast<int>(spec.at[2]);
+    add_six(parameters_, fmt::format("@{}{}{}", first_ + 1, back_ ? fmt::format("-{}", *back_) : "",
+                                     tool_.empty() ? "" : "[" + tool_ + "]"));
   }
   const CauseRecord& cause() const override { return causes::tool_changed(); }
   std::string name() const override { return name_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
-    return fmt::format("the tool{} was changed or knocked before pose {}", tool_.empty() ? "" : " " + tool_,
-                       first_ + 1);
+    const std::string tool = tool_.empty() ? "" : " " + tool_;
+    if (back_)
+      return fmt::format("the tool{}, or the reflector on it, sat elsewhere from pose {} to {}", tool, first_ + 1,
+                         *back_);
+    return fmt::format("the tool{} was changed or knocked before pose {}", tool, first_ + 1);
   }
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    if (context.from(first_) && (tool_.empty() || context.tool == tool_))
-      move_tool(values, state, jacobian, first_column);
+    const bool is_there = context.from(first_) && !(back_ && context.from(*back_));
+    if (is_there && (tool_.empty() || context.tool == tool_)) move_tool(values, state, jacobian, first_column);
   }
 
  private:
   std::string name_;
   int first_;
+  std::optional<int> back_;  // index of the first pose where it sits as before
   std::string tool_;
   std::vector<Parameter> parameters_;
 };
@@ -83,6 +94,9 @@ Result<ErrorSourcePtr> make_tool_changed(const SourceSpec& spec, const Cell& cel
   if (spec.at[1] != std::floor(spec.at[1]) || spec.at[1] > static_cast<double>(cell.tools.size()))
     return failure(ErrorCode::kUsage, "error source '{}': tool {:g} of {}, in the order of their names", spec.text,
                    spec.at[1], cell.tools.size());
+  if (spec.at.size() > 2 && (spec.at[2] != std::floor(spec.at[2]) || spec.at[2] < spec.at[0] || spec.at[2] > kMostRows))
+    return failure(ErrorCode::kUsage, "error source '{}': {:g} is no pose from {:g} on", spec.text, spec.at[2],
+                   spec.at[0]);
   return std::make_shared<ToolChanged>(spec, std::next(cell.tools.begin(), static_cast<int>(spec.at[1]) - 1)->first);
 }
 

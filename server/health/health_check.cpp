@@ -108,6 +108,7 @@ class Examination {
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
   void tell_rms(const RefittedRows& refitted);
   void tell_due(const RefittedRows& refitted, const CheckTimes& times);
+  [[nodiscard]] std::vector<double> misfits_of_drift(const RefittedRows& refitted) const;
   [[nodiscard]] Eigen::VectorXd rows_of(const CauseSignal& signal) const;
   [[nodiscard]] std::vector<double> strengths(std::size_t cause, const RefittedRows& refitted) const;
   void tell_smallest(const CheckTests& tests);
@@ -281,12 +282,43 @@ std::vector<double> Examination::strengths(std::size_t cause, const RefittedRows
   return strengths;
 }
 
-/// Drift is a random walk of all single causes together: after a time t the effects that they have over the working
-/// poses are normal, of variance v t in all. This check says how large v may be (95 %, profile likelihood), and so when
-/// the effect may be above the tolerance (95 %).
+/// From what the next check follows; `since`: s from the model to this check.
+std::string because_of(const DriftRate& rate, double since) {
+  constexpr double kDay = 86400;  // s
+  constexpr double kMonth = 30 * kDay;
+  if (rate.checks == 1) {
+    return fmt::format(
+        "since the model was measured, {:.0f} days before, the arm has drifted by at most {:.3f} mm rms (95 %)",
+        since / kDay, 2 * to_mm(DriftRate::after(rate.most, since)));
+  }
+  return fmt::format(
+      "by {} checks over {:.0f} days the arm drifts by {:.3f} mm rms in 30 days ({:.3f} to {:.3f}, 95 %)", rate.checks,
+      rate.span / kDay, to_mm(DriftRate::after(rate.best, kMonth)), to_mm(DriftRate::after(rate.least, kMonth)),
+      to_mm(DriftRate::after(rate.most, kMonth)));
+}
+
+/// How likely each variance of a drift is, by the residuals: the effects of all single causes are normal, alike.
+std::vector<double> Examination::misfits_of_drift(const RefittedRows& refitted) const {
+  Eigen::MatrixXd drift(rows_.residual.size(), static_cast<Index>(signals_.size()));
+  for (std::size_t s = 0; s < signals_.size(); ++s)
+    drift.col(static_cast<Index>(s)) = refitted.left(rows_of(signals_[s]));
+  drift /= std::sqrt(static_cast<double>(signals_.size()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> along(drift * drift.transpose());
+  const Eigen::VectorXd left = along.eigenvectors().transpose() * refitted.left(rows_.residual);
+  std::vector<double> misfits;
+  for (const double variance : drift_variances()) {
+    const Eigen::ArrayXd all = 1 + variance * along.eigenvalues().array().max(0.0);
+    misfits.push_back((all.log() + left.array().square() / all).sum());
+  }
+  const double least = *std::min_element(misfits.begin(), misfits.end());
+  for (double& misfit : misfits) misfit -= least;
+  return misfits;
+}
+
+/// The effect of the drift may be above the tolerance (95 %) when it has grown that large at the highest rate that all
+/// checks together leave likely (95 %).
 void Examination::tell_due(const RefittedRows& refitted, const CheckTimes& times) {
-  constexpr double kDay = 86400;      // s
-  constexpr double kSurprise = 2.71;  // of twice the log likelihood: 95 % from one side
+  constexpr double kDay = 86400;  // s
   if (!check_.changed.empty()) {
     check_.due_because = "what changed comes first: train again, then check";
     return;
@@ -296,29 +328,17 @@ void Examination::tell_due(const RefittedRows& refitted, const CheckTimes& times
                                                     : "it is not known when the model and the check were measured";
     return;
   }
-  Eigen::MatrixXd drift(rows_.residual.size(), static_cast<Index>(signals_.size()));
-  for (std::size_t s = 0; s < signals_.size(); ++s)
-    drift.col(static_cast<Index>(s)) = refitted.left(rows_of(signals_[s]));
-  drift /= std::sqrt(static_cast<double>(signals_.size()));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> along(drift * drift.transpose());
-  const Eigen::VectorXd left = along.eigenvectors().transpose() * refitted.left(rows_.residual);
-  const auto misfit = [&](double variance) {
-    const Eigen::ArrayXd all = 1 + variance * along.eigenvalues().array().max(0.0);
-    return (all.log() + left.array().square() / all).sum();
-  };
-  double least = misfit(0);
-  double most = 0;  // m², since the model was measured
-  for (double variance = 1e-14; variance < 1e-4; variance *= 1.1) least = std::min(least, misfit(variance));
-  for (double variance = 1e-14; variance < 1e-4; variance *= 1.1)
-    if (misfit(variance) < least + kSurprise) most = variance;
-  const double since = static_cast<double>(*times.check - *times.model);
-  const double until = since * (options_.tolerance * options_.tolerance) / (4 * std::max(most, 1e-14));
+  check_.drift = DriftSeen{*times.model, *times.check, misfits_of_drift(refitted)};
+  std::vector<DriftSeen> seen = options_.earlier;
+  seen.push_back(*check_.drift);
+  check_.drift_rate = drift_rate(seen);
+  const DriftRate& rate = *check_.drift_rate;
   constexpr double kFarthest = 2 * 365.25 * kDay;
+  const double until = (options_.tolerance * options_.tolerance) / (4 * rate.most);
+  const double since = static_cast<double>(*times.check - *times.model);
   const double due = static_cast<double>(*times.model) + std::min(until, since + kFarthest);
   check_.due = date_of(static_cast<std::int64_t>(std::max(due, static_cast<double>(*times.check))));
-  check_.due_because = fmt::format(
-      "since the model was measured, {:.0f} days before, the arm has drifted by at most {:.3f} mm rms (95 %)",
-      since / kDay, 2 * to_mm(std::sqrt(most)));
+  check_.due_because = because_of(rate, since);
 }
 
 /// What it does at the poses of the check.
@@ -435,8 +455,10 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
   if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
   const ErrorFigures& shown = model.parts().training.compensated;
   const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
-  return Examination(options, effects, working, std::move(*rows), tails)
-      .result({model.provenance().measured_at, batch.rows().measured_at});
+  HealthCheck check = Examination(options, effects, working, std::move(*rows), tails)
+                          .result({model.provenance().measured_at, batch.rows().measured_at});
+  check.model = model.provenance().id;
+  return check;
 }
 
 }  // namespace trammel

@@ -7,6 +7,7 @@
 
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
+#include "server/health/drift.h"
 #include "server/measurement/checked_batch.h"
 #include "server/plan/check_design.h"
 
@@ -30,6 +31,7 @@ struct HealthOptions {
   double false_alarm = 0.003;          ///< chance that a healthy robot is said to have changed
   double power = 0.95;                 ///< chance with which an effect of the stated smallest size is seen
   std::uint64_t seed = 1;
+  std::vector<DriftSeen> earlier = {};  ///< what checks before this one saw of the arm's drift
 };
 
 /// A change that was seen.
@@ -54,8 +56,11 @@ struct HealthCheck {
   std::vector<SeenChange> changed;
   std::vector<std::string> suspects;  ///< pose ids that fit nothing, left out
   std::vector<CauseNotAsked> not_asked;
-  std::string due;          ///< date of the next check (ISO 8601, UTC); empty: cannot be said
-  std::string due_because;  ///< from what that follows, or why it cannot be said
+  std::string model;                    ///< id of the one that it was held against
+  std::optional<DriftSeen> drift;       ///< what this check says of it; empty: nothing
+  std::optional<DriftRate> drift_rate;  ///< by this check and the earlier ones
+  std::string due;                      ///< date of the next check (ISO 8601, UTC); empty: cannot be said
+  std::string due_because;              ///< from what that follows, or why it cannot be said
 };
 
 /// Holds `batch` against `model`. The tracker may stand anywhere: the base is found anew. Poses whose tool or payload

@@ -1,5 +1,7 @@
 #include "server/report/health_json.h"
 
+#include <cmath>
+
 #include "server/base/units.h"
 
 namespace trammel {
@@ -32,7 +34,41 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   return json;
 }
 
+constexpr double kMonth = 30 * 86400.0;  // s
+
+ordered_json drift_json(const DriftSeen& drift) {
+  ordered_json misfits = ordered_json::array();
+  for (const double misfit : drift.misfit) misfits.push_back(std::round(misfit * 1e3) / 1e3);
+  return {{"from_unix_s", drift.from}, {"until_unix_s", drift.until}, {"misfit", std::move(misfits)}};
+}
+
+ordered_json rate_json(const DriftRate& rate) {
+  const auto in_a_month = [](double r) { return to_mm(DriftRate::after(r, kMonth)); };
+  return {{"checks", rate.checks},
+          {"days", rate.span / 86400},
+          {"rms_mm_in_30_days", in_a_month(rate.best)},
+          {"at_least_mm", in_a_month(rate.least)},
+          {"at_most_mm", in_a_month(rate.most)}};
+}
+
 }  // namespace
+
+std::optional<DriftSeen> drift_of(const std::string& check) {
+  const ordered_json json = ordered_json::parse(check, nullptr, false);
+  if (!json.is_object() || !json.contains("drift_seen") || !json["drift_seen"].is_object()) return std::nullopt;
+  const ordered_json& drift = json["drift_seen"];
+  for (const char* key : {"from_unix_s", "until_unix_s"})
+    if (!drift.contains(key) || !drift[key].is_number_integer()) return std::nullopt;
+  if (!drift.contains("misfit") || !drift["misfit"].is_array()) return std::nullopt;
+  DriftSeen seen{drift["from_unix_s"], drift["until_unix_s"], {}};
+  for (const ordered_json& misfit : drift["misfit"]) {
+    if (!misfit.is_number()) return std::nullopt;
+    seen.misfit.push_back(misfit);
+  }
+  return seen;
+}
+
+std::string drift_text(const DriftSeen& drift) { return ordered_json{{"drift_seen", drift_json(drift)}}.dump(); }
 
 ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   ordered_json json = {{"verdict", to_string(check.verdict)},
@@ -49,6 +85,9 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
                        {"suspect_poses", check.suspects},
                        {"smallest_seen", ordered_json::array()},
                        {"not_asked", ordered_json::array()}};
+  json["model"] = check.model;
+  json["drift_rate"] = check.drift_rate ? rate_json(*check.drift_rate) : ordered_json(nullptr);
+  json["drift_seen"] = check.drift ? drift_json(*check.drift) : ordered_json(nullptr);
   for (const SeenChange& change : check.changed) json["changed"].push_back(change_json(change, since));
   for (const SmallestEffect& smallest : check.smallest) {
     ordered_json one = cause_json(smallest.cause);

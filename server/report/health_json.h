@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "server/health/health_check.h"
@@ -14,6 +15,10 @@ struct CheckedSince {
 
 /// A health check for programs, as the contract spells it; lengths in mm, joints from 1.
 [[nodiscard]] nlohmann::ordered_json health_json(const HealthCheck& check, const CheckedSince& since);
+/// What the check that health_json() wrote says of the arm's drift; empty: nothing.
+[[nodiscard]] std::optional<DriftSeen> drift_of(const std::string& check);
+/// A text that drift_of() reads, and nothing else of the check.
+[[nodiscard]] std::string drift_text(const DriftSeen& drift);
 /// For people: the verdict, what changed, what would have been seen, when the next check is due.
 [[nodiscard]] std::string health_text(const HealthCheck& check);
 

@@ -7,6 +7,7 @@
 
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
 #include "server/trainer/job_sources.h"
 #include "server/trainer/pipeline/given_up.h"
@@ -15,6 +16,7 @@ namespace trammel {
 
 namespace {
 
+constexpr int kMostEarlierJobs = 500;                     // among which earlier checks are looked for
 constexpr std::chrono::milliseconds kReportInterval{50};  // of a running job, for its watchers
 constexpr std::chrono::milliseconds kFirstPause{250};     // before the disk is asked again; twice as long each time
 constexpr std::chrono::milliseconds kLongestPause{5000};
@@ -58,6 +60,20 @@ bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
   MutexLock lock(mutex);
   never.wait_for(lock, stop, length, [] { return false; });
   return !stop.stop_requested();
+}
+
+/// What the checks of the cell that are done saw of its arm's drift, oldest first.
+Result<std::vector<std::string>> earlier_checks(const Store& store, const std::string& cell) {
+  const auto jobs = store.recent_jobs(cell, kMostEarlierJobs);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  std::vector<std::string> earlier;
+  for (const StoredJob& job : *jobs) {
+    if (job.kind != JobKind::kCheck || job.state != JobState::kDone) continue;
+    const auto found = store.diagnosis(job.id);
+    const auto drift = found ? drift_of(found->findings) : std::nullopt;
+    if (drift) earlier.push_back(drift_text(*drift));
+  }
+  return earlier;
 }
 
 bool is_same(const Opponents& a, const Opponents& b) {
@@ -148,6 +164,11 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   if (const auto present = registry_.in_force(job.cell))
     task.in_force = ModelText{present->version, serialize(present->model)};
   task.fleet = fleet_prior_of(job);
+  if (job.kind == JobKind::kCheck) {
+    auto earlier = earlier_checks(store_, job.cell);
+    if (!earlier) return tl::make_unexpected(earlier.error());
+    task.earlier_checks = std::move(*earlier);
+  }
   task.seed = options_.seed;
   task.validation_share = options_.validation_share;
   task.accept_ratio = options_.accept_ratio;

@@ -47,6 +47,24 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   EXPECT_TRUE(models_json({model})[0]["data_age_s"].is_null());
 }
 
+TEST(ServiceText, AnActivationSaysBeforeAfterLimitWhyAndTheNextCommand) {
+  client::JobStatus made{3, "cell-7", "done", "not in force: worse", 1, 2, false};
+  made.before_mm = 0.0112;
+  made.after_mm = 0.0251;
+  made.limit_mm = 0.0114;
+  made.why = "worse";
+  EXPECT_EQ(in_force_text({"cell-7", 2, 1, made}),
+            "cell cell-7: version 2 in force\n"
+            "held-out rms: before 0.0112 mm, after 0.0251 mm, limit 0.0114 mm\n"
+            "why: when it was made: worse\n"
+            "next: trammel rollback --service --cell cell-7 puts version 1 back in force, if it is not wanted\n");
+  EXPECT_EQ(in_force_json({"cell-7", 2, 1, made})["after_mm"], 0.0251);
+  const InForce imported{"cell-7", 4, 0, {}};
+  EXPECT_NE(in_force_text(imported).find("it was imported"), std::string::npos) << in_force_text(imported);
+  EXPECT_TRUE(in_force_json(imported)["after_mm"].is_null());
+  EXPECT_EQ(in_force_json({"cell-7", 2, 2, made})["next"], "");
+}
+
 TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   client::JobStatus end{3, "cell-7", "done", "not in force: worse", 1, 4, false};
   EXPECT_NE(next_step(end).find("trammel activate --service --model cell-7@4"), std::string::npos);

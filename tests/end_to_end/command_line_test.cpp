@@ -719,7 +719,11 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
   for (const char* part : {"version 2, not in force", "held-out rms", "trammel activate --service --model cell-7@2"}) {
     EXPECT_NE(worse.out.find(part), std::string::npos) << part << " is not in:\n" << worse.out;
   }
-  EXPECT_NE(must_answer({"activate", "--model", "cell-7@2"}).out.find("version 2 in force"), std::string::npos);
+  const Finished activated = must_answer({"activate", "--model", "cell-7@2"});
+  for (const char* part : {"version 2 in force", "held-out rms: before", "limit", "why: when it was made",
+                           "next: trammel rollback --service --cell cell-7 puts version 1"}) {
+    EXPECT_NE(activated.out.find(part), std::string::npos) << part << " is not in:\n" << activated.out;
+  }
   EXPECT_NE(must_answer({"rollback", "--cell", "cell-7"}).out.find("version 1 in force"), std::string::npos);
   must_answer({"export", "--model", "cell-7@2", "-o", file("second.model")});
   EXPECT_EQ(imported(file("second.model")), 2) << "the service has it already";

@@ -6,7 +6,9 @@
 
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
+#include "server/report/health_json.h"
 #include "tests/support/checked_robot.h"
+#include "tests/support/demand.h"
 
 namespace trammel {
 namespace {
@@ -69,6 +71,39 @@ TEST_F(HealthTest, AJointThatLostItsZeroBy50umIsSeenAndNamedWithItsSize) {
     }
   }
   EXPECT_GE(named, 9);
+}
+
+TEST_F(HealthTest, WhenTheNextCheckIsDueFollowsFromAllChecksThatWereMade) {
+  constexpr std::int64_t kDay = 86400;
+  constexpr std::int64_t kMeasured = 1'700'000'000;
+  CompensatedModel::Parts parts = robot_->model.parts();
+  parts.provenance.measured_at = kMeasured;
+  CheckedRobot dated{robot_->robot, test::demand(CompensatedModel::make(std::move(parts))), robot_->planned};
+  HealthOptions options = tolerance_mm(0.1);
+  HealthCheck check;
+  std::vector<std::string> due;
+  for (std::int64_t month = 1; month <= 4; ++month) {
+    MeasurementBatch batch = measured_check(dated, {}, static_cast<std::uint64_t>(month));
+    batch.measured_at = kMeasured + 30 * month * kDay;
+    check = test::demand(
+        check_health(dated.model, test::demand(check_against_cell(batch, dated.model.cell(), drawn(0, 1))), options));
+    ASSERT_TRUE(check.drift && check.drift_rate) << check.due_because;
+    EXPECT_EQ(check.drift_rate->checks, month);
+    const std::string text = health_json(check, {}).dump();
+    const auto read = drift_of(text);
+    ASSERT_TRUE(read) << text;
+    options.earlier.push_back(*read);
+    due.push_back(check.due);
+  }
+  EXPECT_GT(due.back(), due.front());
+  EXPECT_NE(check.due_because.find("by 4 checks over 120 days"), std::string::npos) << check.due_because;
+  options.earlier.clear();
+  MeasurementBatch batch = measured_check(dated, {}, 1);
+  batch.measured_at = kMeasured + 30 * kDay;
+  const HealthCheck alone = test::demand(
+      check_health(dated.model, test::demand(check_against_cell(batch, dated.model.cell(), drawn(0, 1))), options));
+  EXPECT_LT(check.drift_rate->most, alone.drift_rate->most);
+  EXPECT_NE(alone.due_because.find("30 days before"), std::string::npos) << alone.due_because;
 }
 
 TEST_F(HealthTest, WhatThePosesCouldHideIsNotCalledHealthy) {

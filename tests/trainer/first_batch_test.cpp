@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 
@@ -40,6 +42,22 @@ TEST(FirstBatch, OneOfAnotherToolIsLearnedOnceSomebodyWhoKnowsHasReleasedIt) {
   const auto again = test::demand(cell.trainer().retrain("cell-7", {"day-1"}, "", "", Trainer::Quarantine::kReleased));
   EXPECT_EQ(cell.finished(again).outcome.verdict, JobVerdict::kInForce) << cell.finished(again).what;
   EXPECT_EQ(cell.in_force(), 1);
+}
+
+TEST(FirstBatch, OneInWhichSomethingJumpsHalfwayIsKeptOutWithItsPose) {
+  const auto nominal = test::cell_7();
+  LearningCell cell(nominal);
+  const VirtualRobot robot = test::chapter_5_robot(nominal);
+  MeasurementBatch batch = test::measured_on(robot, {.poses = 120, .seed = 7});
+  const MeasurementBatch later = test::measured_on(test::with_zero_off(robot, 3, 1e-3), {.poses = 120, .seed = 7});
+  std::copy(later.measurements.begin() + 60, later.measurements.end(), batch.measurements.begin() + 60);
+  const std::string pose = batch.measurements[60].pose_id;
+  const JobProgress job = cell.submit(std::move(batch));
+  EXPECT_EQ(job.outcome.verdict, JobVerdict::kQuarantined) << job.what;
+  EXPECT_NE(job.what.find("from pose " + pose), std::string::npos) << job.what;
+  EXPECT_NE(job.what.find("lost zero in joint 3"), std::string::npos) << job.what;
+  EXPECT_NE(job.what.find("mm rms"), std::string::npos) << job.what;
+  EXPECT_EQ(cell.in_force(), 0) << "nothing is learned";
 }
 
 TEST(FirstBatch, ALaterOneThatWasReadWronglyIsNamedLikewise) {

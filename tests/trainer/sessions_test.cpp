@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "server/base/units.h"
+#include "server/calibrate/one_session.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/world.h"
@@ -139,6 +141,54 @@ TEST(Sessions, AZeroLostIsFoundBesideAnotherScale) {
   ASSERT_EQ(model.parts().changes.size(), 1u);
   EXPECT_EQ(model.parts().changes.front().source, "joint_slip:3@121");
   EXPECT_TRUE(are_stretched(model.parts().sessions));
+}
+
+/// Five sessions; in those of `elsewhere` (from 0) the reflector sits elsewhere on the tool.
+CheckedBatch sessions_with_reflector_off(const VirtualRobot& robot, const std::set<int>& elsewhere, const Vector3& by,
+                                         std::uint64_t seed) {
+  VirtualRobot other = robot;
+  other.truth.tools.at("spindle").translation() += by;
+  std::vector<CheckedBatch> batches;
+  for (int s = 0; s < 5; ++s) {
+    const test::Day day{.poses = 60, .seed = seed + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+    batches.push_back(checked(measured_on(elsewhere.contains(s) ? other : robot, day), fmt::format("day-{}", s + 1),
+                              *robot.truth.cell));
+  }
+  return joined(batches);
+}
+
+TEST(Sessions, AReflectorThatSatElsewhereForADaySpoilsNothing) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const Vector3& by : {Vector3(1e-4, 0, 5e-5), Vector3(0.004, -0.002, 0.001)}) {
+    const CompensatedModel good = test::demand(train(cell, sessions_with_reflector_off(robot, {}, by, 600), kPhysics));
+    const CompensatedModel model =
+        test::demand(train(cell, sessions_with_reflector_off(robot, {2}, by, 600), kPhysics));
+    const auto& parts = model.parts();
+    ASSERT_EQ(parts.changes.size(), 1u) << by.transpose();
+    EXPECT_TRUE(is_of_one_session(parts.changes.front()));
+    EXPECT_EQ(parts.changes.front().source, "tool_changed@121+1+180");
+    EXPECT_LT(true_error(model, robot), 1.1 * true_error(good, robot)) << by.transpose();
+    EXPECT_EQ(parts.sessions[2].own_noise, 0);
+    const std::string note = notes_of(model).front();
+    EXPECT_NE(note.find("in session day-3 alone"), std::string::npos) << note;
+    const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
+    EXPECT_TRUE(is_of_one_session(again.parts().changes.front()));
+    EXPECT_EQ(serialize(again), serialize(model));
+  }
+}
+
+TEST(Sessions, AReflectorThatStaysElsewhereIsAChangedTool) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const Vector3 by(2e-4, 0, 1e-4);
+  for (const std::set<int>& elsewhere : {std::set<int>{4}, std::set<int>{2, 3, 4}}) {
+    const CompensatedModel model =
+        test::demand(train(cell, sessions_with_reflector_off(robot, elsewhere, by, 700), kPhysics));
+    ASSERT_EQ(model.parts().changes.size(), 1u);
+    EXPECT_FALSE(is_of_one_session(model.parts().changes.front()));
+    EXPECT_EQ(model.parts().changes.front().source, fmt::format("tool_changed@{}", 60 * *elsewhere.begin() + 1));
+  }
 }
 
 TEST(Sessions, AZeroOfTheLastJointAndATurnedToolAreAmbiguous) {

@@ -21,6 +21,7 @@ namespace {
 
 struct CheckArguments {
   std::string model, batch, json;
+  std::vector<std::string> earlier;
   std::optional<double> tolerance_mm;
   bool new_tool = false;
   ServiceOptions service;
@@ -34,22 +35,40 @@ Result<std::int64_t> ask(client::Session& session, const std::string& cell, cons
   });
 }
 
-/// What the service found; its bytes come from outside.
-Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell, std::int64_t job) {
-  const auto found = session.diagnosis(cell, job, false);
-  if (!found) return tl::make_unexpected(found.error());
-  const std::string what = fmt::format("what job {} found", job);
-  if (const Status small = check_json_limits(found->findings_json, what); !small)
-    return tl::make_unexpected(small.error());
-  nlohmann::ordered_json json = nlohmann::ordered_json::parse(found->findings_json, nullptr, false);
+/// A check that a service made; its bytes come from outside.
+Result<nlohmann::ordered_json> check_of(const std::string& text, const std::string& what) {
+  if (const Status small = check_json_limits(text, what); !small) return tl::make_unexpected(small.error());
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(text, nullptr, false);
   const bool whole = json.is_object() && json.contains("verdict") && json["verdict"].is_string() &&
                      json.contains("why") && json["why"].is_string();
   if (!whole) return failure(ErrorCode::kInternal, "{} is no check", what);
   return json;
 }
 
+Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell, std::int64_t job) {
+  const auto found = session.diagnosis(cell, job, false);
+  if (!found) return tl::make_unexpected(found.error());
+  return check_of(found->findings_json, fmt::format("what job {} found", job));
+}
+
+/// `next check: 2026-03-01; ...`; empty where nothing is said of it.
+std::string due_text(const nlohmann::ordered_json& check) {
+  const auto text_of = [&](const char* key) {
+    return check.contains(key) && check[key].is_string() ? check[key].get<std::string>() : std::string();
+  };
+  const std::string due = text_of("due"), because = text_of("due_because");
+  if (due.empty() && because.empty()) return "";
+  return fmt::format("next check: {}{}{}\n", due, due.empty() ? "" : "; ", because);
+}
+
+std::string check_text(const nlohmann::ordered_json& check) {
+  return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(), check.at("why").get<std::string>()) +
+         due_text(check);
+}
+
 Status check_at_service(const CheckArguments& arguments) {
   if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
+  if (!arguments.earlier.empty()) return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   if (model->version != 0) {
@@ -71,9 +90,20 @@ Status check_at_service(const CheckArguments& arguments) {
   if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job");
   const auto json = found_by(**session, model->cell, *job);
   if (!json) return tl::make_unexpected(json.error());
-  tell(fmt::format("{}: {}\n", json->at("verdict").get<std::string>(), json->at("why").get<std::string>()),
-       {arguments.json});
+  tell(check_text(*json), {arguments.json});
   return write_json(arguments.json, *json);
+}
+
+/// What checks before this one saw of the arm's drift: files that `--json` wrote.
+Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& files) {
+  std::vector<DriftSeen> all;
+  for (const std::string& file : files) {
+    const Result<std::string> text = read_text_file(file);
+    if (!text) return tl::make_unexpected(text.error());
+    if (const auto json = check_of(*text, file); !json) return Failure(json.error()).as(ErrorCode::kRefused).in(file);
+    if (auto drift = drift_of(*text)) all.push_back(std::move(*drift));
+  }
+  return all;
 }
 
 Status check(const CheckArguments& arguments) {
@@ -89,6 +119,9 @@ Status check(const CheckArguments& arguments) {
   options.tolerance = rules->tolerance.value_or(kUsualTolerance);
   if (arguments.tolerance_mm) options.tolerance = *arguments.tolerance_mm * from_mm(1);
   options.new_tool = arguments.new_tool;
+  Result<std::vector<DriftSeen>> earlier = earlier_drift(arguments.earlier);
+  if (!earlier) return tl::make_unexpected(earlier.error());
+  options.earlier = std::move(*earlier);
   const Result<HealthCheck> health = check_health(*model, *batch, options);
   if (!health) return tl::make_unexpected(health.error());
   const auto& rows = batch->rows().measurements;
@@ -108,6 +141,10 @@ void add_check_command(CLI::App& app, Action& chosen) {
                    "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check plans them; "
                    "with --service also the id of a batch that the service has")
       ->required();
+  command->add_option(
+      "--earlier", arguments->earlier,
+      "What an earlier check of this robot wrote with --json, once for each: the next one is due by all of "
+      "them; a service has its own");
   command
       ->add_option("--tolerance", arguments->tolerance_mm,
                    "What the cell must hold, mm, instead of the cell file's tolerance_mm (0.1 where it says none)")

@@ -8,7 +8,9 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/calibrate/jump.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/world.h"
@@ -105,6 +107,29 @@ nlohmann::ordered_json unlike_json(const std::vector<Unlike>& unlike) {
   return json;
 }
 
+/// What began in the middle of the batch, beside all that the model has.
+std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatch& batch) {
+  auto cell = std::make_shared<Cell>(*model.parts().physics.cell);
+  cell->model.error_sources.clear();
+  for (const ErrorSourcePtr& source : model.parts().physics.sources)
+    cell->model.error_sources.push_back(source->name());
+  return jump_within(cell, batch.in_order_of_time().rows());
+}
+
+std::string jump_text(const std::optional<Jump>& jump) {
+  if (!jump) return "";
+  return fmt::format(
+      "note: something changed in the middle of the batch: {}; the model is of no arm that is there: give the poses "
+      "before and after as two batches, or see what diagnose says\n",
+      in_words(*jump));
+}
+
+nlohmann::ordered_json jump_json(const Jump& jump) {
+  return {{"source", jump.source},   {"pose_id", jump.pose_id},
+          {"row", jump.row},         {"effect_rms_mm", to_mm(jump.effect)},
+          {"p_value", jump.p_value}, {"could_also_be", jump.could_also_be}};
+}
+
 Status train_model(const TrainArguments& arguments) {
   if (arguments.bias) {
     if (const Status spelled = check_bias_spelling(*arguments.bias); !spelled)
@@ -149,7 +174,8 @@ Status train_model(const TrainArguments& arguments) {
   if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
   const auto& parts = model->parts();
   const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
-  tell(model_text(*model) + unlike_text(unlike) +
+  const std::optional<Jump> jump = options.from ? std::nullopt : jump_beside(*model, *batch);
+  tell(model_text(*model) + unlike_text(unlike) + jump_text(jump) +
            (parts.validation ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
                                    evaluation_table(*parts.validation)
                              : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
@@ -158,6 +184,7 @@ Status train_model(const TrainArguments& arguments) {
        {arguments.output, arguments.json});
   nlohmann::ordered_json json = model_json(*model);
   if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
+  if (jump) json["jump"] = jump_json(*jump);
   return write_json(arguments.json, json);
 }
 

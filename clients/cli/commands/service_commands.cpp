@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <type_traits>
 
@@ -187,6 +188,23 @@ Status discard(client::Session& session, const ServiceArguments& arguments) {
                             "discarded", arguments);
 }
 
+/// 0: none, or it cannot be asked.
+int version_in_force(client::Session& session, const std::string& cell) {
+  const auto models = session.models(cell);
+  if (!models) return 0;
+  const auto found = std::find_if(models->begin(), models->end(), [](const auto& model) { return model.in_force; });
+  return found == models->end() ? 0 : found->version;
+}
+
+/// Of the jobs that the service still lists.
+std::optional<client::JobStatus> job_that_made(client::Session& session, const std::string& cell, int version) {
+  const auto jobs = session.jobs(cell);
+  if (!jobs) return std::nullopt;
+  const auto found = std::find_if(jobs->begin(), jobs->end(),
+                                  [&](const client::DatedJob& job) { return job.status.model_version == version; });
+  return found == jobs->end() ? std::nullopt : std::optional(found->status);
+}
+
 Status activate(client::Session& session, const ServiceArguments& arguments) {
   const Result<ModelReference> model = parse_model_reference(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
@@ -197,7 +215,12 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
   }
   client::ChangeOptions options = because(arguments);
   options.force = arguments.force;
-  return now_in_force(model->cell, session.activate(model->cell, model->version, options), arguments);
+  InForce now{model->cell, model->version, version_in_force(session, model->cell), {}};
+  const Result<int> version = session.activate(model->cell, model->version, options);
+  if (!version) return tl::make_unexpected(version.error());
+  now.made_by = job_that_made(session, now.cell, now.version);
+  tell(in_force_text(now), {arguments.json});
+  return write_json(arguments.json, in_force_json(now));
 }
 
 Status rollback(client::Session& session, const ServiceArguments& arguments) {

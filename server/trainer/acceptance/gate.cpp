@@ -6,6 +6,7 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/calibrate/one_session.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/world.h"
 #include "server/measurement/sessions.h"
@@ -382,19 +383,43 @@ namespace {
 std::set<std::string> before_last_change(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   std::size_t last = 0;
-  for (const Change& change : parts.changes) last = std::max(last, change.session);
+  for (const Change& change : parts.changes) last = std::max(last, is_of_one_session(change) ? 0 : change.session);
   std::set<std::string> names;
   for (std::size_t s = 0; s < last; ++s) names.insert(parts.sessions[s].id);
   return names;
 }
 
-/// What was measured since the arm changed for the last time, by either model: rows before it do not judge.
+/// The names of the sessions in which the reflector sat elsewhere for that day.
+std::set<std::string> measured_apart(const CompensatedModel& model) {
+  std::set<std::string> names;
+  for (const Change& change : model.parts().changes)
+    if (is_of_one_session(change)) names.insert(model.parts().sessions[change.session].id);
+  return names;
+}
+
+/// `session` without the rows of those sessions.
+JudgingSession without(const std::set<std::string>& names, JudgingSession session) {
+  const bool divided = has_sessions(session.judges);
+  std::erase_if(session.judges.measurements, [&](const Measurement& m) {
+    const std::string& name = divided ? session.judges.sessions[static_cast<std::size_t>(m.session)] : session.batch_id;
+    return names.contains(name) || names.contains(session.batch_id + "/" + name);
+  });
+  return session;
+}
+
+/// What was measured since the arm changed for the last time, by either model: rows before it do not judge, and none
+/// that were measured with a reflector that sat elsewhere.
 std::vector<JudgingSession> since_last_change(const GateQuestion& question) {
   std::set<std::string> before = before_last_change(question.candidate);
-  if (question.in_force != nullptr) before.merge(before_last_change(question.in_force->model));
+  std::set<std::string> apart = measured_apart(question.candidate);
+  if (question.in_force != nullptr) {
+    before.merge(before_last_change(question.in_force->model));
+    apart.merge(measured_apart(question.in_force->model));
+  }
   std::vector<JudgingSession> since;
   for (const JudgingSession& session : question.sessions) {
-    JudgingSession later = session;
+    JudgingSession later = without(apart, session);
+    if (later.judges.measurements.empty() && !session.judges.measurements.empty()) continue;
     const auto is_before = [&](const std::string& name) {
       return before.contains(name) || before.contains(session.batch_id + "/" + name);
     };

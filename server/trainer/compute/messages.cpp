@@ -97,6 +97,7 @@ std::vector<Frame> of_task(const ComputeTask& task) {
                                   {"check", task.kind == JobKind::kCheck},
                                   {"batch_ids", task.batch_ids},
                                   {"earlier_ids", task.earlier_ids},
+                                  {"earlier_checks", task.earlier_checks},
                                   {"level", task.level},
                                   {"fleet", json_of(task.fleet)},
                                   {"bias", task.bias},
@@ -120,6 +121,7 @@ Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
                                               : JobKind::kTrain;
   task.batch_ids = head.at("batch_ids").get<std::vector<std::string>>();
   task.earlier_ids = head.at("earlier_ids").get<std::vector<std::string>>();
+  task.earlier_checks = head.at("earlier_checks").get<std::vector<std::string>>();
   task.level = head.at("level");
   task.bias = head.at("bias");
   task.fleet = fleet_from(head.at("fleet"));

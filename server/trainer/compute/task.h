@@ -29,6 +29,7 @@ struct ComputeTask {
   std::vector<std::string> earlier_ids = {};  ///< sessions of the same arm to learn from as well, oldest first
   std::string level, bias;                    ///< of a training; empty: as usual
                                               ///< `level` of a check: its tolerance in mm; empty: as the cell file says
+  std::vector<std::string> earlier_checks;    ///< of a check: what those before it saw, as drift_of() reads it
   bool apply = false;                         ///< of a diagnosis: train a model with the causes found
   bool hold_against_in_force = false;         ///< look at the batch first, and learn nothing from one that is strange
   std::optional<ModelText> in_force;

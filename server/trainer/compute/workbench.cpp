@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
+#include "server/calibrate/jump.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -74,6 +75,19 @@ bool is_better_on(const std::vector<JudgingSession>& sessions, const Compensated
       .beyond_chance();
 }
 
+/// Why nothing is to be learned from the first batch of a cell: it was not read as it was meant, or something began in
+/// the middle of it. Empty: it may be.
+std::string why_no_first_batch(const CheckedBatch& batch, const std::shared_ptr<const Cell>& cell) {
+  if (const auto doubt = batch_doubt(batch.rows(), *cell)) return sentence(*doubt);
+  const auto jump = jump_within(cell, batch.in_order_of_time().rows());
+  if (!jump) return "";
+  return fmt::format(
+      "something changed in the middle of it: {}; a model of all its poses would be of no arm that is there: submit "
+      "the "
+      "poses before and after as two batches",
+      in_words(*jump));
+}
+
 /// `; ` before each that says something.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
@@ -118,8 +132,10 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   if (task_.hold_against_in_force) {
     const auto batch = batches_.first();
     if (!batch) return tl::make_unexpected(batch.error());
-    if (const auto doubt = *in_force ? std::nullopt : batch_doubt(batch->rows(), *task_.cell))
-      return Made{std::nullopt, "", sentence(*doubt)};
+    if (!*in_force) {
+      if (const std::string why = why_no_first_batch(*batch, task_.cell); !why.empty())
+        return Made{std::nullopt, "", why};
+    }
     if (*in_force) {
       const Triage triaged = triage((*in_force)->model, *batch);
       if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
@@ -150,6 +166,9 @@ Result<Made> Workbench::checked(const ComputeWatch& watch) {
   HealthOptions options;
   options.tolerance = rules->tolerance.value_or(kUsualTolerance);
   if (!task_.level.empty()) options.tolerance = std::stod(task_.level) * from_mm(1);
+  for (const std::string& earlier : task_.earlier_checks) {
+    if (auto drift = drift_of(earlier)) options.earlier.push_back(std::move(*drift));
+  }
   const auto health = check_health((*present)->model, *batch, options);
   if (!health) return tl::make_unexpected(health.error());
   const auto& rows = batch->rows().measurements;

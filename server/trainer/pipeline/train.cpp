@@ -5,6 +5,7 @@
 
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/frames/frames.h"
+#include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/orientation_check.h"
 #include "server/compensate/world.h"
 #include "server/measurement/gauges.h"
@@ -169,8 +170,9 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
     return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
                          : calibrate(cell, names, split.train, {.held = {}, .weigh_links = true});
   };
-  auto found = identify_sessions(identify, *sources, split.train, [&](double share) {
-    return report("asking what changed between the sessions", 0.3 * share);
+  auto found = identify_sessions(identify, *sources, split.train, [&](double share) -> Status {
+    if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
+    return {};
   });
   if (!found) return found;
   split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
