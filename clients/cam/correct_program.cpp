@@ -267,9 +267,7 @@ class Correcting {
       bool found = reading.motion;
       const auto tell = [&](auto rows) {
         for (auto row = rows.first; row != rows.second; ++row) {
-          if (told.insert({row->second, reading.name}).second)
-            result_.rows[row->second].message +=
-                fmt::format("; it moves with {}, which is corrected", shown(reading.name));
+          if (told.insert({row->second, reading.name}).second) tell_along(result_.rows[row->second], reading.name);
           found = true;
         }
       };
@@ -279,6 +277,11 @@ class Correcting {
                                            by_file, reading.by_line, shown(reading.name));
       if (!found && said.insert(note).second) result_.notes.push_back(note);
     }
+  }
+
+  static void tell_along(ReceiptRow& row, const std::string& with) {
+    row.moves_along = true;
+    row.message += fmt::format("; it moves with {}, which is corrected", shown(with));
   }
 
   /// A motion that is left goes to a stored target all the same, which another motion has corrected.
@@ -297,9 +300,7 @@ class Correcting {
     }
     for (std::size_t r = program_.targets.size(); r < result_.rows.size(); ++r) {
       ReceiptRow& row = result_.rows[r];
-      const std::string moves = fmt::format("it moves with {}, which is corrected", shown(row.name));
-      if (!row.motion.empty() && corrected.contains(key(row)) && row.message.find(moves) == std::string::npos)
-        row.message += "; " + moves;
+      if (!row.motion.empty() && corrected.contains(key(row)) && !row.moves_along) tell_along(row, row.name);
     }
   }
 

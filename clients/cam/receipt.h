@@ -29,6 +29,7 @@ struct ReceiptRow {
   double rounding_mm = kNotKnown;        ///< distance of what is written from what was computed
   int iterations = 0;
   bool folded = false;
+  bool moves_along = false;  ///< it is left as it was, and moves all the same: with a target that is corrected
   /// Speed of the tool at which the first axis reaches its limit on the way from the target before; see path_check.h.
   double path_limit_before_mm_s = kNotKnown, path_limit_after_mm_s = kNotKnown;
   Vector3 p_B = Vector3::Constant(kNotKnown);  ///< m, the wanted position

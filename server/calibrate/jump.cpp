@@ -10,6 +10,7 @@
 #include "server/calibrate/change_kinds.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify/weighted_pose.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 #include "server/numerics/chi_square.h"
 
@@ -257,7 +258,7 @@ std::string in_words(const Jump& jump) {
 }
 
 std::optional<Jump> jump_within(const CalibrationResult& found, const MeasurementBatch& batch) {
-  if (has_sessions(batch)) return std::nullopt;
+  if (has_sessions(batch) || has_gauges(batch)) return std::nullopt;
   if (batch.measurements.size() * found.parameters.size() > kMostDerivatives) return std::nullopt;
   std::optional<Jump> worst;
   for (const std::vector<const Measurement*>& poses : by_load(batch)) {
@@ -268,7 +269,7 @@ std::optional<Jump> jump_within(const CalibrationResult& found, const Measuremen
 }
 
 std::optional<Jump> jump_within(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch) {
-  if (has_sessions(batch) || batch.measurements.size() < kFewestPoses) return std::nullopt;
+  if (has_sessions(batch) || has_gauges(batch) || batch.measurements.size() < kFewestPoses) return std::nullopt;
   const auto found = calibrate(cell, with_unknown_tool(cell->model.error_sources, *cell), batch, {});
   return found ? jump_within(*found, batch) : std::nullopt;
 }

@@ -2,8 +2,8 @@
 
 #include <Eigen/Dense>
 #include <string>
-#include <string_view>
 
+#include "server/error_sources/instruments.h"
 #include "server/error_sources/physical_model.h"
 #include "server/robot/gauge.h"
 
@@ -11,16 +11,6 @@
 /// model has them in its list of sources as `anchors` and `instrument_zero`, with values and covariances beside those
 /// of the arm. They are no errors of the robot: they move no tool, and nobody looks for them.
 namespace trammel {
-
-inline constexpr std::string_view kAnchors = "anchors";
-inline constexpr std::string_view kInstrumentZero = "instrument_zero";
-
-[[nodiscard]] bool is_of_instruments(std::string_view spec);
-[[nodiscard]] bool is_of_instruments(const ErrorSource& source);
-
-/// `anchors`: `ax[ID]`, `ay[ID]`, `az[ID]` (m in W) of each anchor whose place the cell file does not say, which is 0
-/// until it is found. `instrument_zero`: `zero[ID]` (m) of each whose zero it does not say. Refuses what is neither.
-[[nodiscard]] Result<ErrorSourcePtr> make_instrument_source(const std::string& spec, const Cell& cell);
 
 /// An anchor in a model: what the cell file says, and where among the parameters the rest is; -1: nowhere.
 struct PlacedAnchor {

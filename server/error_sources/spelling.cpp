@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "server/base/near_miss.h"
-#include "server/error_sources/anchors.h"
+#include "server/error_sources/instruments.h"
 
 namespace trammel {
 
