@@ -108,12 +108,12 @@ TEST(Sentence, OfCellAndServerFiles) {
   folder.write("cell-7.yaml", test::small_cell_yaml("cell-7"));
   const std::string start = "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n";
   const std::string server = folder.write("server.yaml", start + "dds: {prot: 17500}\nlog: {level: loud}\n");
-  EXPECT_EQ(
-      said(read_server_config(server)),
-      server +
-          " row 5: dds: prot: unknown key, did you mean port?; known here: domain address allow_network port "
-          "peer_ports compute_workers max_clients client_requests client_mb queued_requests queued_mb cell_share\n" +
-          server + " row 6: log: level: 'loud', expected debug, info, warn, error");
+  EXPECT_EQ(said(read_server_config(server)),
+            server +
+                " row 5: dds: prot: unknown key, did you mean port?; known here: domain address allow_network "
+                "without_security security port peer_ports peers compute_workers max_clients client_requests client_mb "
+                "queued_requests queued_mb cell_share\n" +
+                server + " row 6: log: level: 'loud', expected debug, info, warn, error");
   folder.write("server.yaml", start + "dds: {port: 80}\n");
   EXPECT_EQ(said(read_server_config(server)), server + " row 5: dds: port: 80, limit 1024 to 65535");
 }

@@ -317,7 +317,7 @@ TEST(Calibrate, RefusesACauseWhoseContextWasNotRecorded) {
       {"thermal_growth", "temperature_c"}, {"tracker_drift", "time_s"}, {"backlash:2", "dir2"}, {"time_lag", "time_s"}};
   for (const auto& [spec, column] : lacking) {
     const Result<CalibrationResult> result = calibrate(cell, {"base", spec}, batch, {});
-    EXPECT_EQ(refusal_of(result), Refusal("batch virtual", {}, column)) << spec;
+    EXPECT_EQ(refusal_of(result), Refusal("batch virtual", {}, column).text(spec)) << spec;
   }
 }
 

@@ -24,7 +24,8 @@ struct NamedPoint {
 struct PointList {
   std::string where;  ///< the file as messages name it
   std::vector<NamedPoint> points;
-  std::vector<std::string> extra_columns;  ///< what the software of a tracker recorded beside: the air, time stamps
+  std::vector<std::string> extra_columns =
+      {};  ///< what the software of a tracker recorded beside: the air, time stamps
 };
 
 /// Reads the ASCII exports of SpatialAnalyzer (its manual: "Exporting ASCII Formatted Points", "Export Frames"), and
