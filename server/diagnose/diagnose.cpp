@@ -204,13 +204,13 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   diagnosis.batch = as_recorded(prepared->surrogates, found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, *prepared, diagnosis);
-  tell_findings(explained, *prepared, diagnosis.batch, leaves_more_than_noise(explained.after, prepared->repeats),
-                diagnosis);
+  tell_held_out(explained, *prepared, diagnosis);
+  tell_findings(explained, *prepared, diagnosis.batch, remainder_of(explained, *prepared, diagnosis), diagnosis);
   tell_since(batch.rows(), diagnosis);
   tell_noise(explained, *prepared, diagnosis);
+  tell_verdict(diagnosis);
   tell_row_mistakes(explained, prepared->sorted ? batch.rows() : MeasurementBatch(), diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
-  tell_held_out(explained, *prepared, diagnosis);
 
   std::vector<Step> steps;
   steps.push_back({"asking what could not have been seen", 0.72, [&] {

@@ -106,6 +106,8 @@ inline constexpr double kWrongSign = 1.645;
 inline constexpr double kWrongSignOfPose = 2;
 /// Share of the poses that may have play of the wrong sign. A quarter is more than the side of a pose is mistaken.
 inline constexpr double kPosesOfWrongSign = 0.25;
+/// Poses held out that say whether a model is worse: fewer are outvoted by one of them.
+inline constexpr std::size_t kFewestHeldOut = 7;
 /// Chance that any of the held-out poses that fit is called one that fits neither model.
 inline constexpr double kMisjudgedHeldOut = 0.01;
 

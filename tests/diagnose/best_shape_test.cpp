@@ -32,7 +32,7 @@ TEST(BestShape, IsSaidSoAndStillCompensated) {
   const Unexplained nothing;
   const std::vector<Cause> found = {coupling};
   const auto judged = [&](bool more_than_noise, bool in_both_halves) {
-    return cause_search::judge(coupling, 1e-4, {}, {found, nothing, {}, recorded, more_than_noise}, in_both_halves);
+    return cause_search::judge(coupling, {1e-4, in_both_halves}, {}, {found, nothing, {}, recorded, more_than_noise});
   };
   EXPECT_TRUE(judged(false, true).could_also_be.empty());
   EXPECT_TRUE(judged(false, true).whole);

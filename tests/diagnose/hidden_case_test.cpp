@@ -178,7 +178,7 @@ TEST(HiddenCase, TheSameSpecIsTheSameCase) {
 TEST(HiddenCase, EveryKindIsReadByTheServer) {
   std::vector<std::string> kinds = hidden::decidable_kinds();
   for (const auto* more : {&hidden::null_kinds(), &hidden::unknown_kinds(), &hidden::slow_kinds(),
-                           &hidden::undecidable_kinds(), &hidden::replica_kinds()}) {
+                           &hidden::foreign_kinds(), &hidden::undecidable_kinds(), &hidden::replica_kinds()}) {
     kinds.insert(kinds.end(), more->begin(), more->end());
   }
   kinds.insert(kinds.end(), {"mixture2", "mixture3"});

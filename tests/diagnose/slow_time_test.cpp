@@ -82,7 +82,7 @@ TEST(TwoStepsOfOneCause, AreDoubtedAndOneIsNot) {
   const Unexplained nothing;
   const std::vector<Cause> twice = {first, second, other}, once = {first, other};
   const auto judged = [&](const Cause& cause, const std::vector<Cause>& found) {
-    return cause_search::judge(cause, 1e-4, {}, {found, nothing, {}, recorded});
+    return cause_search::judge(cause, {1e-4}, {}, {found, nothing, {}, recorded});
   };
   EXPECT_EQ(judged(first, twice).could_also_be, (std::vector<Cause>{{"unknown", 2}}));
   EXPECT_NE(judged(second, twice).action.find("moves slowly"), std::string::npos);

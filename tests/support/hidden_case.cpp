@@ -91,7 +91,7 @@ void understand(Draft& draft) {
   } else if (contains(unknown_kinds(), kind)) {
     draft.truth.question = Question::kUnknown;
     draft.names = {"unknown"};
-  } else if (contains(slow_kinds(), kind)) {
+  } else if (contains(slow_kinds(), kind) || contains(foreign_kinds(), kind)) {
     draft.truth.question = Question::kUnknown;
     draft.names = {kind};
   } else if (contains(undecidable_kinds(), kind)) {
@@ -238,6 +238,7 @@ Effect draw_named(const std::string& name, const Draft& draft, const Scene& scen
     return draw_effect({"unknown", 0, "", -1, joints}, scene, random);
   }
   if (contains(slow_kinds(), name)) return draw_slow_effect(name, scene, random);
+  if (contains(foreign_kinds(), name)) return draw_foreign_effect(name, scene, random);
   if (name == "backlash_one_side") return draw_effect(draw_cause("backlash", scene, random), scene, random);
   if (name == "payload_alone") return one_parameter({"payload", 0, "", -1, {}}, 0, 8, scene, random);
   if (name == "constant_warmth") return draw_effect({"thermal_growth", 0, "", -1, {}}, scene, random);
@@ -439,6 +440,12 @@ const std::vector<std::string>& unknown_kinds() {
 
 const std::vector<std::string>& slow_kinds() {
   static const std::vector<std::string> kinds = {"slow_zero", "slow_stand", "slow_growth", "slow_walk"};
+  return kinds;
+}
+
+const std::vector<std::string>& foreign_kinds() {
+  static const std::vector<std::string> kinds = {"foreign_wave",  "foreign_wobble", "foreign_foot",
+                                                 "foreign_walks", "foreign_loads",  "foreign_scale"};
   return kinds;
 }
 

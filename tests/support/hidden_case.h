@@ -21,7 +21,9 @@ enum class Question {
 struct HiddenSpec {
   /// A cause (`backlash`), several (`backlash+outlier`, `mixture2`, `mixture3`), a null (`null_white`,
   /// `null_structured`, `null_permuted`), an unknown (`unknown_q4`, `unknown_q2q3`), something slow that no cause is
-  /// (`slow_zero`, `slow_stand`, `slow_growth`, `slow_walk`), what cannot be decided
+  /// (`slow_zero`, `slow_stand`, `slow_growth`, `slow_walk`), something of another form than any cause
+  /// (`foreign_wave`, `foreign_wobble`, `foreign_foot`, `foreign_walks`, `foreign_loads`, `foreign_scale`), what cannot
+  /// be decided
   /// (`backlash_one_side`, `payload_alone`, `tool_or_link`, `tool_absorbed`, `joint1_or_tracker`, `joint6_or_tool`,
   /// `constant_warmth`) or a replica of the source's studies (`replica_ripple_1dim`, `replica_ripple_6dim`,
   /// `replica_tool`, `replica_p28`).
@@ -70,6 +72,7 @@ struct HiddenCase {
 [[nodiscard]] const std::vector<std::string>& null_kinds();
 [[nodiscard]] const std::vector<std::string>& unknown_kinds();
 [[nodiscard]] const std::vector<std::string>& slow_kinds();
+[[nodiscard]] const std::vector<std::string>& foreign_kinds();
 [[nodiscard]] const std::vector<std::string>& undecidable_kinds();
 [[nodiscard]] const std::vector<std::string>& replica_kinds();
 

@@ -315,6 +315,69 @@ Effect slow_stand(const HiddenCause& cause, const Scene& scene, Random& random) 
                 });
 }
 
+HiddenCause unknown_of(std::vector<std::string> joints) { return {"unknown", 0, "", -1, std::move(joints), 0}; }
+
+/// The angle of joint 3 is off by a wave that runs along two joints at once.
+Effect wave_of_two(Random& random) {
+  const Eigen::Vector2d order(uniform(random, 1.4, 3.4), uniform(random, 1.4, 3.4));
+  const double phase = uniform(random, 0, kTurn);
+  return effect(unknown_of({"q2", "q3"}), {"size"}, one(1e-4),
+                [order, phase](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(2) += v(0) * std::sin(order(0) * p.q(1) + order(1) * p.q(2) + phase);
+                });
+}
+
+/// Axis 4 tilts twice a turn, as in a bearing that is oval.
+Effect wobble(Random& random) {
+  const double phase = uniform(random, 0, kTurn);
+  const double other = uniform(random, 0, kTurn);
+  return effect(unknown_of({"q4"}), {"size"}, one(1e-4),
+                [phase, other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.arm.links[2].alpha += v(0) * std::sin(2 * p.q(3) + phase);
+                  m.arm.links[3].alpha += 0.6 * v(0) * std::sin(2 * p.q(3) + other);
+                });
+}
+
+/// The plate under the foot yields, to one side more than to the other.
+Effect yielding_foot(Random& random) {
+  const double share = uniform(random, 0.3, 0.9);
+  return effect(
+      unknown_of({"q1", "q2", "q3"}), {"yield"}, one(1e-11),
+      [share](const MeasuringPose&, const VectorXd& v, Moment& m) { m.arm.foot += v(0) * Eigen::Vector2d(1, share); });
+}
+
+/// Every joint's zero walks at random, from pose to pose.
+Effect walking_zeros(const Scene& scene, Random& random) {
+  std::vector<Joints> way = {Joints::Zero()};
+  while (way.size() < scene.poses->size()) {
+    Joints next = way.back();
+    for (Index j = 0; j < kJoints; ++j) next(j) += normal(random);
+    way.push_back(next);
+  }
+  return effect(unknown_of({"time"}), {"size"}, one(1e-5), [way](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    m.q += v(0) * way[std::min(static_cast<std::size_t>(p.index), way.size() - 1)];
+  });
+}
+
+/// At some three of ten poses another load hangs there than the batch says.
+Effect other_loads(const Scene& scene, Random& random) {
+  std::vector<bool> other;
+  while (other.size() < scene.poses->size()) other.push_back(uniform(random, 0, 1) < 0.3);
+  return effect(unknown_of({}), {"mass"}, one(20), [other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    if (other[std::min(static_cast<std::size_t>(p.index), other.size() - 1)]) m.arm.load.mass_kg -= v(0);
+  });
+}
+
+/// All that the tracker measures is larger in warm air, as seen from its stand.
+Effect scale_with_temperature(Random& random) {
+  return effect(unknown_of({"temperature"}), {"scale"}, one(uniform(random, 2e-6, 6e-6)),
+                [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const Matrix4d tool = m.seen * tool_frame(m.arm, m.q);
+                  m.shift +=
+                      v(0) * (p.temperature_c - kReferenceTemperature) * (tool.block<3, 1>(0, 3) - kTrackerStand);
+                });
+}
+
 /// A smooth random function of some joints, in three axes of the base: waves of random direction and phase.
 Effect unknown(const HiddenCause& cause, const Scene&, Random& random) {
   constexpr int kWaves = 40;
@@ -417,6 +480,15 @@ Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& ran
   const int joint = whole(random, 2, 5);
   const HiddenCause zero{"unknown", 0, "", -1, {"q" + std::to_string(joint), "time"}};
   return kind == "slow_walk" ? slow_walk(zero, scene, random) : slow_zero(zero, scene, random);
+}
+
+Effect draw_foreign_effect(const std::string& kind, const Scene& scene, Random& random) {
+  if (kind == "foreign_wave") return wave_of_two(random);
+  if (kind == "foreign_wobble") return wobble(random);
+  if (kind == "foreign_foot") return yielding_foot(random);
+  if (kind == "foreign_walks") return walking_zeros(scene, random);
+  if (kind == "foreign_loads") return other_loads(scene, random);
+  return scale_with_temperature(random);
 }
 
 Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random) {

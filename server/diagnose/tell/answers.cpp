@@ -11,6 +11,7 @@
 #include "server/diagnose/search/folds.h"
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/search/recovery.h"
+#include "server/diagnose/tell/doubts.h"
 #include "server/diagnose/tell/findings.h"
 #include "server/diagnose/tell/next_poses.h"
 #include "server/diagnose/tell/separability.h"
@@ -87,13 +88,6 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   return unexplained;
 }
 
-Verdict verdict_of(const Diagnosis& diagnosis) {
-  if (diagnosis.findings.empty()) return diagnosis.unexplained.present ? Verdict::kUnknown : Verdict::kNothing;
-  const bool doubt = std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
-                                 [](const Finding& finding) { return !finding.could_also_be.empty(); });
-  return doubt ? Verdict::kAmbiguous : Verdict::kNamed;
-}
-
 /// What is left after the nominal chain, the cell's own sources and each finding in turn; at last what none explains.
 std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearProblem& before,
                                         const LinearProblem& after, double noise) {
@@ -123,15 +117,12 @@ std::vector<WaterfallStep> waterfall_of(const SearchResult& found, const LinearP
   return steps;
 }
 
-/// Which number of a cause it is may stay open: the cause as a whole is identified anyway. And a more general
-/// description does the same to the poses, as does the best known shape of something.
+/// The best known shape of something does to the poses what that does.
 bool is_sure(const Finding& finding) {
-  return !finding.whole ||
-         std::all_of(finding.could_also_be.begin(), finding.could_also_be.end(), [&](const Cause& other) {
-           return (other.cause == finding.cause.cause && other.joint == finding.cause.joint) ||
-                  is_description_of(other, finding.cause);
-         });
+  return !finding.whole || differ_in_form_only(finding.cause, finding.could_also_be);
 }
+
+bool is_outlier(const Finding& finding) { return finding.source.empty(); }
 
 }  // namespace
 
@@ -166,16 +157,29 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
 }
 
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   bool more_than_noise, Diagnosis& diagnosis) {
+                   const Remainder& remainder, Diagnosis& diagnosis) {
   const SearchResult& found = explained.found;
   diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
-  // Beside something unexplained, what is left is that as well: how large a finding is beside it says how sure it is.
-  const bool more = found.unnamed.empty() && more_than_noise;
-  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded, more);
-  diagnosis.verdict = verdict_of(diagnosis);
+  const double left = std::max(remainder.rms, diagnosis.unexplained.rms);
+  diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded,
+                                   {remainder.more_than_noise, left});
+  std::vector<SuspectedPose> out;
   for (const Accepted& one : found.accepted) {
-    if (one.is_outlier()) diagnosis.suspects.push_back(one.pose);
+    if (one.is_outlier()) out.push_back(one.pose);
   }
+  diagnosis.suspects.insert(diagnosis.suspects.begin(), out.begin(), out.end());
+}
+
+void tell_verdict(Diagnosis& diagnosis) {
+  const std::vector<Finding>& findings = diagnosis.findings;
+  const bool left = diagnosis.unexplained.present;
+  if (findings.empty() || (left && std::all_of(findings.begin(), findings.end(), is_outlier))) {
+    diagnosis.verdict = left ? Verdict::kUnknown : Verdict::kNothing;
+    return;
+  }
+  const bool doubt = std::any_of(findings.begin(), findings.end(),
+                                 [](const Finding& finding) { return !finding.could_also_be.empty(); });
+  diagnosis.verdict = doubt ? Verdict::kAmbiguous : Verdict::kNamed;
 }
 
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) {

@@ -6,6 +6,7 @@
 #include "server/diagnose/diagnose_options.h"
 #include "server/diagnose/search/search_result.h"
 #include "server/diagnose/search/surrogates.h"
+#include "server/diagnose/tell/findings.h"
 #include "server/measurement/repeats.h"
 
 /// What a search found, told: each function fills its part of a diagnosis.
@@ -33,10 +34,12 @@ struct Explained {
 
 /// Noise, errors before and after, the waterfall from the one to the other.
 void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
-/// Findings, what stays unexplained, verdict, suspects. `recorded`: the batch without surrogates. `more_than_noise`: is
-/// left.
+/// Findings, what stays unexplained, suspects. `recorded`: the batch without surrogates.
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
-                   bool more_than_noise, Diagnosis& diagnosis);
+                   const Remainder& remainder, Diagnosis& diagnosis);
+/// Once all is found, and what is left is known. Single poses that are out are no cause: where more than noise is left
+/// beside them, that is unknown.
+void tell_verdict(Diagnosis& diagnosis);
 /// The sources before and those that the model could be extended to: what was found and is beyond doubt.
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis);
 /// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects among them.

@@ -41,12 +41,32 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
+bool begins(const Cause& cause) {
+  return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose;
+}
+
 /// Whether the cause begins at more than one pose.
 bool begins_again(const Cause& cause, const std::vector<Cause>& found) {
-  return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose &&
-         std::count_if(found.begin(), found.end(), [&](const Cause& other) {
-           return other.cause == cause.cause && other.joint == cause.joint;
-         }) > 1;
+  return begins(cause) && std::count_if(found.begin(), found.end(), [&](const Cause& other) {
+                            return other.cause == cause.cause && other.joint == cause.joint;
+                          }) > 1;
+}
+
+bool goes_with_time(const Unexplained& unexplained) {
+  const auto& on = unexplained.depends_on;
+  return std::any_of(on.begin(), on.end(), [](const auto& one) { return one == "time" || one == "temperature"; });
+}
+
+/// Whether lengths that go with the temperature may be the instrument's own: its scale moves the base as well, about
+/// the instrument, so that something else is there that moves in the course of the batch.
+bool may_be_scale(const Cause& cause, const Beside& beside) {
+  const CauseRecord& own = record_of(cause);
+  if (own.acts.on != causes::ActsOn::kLinks || !own.needs.temperature) return false;
+  return goes_with_time(beside.unexplained) ||
+         std::any_of(beside.found.begin(), beside.found.end(), [](const Cause& other) {
+           const CauseRecord& record = record_of(other);
+           return record.scope == causes::Scope::kSession && !record.needs.velocity;
+         });
 }
 
 /// Adds what is told by the time alone.
@@ -97,42 +117,82 @@ bool is_unlikely(const Cause& cause, const Eigen::VectorXd& size) {
   return farthest > thresholds::kUnlikelyPayload;
 }
 
-Judgement judge(const Cause& cause, double effect_rms, const std::vector<Cause>& rivals, const Beside& beside,
-                bool in_both_halves, bool unlikely) {
-  const bool by_surrogate = is_by_surrogate(beside.surrogates, cause);
-  const bool dwarfed = is_dwarfed(effect_rms, beside.unexplained);
-  std::vector<Cause> many = descriptions_of_many(cause, beside.found);
-  std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
+bool differ_in_form_only(const Cause& cause, const std::vector<Cause>& others) {
+  return std::all_of(others.begin(), others.end(), [&](const Cause& other) {
+    return (other.cause == cause.cause && other.joint == cause.joint) || is_description_of(other, cause);
+  });
+}
 
-  std::vector<Cause> could_also_be = rivals;
-  for (const Cause& rival : untestable_rivals(cause, beside.recorded)) add(could_also_be, rival);
-  if (by_surrogate) add_rivals_of_surrogate(cause, could_also_be);
-  if (dwarfed) could_also_be.push_back(unknown_cause());
-  could_also_be.insert(could_also_be.end(), many.begin(), many.end());
-  const bool again = begins_again(cause, beside.found);
-  if (again) add(could_also_be, unknown_cause(cause.joint));
-  if (unlikely) add_what_weighs(could_also_be);
-  const bool by_half = beside.more_than_noise && !in_both_halves;
-  if (by_half) add(could_also_be, unknown_cause(cause.joint));
-  const bool whole = !beside.more_than_noise || !could_also_be.empty();
-  if (!whole) could_also_be.push_back(unknown_cause(cause.joint));
+namespace {
 
-  const auto action = [&]() -> std::string {
-    if (!many.empty())
-      return fmt::format("measure more poses over the range of joint {}: its error has no single order",
-                         cause.joint + 1);
-    if (dwarfed) return "find first what is unknown here: it is several times larger";
-    if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
-    if (unlikely)
-      return "it is larger than robots have it: measure with another known payload, which the arm's own weight does "
-             "not "
-             "follow";
-    if (by_half)
-      return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
-    if (by_surrogate) return what_to_record(cause, beside.surrogates);
-    return action_for(cause, rivals);
-  };
-  return {std::move(could_also_be), whole, action()};
+/// The reasons for which a cause is doubted.
+struct Doubts {
+  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half;
+  std::vector<Cause> many;
+
+  Doubts(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside)
+      : by_surrogate(is_by_surrogate(beside.surrogates, cause)),
+        dwarfed(is_dwarfed(evidence.effect_rms, beside.unexplained)),
+        again(begins_again(cause, beside.found)),
+        unlikely(evidence.unlikely),
+        slow(begins(cause) && goes_with_time(beside.unexplained)),
+        by_scale(may_be_scale(cause, beside)),
+        not_held_out(!evidence.helps_held_out),
+        by_half(beside.more_than_noise && !evidence.in_both_halves),
+        many(descriptions_of_many(cause, beside.found)) {
+    std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
+  }
+  [[nodiscard]] std::vector<Cause> could_also_be(const Cause& cause, const std::vector<Cause>& rivals,
+                                                 const Beside& beside) const;
+  /// What to do about the last of them; empty where there is none.
+  [[nodiscard]] std::string action(const Cause& cause, const Surrogates& surrogates) const;
+};
+
+std::vector<Cause> Doubts::could_also_be(const Cause& cause, const std::vector<Cause>& rivals,
+                                         const Beside& beside) const {
+  std::vector<Cause> all = rivals;
+  for (const Cause& rival : untestable_rivals(cause, beside.recorded)) add(all, rival);
+  if (by_surrogate) add_rivals_of_surrogate(cause, all);
+  if (dwarfed || by_scale) add(all, unknown_cause());
+  all.insert(all.end(), many.begin(), many.end());
+  if (again || slow) add(all, unknown_cause(cause.joint));
+  if (unlikely) add_what_weighs(all);
+  if (not_held_out || by_half) add(all, unknown_cause(cause.joint));
+  return all;
+}
+
+std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) const {
+  if (!many.empty())
+    return fmt::format("measure more poses over the range of joint {}: its error has no single order", cause.joint + 1);
+  if (dwarfed) return "find first what is unknown here: it is several times larger";
+  if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
+  if (slow) return "something moves slowly as well, of which it may be part: " + what_slow_changes_need();
+  if (unlikely)
+    return "it is larger than robots have it: measure with another known payload, which the arm's own weight does not "
+           "follow";
+  if (by_scale)
+    return "it may be the scale of the instrument, which follows the temperature of the air: see that its weather "
+           "station is right, and measure reference reflectors at known distances in between";
+  if (by_half)
+    return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
+  if (not_held_out) return "measure again with other poses: those that are held out are not predicted better with it";
+  return by_surrogate ? what_to_record(cause, surrogates) : "";
+}
+
+}  // namespace
+
+Judgement judge(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside) {
+  const Doubts doubts(cause, evidence, rivals, beside);
+  std::vector<Cause> could_also_be = doubts.could_also_be(cause, rivals, beside);
+  const bool whole = !beside.more_than_noise || !differ_in_form_only(cause, could_also_be);
+  const Cause unknown = unknown_cause(cause.joint);
+  if (beside.more_than_noise && !contains(could_also_be, unknown_cause())) add(could_also_be, unknown);
+  std::string action = doubts.action(cause, beside.surrogates);
+  if (action.empty()) {
+    action = !whole && evidence.effect_rms <= beside.left ? "find first what is unknown here: more is left than this"
+                                                          : action_for(cause, rivals);
+  }
+  return {std::move(could_also_be), whole, std::move(action)};
 }
 
 }  // namespace trammel::cause_search

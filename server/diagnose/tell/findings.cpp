@@ -137,7 +137,7 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
 class Findings {
  public:
   Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-           const Surrogates& surrogates, const MeasurementBatch& recorded, bool more_than_noise);
+           const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder);
 
   [[nodiscard]] Finding of(const Accepted& one) const { return one.is_outlier() ? outlier(one) : cause(one); }
 
@@ -182,12 +182,12 @@ Estimated estimated_beside(const MatrixXd& columns, const VectorXd& data) {
 bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_id.empty(); }
 
 Findings::Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
-                   const Surrogates& surrogates, const MeasurementBatch& recorded, bool more_than_noise)
+                   const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder)
     : problem_(problem),
       surrogates_(surrogates),
       causes_(causes_of(found.accepted)),
       limit_(found.chance.limit),
-      beside_{causes_, unexplained, surrogates, recorded, more_than_noise},
+      beside_{causes_, unexplained, surrogates, recorded, remainder.more_than_noise, remainder.rms},
       columns_(background_columns(problem, found.unnamed)),
       estimated_(estimated_beside(columns_, problem.residual())),
       folds_(problem, columns_),
@@ -225,10 +225,10 @@ Finding Findings::cause(const Accepted& one) const {
   const VectorXd without = folds_.held_out_residual(problem_.residual() + effect, others);
   const ErrorFigures before = figures_of(problem_.positions(without));
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
-  const bool in_both_halves = !beside_.more_than_noise || is_in_both_halves(one, effect, others);
   const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
-  Judgement judgement =
-      judge(one.cause, effect_rms, one.could_also_be, beside_, in_both_halves, is_unlikely(one.cause, own.size));
+  const Evidence evidence{effect_rms, !beside_.more_than_noise || is_in_both_halves(one, effect, others),
+                          held_out_.squaredNorm() < without.squaredNorm(), is_unlikely(one.cause, own.size)};
+  Judgement judgement = judge(one.cause, evidence, one.could_also_be, beside_);
   return {.cause = cause,
           .source = one.source,
           .parameters = std::move(parameters),
@@ -296,8 +296,8 @@ std::vector<PossibleBeginning> Findings::beginnings(const Accepted& one, const V
 
 std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
                                  const Unexplained& unexplained, const Surrogates& surrogates,
-                                 const MeasurementBatch& recorded, bool more_than_noise) {
-  const Findings findings(found, problem, unexplained, surrogates, recorded, more_than_noise);
+                                 const MeasurementBatch& recorded, const Remainder& remainder) {
+  const Findings findings(found, problem, unexplained, surrogates, recorded, remainder);
   std::vector<Finding> all;
   for (const Accepted& one : found.accepted) all.push_back(findings.of(one));
   return all;

@@ -5,12 +5,18 @@
 
 namespace trammel::cause_search {
 
+/// What is left beside all that was found and has a name.
+struct Remainder {
+  bool more_than_noise = false;
+  double rms = 0;  ///< m
+};
+
 /// The findings of a search, each built once: its numbers beside everything else that was found (parameters by
 /// generalised least squares, effects, strengths, what it gains on poses held out), and how sure its name is.
-/// `problem`: about the extended model. `recorded`: the batch without surrogates. `more_than_noise`: is left.
+/// `problem`: about the extended model. `recorded`: the batch without surrogates.
 [[nodiscard]] std::vector<Finding> findings_of(const SearchResult& found, const LinearProblem& problem,
                                                const Unexplained& unexplained, const Surrogates& surrogates,
-                                               const MeasurementBatch& recorded, bool more_than_noise);
+                                               const MeasurementBatch& recorded, const Remainder& remainder);
 
 /// Errors of poses held out, fold by fold, before and after.
 struct HeldOut {

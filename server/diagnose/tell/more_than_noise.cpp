@@ -52,6 +52,20 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
       micrometres(prepared.repeats.sigma));
 }
 
+/// m, of the three axes: what is left beyond what is stated.
+double rms_beyond(const LeftOver& left) {
+  return std::sqrt(3 * std::max(0.0, left.left * left.left - left.stated * left.stated));
+}
+
+bool is_worse_held_out(const PreparedBatch& prepared, const Diagnosis& diagnosis) {
+  if (!diagnosis.held_out_before || !diagnosis.held_out_after) return false;
+  const std::size_t rows = prepared.validation.measurements.size();
+  if (rows > 0 && rows < thresholds::kFewestHeldOut) return false;
+  if (diagnosis.held_out_before_without && diagnosis.held_out_after_without)
+    return diagnosis.held_out_after_without->rms > diagnosis.held_out_before_without->rms;
+  return diagnosis.held_out_after->rms > diagnosis.held_out_before->rms;
+}
+
 }  // namespace
 
 NoiseVerdict judge_noise(const LeftOver& left) {
@@ -72,6 +86,12 @@ bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& 
          std::max(judge_noise(position), judge_noise(left_of(after.rotation_spread()))) == NoiseVerdict::kMoreThanNoise;
 }
 
+Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
+  const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained.after, prepared.repeats) ||
+                    is_worse_held_out(prepared, diagnosis);
+  return {more, more ? rms_beyond(left_of(explained.after.position_spread())) : 0};
+}
+
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
   const LeftOver position = diagnosis.left_position = left_of(explained.after.position_spread());
   const LeftOver rotation = diagnosis.left_rotation = left_of(explained.after.rotation_spread());
@@ -89,12 +109,10 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
     diagnosis.limits.push_back(fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
     return;
   }
-  const double beyond = std::max(0.0, position.left * position.left - position.stated * position.stated);
   unexplained.present = true;
-  unexplained.rms = std::sqrt(3 * beyond);
+  unexplained.rms = rms_beyond(position);
   unexplained.p_value = std::min(chance_of_noise(position), chance_of_noise(rotation));
   unexplained.hint = fmt::format("more than noise: {}, and it depends on nothing I know; {}", what, more);
-  if (diagnosis.verdict == Verdict::kNothing) diagnosis.verdict = Verdict::kUnknown;
 }
 
 }  // namespace trammel::cause_search

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "server/diagnose/tell/answers.h"
+#include "server/diagnose/tell/findings.h"
 
 /// Whether what is left after all that was found is still the noise that is stated for a measurement.
 ///
@@ -25,8 +26,16 @@ enum class NoiseVerdict {
 /// repeatedly do not scatter as much.
 [[nodiscard]] bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& repeats);
 
+/// What is left beside all that has a name. It is more than noise where
+/// - something was found that has no name;
+/// - the extended model leaves more than the measurement;
+/// - the extended model is worse on the poses held out, if there are enough of them (`diagnosis` has their errors): it
+///   says something else than what is there.
+[[nodiscard]] Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared,
+                                     const Diagnosis& diagnosis);
+
 /// Fills `left_position` and `left_rotation`; where either is more than noise, what is left is unexplained and depends
-/// on nothing known; where it is larger than stated, `limits` says so. Verdict as the findings say, else `unknown`.
+/// on nothing known; where it is larger than stated, `limits` says so.
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
 
 }  // namespace trammel::cause_search
