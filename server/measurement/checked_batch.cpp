@@ -222,15 +222,22 @@ CheckedBatch joined(std::vector<CheckedBatch> batches) {
   MeasurementBatch all;
   std::vector<bool> is_held_out;
   std::set<Fingerprint> met;
+  std::size_t taken = 0;
   for (const CheckedBatch& batch : batches) {
     const std::vector<bool> copied = copied_rows(batch.rows(), met);
     const auto copies = static_cast<int>(std::count(copied.begin(), copied.end(), true));
     all.copies += copies;
     if (static_cast<std::size_t>(copies) == batch.size()) continue;
+    ++taken;
     append(all, copies == 0 ? batch.rows() : without_rows(batch.rows(), copied));
     for (std::size_t i = 0; i < copied.size(); ++i) {
       if (!copied[i]) is_held_out.push_back(batch.content_->is_held_out[i]);
     }
+  }
+  if (taken == 1) {  // the first, and nothing but copies of it
+    MeasurementBatch rows = batches.front().rows();
+    rows.copies = all.copies;
+    return CheckedBatch(std::move(rows), std::move(is_held_out), batches.front().hash());
   }
   std::string hash = batch_hash(all);
   return CheckedBatch(std::move(all), std::move(is_held_out), std::move(hash));

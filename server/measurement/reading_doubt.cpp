@@ -39,6 +39,7 @@ constexpr double kSameTool = 0.4;  // of the distance: another tool of the cell 
 // Stated uncertainties.
 constexpr std::size_t kFewestForSigma = 20;  // poses: below that an arm follows noise
 constexpr double kNotThatGood = 0.25;        // of the stated deviation: honest noise leaves at least 0.8 of it
+constexpr double kHarmless = 3e-4;           // m: who states less may be careful, and does no harm
 // Angles.
 constexpr double kOtherTurn = from_deg(0.5);  // by which orientations decide between readings
 constexpr double kNearBase = from_deg(30);    // a base that stands about where the cell says
@@ -258,7 +259,7 @@ std::optional<Error> Look::of_sigma() const {
   std::vector<double> stated;
   for (const Measurement* m : table_.from) stated.push_back(m->sigma.value_or(cell_.tracker.sigma));
   const double sigma = reading::median(stated);
-  if (given_->off > kNotThatGood * sigma) return std::nullopt;
+  if (sigma < kHarmless || given_->off > kNotThatGood * sigma) return std::nullopt;
   return refused("the positions follow the joints to {}, and are said to be uncertain by {}", mm(given_->off),
                  mm(sigma))
       .of("sigma_mm")

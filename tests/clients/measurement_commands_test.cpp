@@ -91,7 +91,7 @@ TEST_F(MeasurementCommands, ConvertReadsATableWithoutAHeaderByItsColumns) {
   const std::string table =
       folder_.write("log.txt", "# recorded by hand\n17 0.5 -1.5 1.52 0.31 1.2\n18 0.6 -1.4 1.5 0.3 1.1\n");
   const std::string batch = folder_.file("batch.csv");
-  ASSERT_EQ(trammel({"convert", "--table", table, "--columns", "-,q1_rad,q2_rad,x_m,y_m,z_m", "-o", batch}), 0);
+  ASSERT_EQ(trammel({"convert", "--table", table, "--columns", "skip,q1_rad,q2_rad,x_m,y_m,z_m", "-o", batch}), 0);
   const MeasurementBatch read = test::demand(read_batch_csv(batch));
   ASSERT_EQ(read.measurements.size(), 2u);
   EXPECT_NEAR(read.measurements[0].context.q(1), -1.5, 1e-11);

@@ -202,7 +202,7 @@ void add_convert(CLI::App& app, Action& chosen) {
       command
           ->add_option("--columns", arguments->columns,
                        "Columns of --table in their order, joined by commas: q1_deg,...,x_mm,y_mm,z_mm and any other "
-                       "of a batch; _rad and _m for other units, - to pass one over")
+                       "of a batch; _rad and _m for other units, skip to pass one over")
           ->delimiter(',')
           ->needs(table);
   table->needs(columns);

@@ -263,7 +263,7 @@ struct ToldColumn {
 
 /// `q1_rad` is `q1_deg` in another unit, and `x_m` `x_mm`.
 ToldColumn told_column(const std::string& name) {
-  if (name == "-" || name.empty()) return {};
+  if (name == "skip" || name == "-" || name.empty()) return {};
   const auto in = [&](std::string_view unit) {
     return name.size() > unit.size() && name.ends_with(unit) ? name.substr(0, name.size() - unit.size()) : "";
   };

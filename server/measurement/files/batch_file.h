@@ -38,8 +38,8 @@ namespace trammel {
 [[nodiscard]] Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<MeasurementBatch> read_robodk_csv(const std::string& path);
 
-/// Reads a table without a header, whose columns somebody tells: names of a batch's columns in their order, `-` for one
-/// that is passed over. `_rad` and `_m` stand for the same column in `_deg` and `_mm`: `q1_rad`, `x_m`. Values are
+/// Reads a table without a header, whose columns somebody tells: names of a batch's columns in their order, `skip` for
+/// one that is passed over. `_rad` and `_m` stand for the same column in `_deg` and `_mm`: `q1_rad`, `x_m`. Values are
 /// separated by `;`, tab, `,` or blanks, by the first of these that is in the first line; `#` and `//` start comments;
 /// with `;`, tab or blanks a number may have a decimal comma. Refuses a row of another length, and what
 /// parse_batch_csv() refuses.
