@@ -84,7 +84,7 @@ class JumpSearch {
     if (poses_.size() < kFewestPoses) return std::nullopt;
     const double inflation = inflation_by_halves();
     std::vector<Scored> all;
-    KindSums since(K(), P());
+    KindSums since(kinds(), unknowns());
     for (std::size_t i = poses_.size() - 1; i >= kFewestBeyond; --i) {
       since.add(poses_[i]);
       if (poses_.size() - i < kFewestBeyond) continue;
@@ -110,8 +110,8 @@ class JumpSearch {
     VectorXd size;
   };
 
-  [[nodiscard]] Index K() const { return static_cast<Index>(changes_.size()); }
-  [[nodiscard]] Index P() const { return poses_.front().free.rows(); }
+  [[nodiscard]] Index kinds() const { return static_cast<Index>(changes_.size()); }
+  [[nodiscard]] Index unknowns() const { return poses_.front().free.rows(); }
 
   void add(const Measurement& m, const Weights& weights) {
     const WeightedPose weighted(kinds_.probe(), s_, m, weights);
@@ -184,7 +184,7 @@ class JumpSearch {
   }
   template <typename Course>
   [[nodiscard]] double gain_with(const ChangeKind& kind, const Course& course) const {
-    KindSums sums(K(), P());
+    KindSums sums(kinds(), unknowns());
     for (std::size_t i = 0; i < poses_.size(); ++i) sums.add(poses_[i], course(i));
     return fit(kind.first, kind.count, sums).gain;
   }
@@ -199,10 +199,10 @@ class JumpSearch {
       for (const PoseEquations& pose : poses_) angles.push_back(pose.measurement->context.q(j));
       const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
       std::nth_element(angles.begin(), middle, angles.end());
-      KindSums upper(K(), P());
+      KindSums upper(kinds(), unknowns());
       for (const PoseEquations& pose : poses_)
         if (pose.measurement->context.q(j) > *middle) upper.add(pose);
-      for (Index k = 0; k < K(); ++k) {
+      for (Index k = 0; k < kinds(); ++k) {
         const double one = fit(k, 1, upper).gain;
         if (one <= 0) continue;
         sum += one;

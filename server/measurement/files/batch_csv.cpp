@@ -374,12 +374,13 @@ void add_pose_columns(const MeasurementBatch& batch, std::vector<WrittenColumn>&
 }
 
 void add_gauge_columns(std::vector<WrittenColumn>& columns) {
-  for (const auto& [name, kind] :
-       {std::pair("distance_mm", Gauge::Kind::kDistance), std::pair("touch_mm", Gauge::Kind::kTouch)}) {
+  const auto add = [&](const char* name, Gauge::Kind kind) {
     columns.push_back({name, [kind](const Measurement& m) {
                          return m.gauge && m.gauge->kind == kind ? csv_number(to_mm(m.gauge->value)) : "";
                        }});
-  }
+  };
+  add("distance_mm", Gauge::Kind::kDistance);
+  add("touch_mm", Gauge::Kind::kTouch);
   columns.push_back({"anchor_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->anchor) : ""; }});
   columns.push_back(
       {"minus_pose_id", [](const Measurement& m) { return m.gauge ? csv_field(m.gauge->minus_pose) : ""; }});
