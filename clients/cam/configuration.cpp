@@ -123,9 +123,9 @@ std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pos
   std::vector<Candidate> candidates;
   for (int conf = 0; conf < kBranches; ++conf) {
     if (said.conf && *said.conf != conf) continue;
-    const Result<InverseResult> found = inverse_kinematics(arm, X_BF, conf, previous);
-    if (!found || found->status == InverseStatus::kUnreachable) continue;
-    candidates.push_back({conf, found->q, found->status == InverseStatus::kJointLimit});
+    const auto found = joints_of_branch(arm, X_BF, conf, previous);
+    if (!found) continue;
+    candidates.push_back({conf, *found, arm.joint_outside_limits(*found).has_value()});
     choose_turns(arm, said, previous, candidates.back().q);
   }
   const auto other_elbow = [&](const Candidate& of) -> const Candidate* {

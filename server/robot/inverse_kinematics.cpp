@@ -200,14 +200,20 @@ Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, i
   }
   if (conf < 0 || conf > 7)
     return refused("conf is {}, limits 0 and 7", conf).of("conf").beyond(conf, conf < 0 ? 0 : 7);
+  const auto q = joints_of_branch(chain, X_BF, conf, near);
+  if (!q) return InverseResult{InverseStatus::kUnreachable, near.value_or(JointVector::Zero(6)), 0};
+  return judged(chain, *q, 0);
+}
+
+std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF, int conf,
+                                            const std::optional<JointVector>& near) {
   const auto theta = branch(chain, X_BF, (conf & 4) != 0, (conf & 2) != 0, (conf & 1) != 0);
-  InverseResult result{InverseStatus::kUnreachable, near.value_or(JointVector::Zero(6)), 0};
-  if (!theta) return result;
-  Eigen::VectorXd value(6);
+  if (!theta) return std::nullopt;
+  Vector6 value;
   for (int i = 0; i < 6; ++i) value(i) = (*theta)[static_cast<std::size_t>(i)] - chain.joint(i).link.theta;
-  JointVector q = chain.transmission().inverse() * value;
+  JointVector q = Eigen::Matrix<double, 6, 6>(chain.transmission()).partialPivLu().solve(value);
   for (int i = 0; i < 6; ++i) q(i) = nearest_turn(chain.joint(i), q(i), near ? (*near)(i) : 0.0);
-  return judged(chain, q, 0);
+  return q;
 }
 
 Result<int> branch_of(const Chain& chain, const JointVector& q) {
@@ -218,9 +224,9 @@ Result<int> branch_of(const Chain& chain, const JointVector& q) {
   int best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (int conf = 0; conf < 8; ++conf) {
-    const Result<InverseResult> candidate = inverse_kinematics(chain, X_BF, conf, q);
-    if (!candidate || candidate->status == InverseStatus::kUnreachable) continue;
-    const double distance = (candidate->q - q).norm();
+    const auto candidate = joints_of_branch(chain, X_BF, conf, q);
+    if (!candidate) continue;
+    const double distance = (*candidate - q).norm();
     if (distance < least) {
       least = distance;
       best = conf;

@@ -37,6 +37,11 @@ struct InverseResult {
 [[nodiscard]] Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, int conf,
                                                        const std::optional<JointVector>& near = std::nullopt);
 
+/// The same joints, not held against limits and singular places. For an arm with a spherical wrist; `conf` is 0..7.
+/// Empty where the flange cannot be brought there.
+[[nodiscard]] std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF, int conf,
+                                                          const std::optional<JointVector>& near);
+
 /// The branch that `q` is in, numbered as above. Refuses a chain without spherical wrist.
 [[nodiscard]] Result<int> branch_of(const Chain& chain, const JointVector& q);
 

@@ -280,6 +280,11 @@ class Reader {
     }
   }
 
+  /// `[100,500,5000,1000]`, and no target.
+  static bool is_speed(const Expression& aggregate) {
+    return !aggregate.parts.empty() && aggregate.parts.front().kind != Kind::kAggregate;
+  }
+
   /// mm/s, of the tool: what `v100`, which a controller predefines, or a constant speeddata says.
   std::optional<double> speed_of(const Expression& argument, const Scope& scope) const {
     const auto handed = meaning_->handed_over(argument, scope);
@@ -292,6 +297,7 @@ class Reader {
       return number ? std::optional<double>(number->value) : std::nullopt;
     }
     const bool written_here = expression->kind == Kind::kAggregate;
+    if (written_here && !is_speed(*expression)) return std::nullopt;
     if (!written_here && meaning_->type_of(*expression, *where) != "speeddata") return std::nullopt;
     int ignored = 0;
     const Told<std::vector<double>> numbers = meaning_->numbers_of(*expression, 4, *where, &ignored);

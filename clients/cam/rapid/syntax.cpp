@@ -38,8 +38,10 @@ class Parser {
     const Token& t = token(ahead);
     return text_.substr(t.begin, t.end - t.begin);
   }
+  /// A sign of two bytes is `:=`; no other begins so.
   [[nodiscard]] bool is_sign(std::string_view sign, std::size_t ahead = 0) const {
-    return token(ahead).kind == TokenKind::kSign && bytes(ahead) == sign;
+    const Token& t = token(ahead);
+    return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() && text_[t.begin] == sign[0];
   }
   [[nodiscard]] std::string word(std::size_t ahead = 0) const {
     return token(ahead).kind == TokenKind::kWord ? in_lower_case(bytes(ahead)) : std::string();

@@ -1,5 +1,7 @@
 #include "clients/cli/text/receipt_text.h"
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -22,16 +24,25 @@ constexpr std::size_t kNumbers = 7;  // of the longest kind of target
 constexpr std::size_t kCsvBytes = 400;
 constexpr std::size_t kJsonBytes = 900;
 
-/// Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
-std::string millimetres(double value) { return std::isfinite(value) ? fmt::format("{:.5f}", value) : ""; }
+// A long program's receipt is mostly numbers.
 
-std::string numbers(const std::vector<double>& values) {
-  std::string text;
-  for (std::size_t k = 0; k < kNumbers; ++k) text += (k < values.size() ? csv_number(values[k]) : "") + ",";
-  return text;
+void add_number(std::string& text, double value, std::chars_format format, int digits) {
+  std::array<char, 400> written{};
+  text.append(written.data(), std::to_chars(written.begin(), written.end(), value, format, digits).ptr);
 }
 
-std::string speed(double mm_s) { return std::isfinite(mm_s) ? fmt::format("{:.1f}", mm_s) : ""; }
+/// Nothing where it is not known.
+void add_fixed(std::string& text, double value, int decimals) {
+  if (std::isfinite(value)) add_number(text, value, std::chars_format::fixed, decimals);
+  text += ',';
+}
+
+void add_numbers(std::string& text, const std::vector<double>& values) {
+  for (std::size_t k = 0; k < kNumbers; ++k) {
+    if (k < values.size()) add_number(text, values[k], std::chars_format::general, 12);
+    text += ',';
+  }
+}
 
 const char* spelled(cam::Coordinates coordinates) {
   switch (coordinates) {
@@ -105,20 +116,17 @@ std::string receipt_csv(const CorrectedProgram& program) {
                    csv_field(row.motion), csv_field(fmt::format("{}", fmt::join(row.used_at, " "))),
                    csv_field(row.tool), csv_field(row.frame), row.status, row.folded && row.corrected() ? 1 : 0,
                    row.before.empty() ? "" : spelled(row.coordinates));
-    text += numbers(row.before);
-    text += numbers(row.after);
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      if (std::isfinite(row.p_B(k))) fmt::format_to(out, "{:.4f}", to_mm(row.p_B(k)));
-      text += ',';
-    }
+    add_numbers(text, row.before);
+    add_numbers(text, row.after);
+    for (Eigen::Index k = 0; k < 3; ++k) add_fixed(text, to_mm(row.p_B(k)), 4);
+    // Micrometres are said in mm with four decimals, tenths of them with five: more nobody knows.
     for (const double value :
-         {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm}) {
-      text += millimetres(value);
-      text += ',';
-    }
-    fmt::format_to(out, "{},{},{},{},{},{},{}\n", domain_of(row), row.iterations, speed(row.path_limit_before_mm_s),
-                   speed(row.path_limit_after_mm_s), program.model_id, csv_field(row.message),
-                   csv_field(row.suggestion));
+         {row.error_before_mm, row.error_after_mm, row.sigma_mm, row.sigma_measured_mm, row.rounding_mm})
+      add_fixed(text, value, 5);
+    fmt::format_to(out, "{},{},", domain_of(row), row.iterations);
+    add_fixed(text, row.path_limit_before_mm_s, 1);
+    add_fixed(text, row.path_limit_after_mm_s, 1);
+    fmt::format_to(out, "{},{},{}\n", program.model_id, csv_field(row.message), csv_field(row.suggestion));
   }
   return text;
 }
