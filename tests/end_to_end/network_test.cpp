@@ -1,14 +1,12 @@
-// A service that other hosts reach: two hosts are two network namespaces with a cable between them.
+// A service that other hosts reach: two hosts are two network namespaces with a line between them,
+// good or bad.
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <memory>
 
 #include "server/base/text_file.h"
 #include "tests/support/daemon.h"
+#include "tests/support/two_hosts.h"
 #include "tests/support/virtual_cell.h"
 
 namespace trammel {
@@ -17,69 +15,12 @@ namespace {
 using std::chrono::seconds;
 constexpr seconds kLimit{60};
 
-/// Two hosts, 10.88.N.1 and 10.88.N.2, that see each other and nobody else. They go with the test.
-class TwoHosts {
- public:
-  TwoHosts() {
-    const auto number = std::to_string(::getpid() % 250);
-    for (std::size_t i = 0; i < 2; ++i) {
-      names_[i] = "trammel-" + std::to_string(::getpid()) + "-" + std::to_string(i);
-      addresses_[i] = "10.88." + number + "." + std::to_string(i + 1);
-    }
-    made_ =
-        ip({"netns", "add", names_[0]}) && ip({"netns", "add", names_[1]}) &&
-        ip({"link", "add", "cable", "netns", names_[0], "type", "veth", "peer", "name", "cable", "netns", names_[1]});
-    for (std::size_t i = 0; made_ && i < 2; ++i) {
-      made_ = ip({"-n", names_[i], "addr", "add", addresses_[i] + "/24", "dev", "cable"}) &&
-              ip({"-n", names_[i], "link", "set", "lo", "up"}) && set_cable(i, true);
-    }
-    made_ = made_ && wait_for_link();
-  }
-  ~TwoHosts() {
-    for (const std::string& name : names_) static_cast<void>(ip({"netns", "del", name}));
-  }
-  TwoHosts(const TwoHosts&) = delete;
-  TwoHosts& operator=(const TwoHosts&) = delete;
-
-  [[nodiscard]] bool made() const { return made_; }
-  [[nodiscard]] const std::string& address(std::size_t host) const { return addresses_.at(host); }
-  [[nodiscard]] bool set_cable(std::size_t host, bool up) const {
-    return ip({"-n", names_.at(host), "link", "set", "cable", up ? "up" : "down"});
-  }
-  /// Until both ends of the cable are up, and have noticed.
-  [[nodiscard]] bool wait_for_link() const {
-    for (int i = 0; i < 1000; ++i) {
-      if (has_link()) return true;
-    }
-    return false;
-  }
-  /// The same command on that host.
-  [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const {
-    argv.insert(argv.begin(), {"/usr/sbin/ip", "netns", "exec", names_.at(host)});
-    return argv;
-  }
-
- private:
-  [[nodiscard]] bool has_link() const {
-    return std::all_of(names_.begin(), names_.end(), [](const std::string& name) {
-      const auto link = test::run({"/usr/sbin/ip", "-n", name, "link", "show", "cable"});
-      return link.out.find("state UP") != std::string::npos;
-    });
-  }
-  static bool ip(std::vector<std::string> words) {
-    words.insert(words.begin(), "/usr/sbin/ip");
-    return test::run(words).exit_code == 0;
-  }
-
-  std::array<std::string, 2> names_, addresses_;
-  bool made_ = false;
-};
-
 class NetworkTest : public testing::Test {
  protected:
+  explicit NetworkTest(const test::LineFaults& faults = {}) : hosts_(faults) {}
+
   void SetUp() override {
-    if (::access("/usr/sbin/ip", X_OK) != 0 || !hosts_.made())
-      GTEST_SKIP() << "network namespaces cannot be made here: that takes root, and iproute2";
+    if (!hosts_.why_not().empty()) GTEST_SKIP() << hosts_.why_not();
   }
 
   void start(const std::string& dds) {
@@ -90,7 +31,7 @@ class NetworkTest : public testing::Test {
     ASSERT_TRUE(service_->wait_for_line("ready", kLimit)) << service_->standard_error();
   }
   [[nodiscard]] std::vector<std::string> command(std::vector<std::string> words) const {
-    words.insert(words.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
+    words.insert(words.begin(), {TRAMMEL_BINARY_DIR "/clients/trammel"});
     words.insert(words.end(), {"--host", fmt::format("{}:{}", hosts_.address(0), daemon_.port()), "--domain",
                                std::to_string(daemon_.domain())});
     return hosts_.on(1, std::move(words));
@@ -100,7 +41,7 @@ class NetworkTest : public testing::Test {
     return test::run(command(std::move(words)), kLimit);
   }
 
-  TwoHosts hosts_;
+  test::TwoHosts hosts_;
   test::Daemon daemon_;
   test::TemporaryFolder folder_;
   std::unique_ptr<test::Process> service_;
@@ -116,14 +57,13 @@ TEST_F(NetworkTest, AnotherHostSubmitsABatchAndHasItsTargetsCorrected) {
   EXPECT_EQ(corrected.exit_code, 0) << corrected.out << corrected.err;
 }
 
-TEST_F(NetworkTest, AfterACutCableTheServiceAnswersAgain) {
+TEST_F(NetworkTest, AfterItsInterfaceWasGoneTheServiceAnswersAgain) {
   start("without_security: true");
   ASSERT_EQ(elsewhere({"status"}).exit_code, 0);
-  ASSERT_TRUE(hosts_.set_cable(0, false));
+  ASSERT_TRUE(hosts_.set_interface(0, false));
   const auto cut = elsewhere({"status"});
   EXPECT_NE(cut.exit_code, 0) << cut.out << cut.err;
-  ASSERT_TRUE(hosts_.set_cable(0, true));
-  ASSERT_TRUE(hosts_.wait_for_link());
+  ASSERT_TRUE(hosts_.set_interface(0, true));
   const auto again = elsewhere({"status"});
   EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
 }
@@ -140,6 +80,63 @@ TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
   EXPECT_EQ(known.exit_code, 0) << known.out << known.err;
   const auto forbidden = elsewhere({"rollback", "--cell", "cell-7", "--security", plant + "/participants/office"});
   EXPECT_EQ(forbidden.exit_code, 3) << forbidden.out << forbidden.err;
+}
+
+/// Holes beside each other on the shipped panel.
+std::string many_targets(int count) {
+  std::string text = "hole,x_mm,y_mm,z_mm,qw,qx,qy,qz,conf\n";
+  for (int i = 0; i < count; ++i)
+    text += fmt::format("{},1800,{:.3f},{:.3f},0.7071067811865476,0,0.7071067811865476,0,0\n", i,
+                        -250 + 500.0 * i / count, 800.0 + i % 1000);
+  return text;
+}
+
+/// A line that loses every twentieth frame, holds each back for 50 ms and lets them overtake each other.
+class BadLineTest : public NetworkTest {
+ protected:
+  BadLineTest() : NetworkTest({0.05, std::chrono::milliseconds(50), std::chrono::milliseconds(20)}) {}
+
+  /// A model is learned from a batch that comes over the line.
+  void learn() {
+    const std::string batch = folder_.write("batch.csv", test::virtual_batch_csv(120, 3));
+    const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
+    ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
+    const auto fetched = elsewhere({"export", "--model", "cell-7", "-o", folder_.file("cell.model")});
+    ASSERT_EQ(fetched.exit_code, 0) << fetched.out << fetched.err;
+  }
+  /// What this host makes of the program with the model's file.
+  [[nodiscard]] std::string corrected_here(const std::string& program) const {
+    const auto done = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "correct", "--model",
+                                 folder_.file("cell.model"), program, "-o", folder_.file("here.csv")});
+    EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
+    return test::read_file(folder_.file("here.csv"));
+  }
+  [[nodiscard]] std::vector<std::string> correct(const std::string& program) const {
+    return {"correct", "--service", "--model", "cell-7", program, "-o", folder_.file("there.csv"), "--timeout", "20"};
+  }
+};
+
+TEST_F(BadLineTest, EveryAnswerOverItIsTheRightOne) {
+  start("without_security: true");
+  learn();
+  const std::string program = TRAMMEL_SOURCE_DIR "/config/drill-panel.csv", wanted = corrected_here(program);
+  for (int i = 0; i < 5; ++i) {
+    const auto corrected = elsewhere(correct(program));
+    ASSERT_EQ(corrected.exit_code, 0) << corrected.out << corrected.err;
+    EXPECT_EQ(test::read_file(folder_.file("there.csv")), wanted);
+  }
+}
+
+TEST_F(BadLineTest, ALongProgramOutlastsACutOfFiveSeconds) {
+  start("without_security: true");
+  learn();
+  const std::string program = folder_.write("long.csv", many_targets(3000)), wanted = corrected_here(program);
+  const std::uint64_t before = hosts_.carried();
+  test::Process correcting(command(correct(program)));
+  hosts_.wait_until_carried(before + 200);  // some parts are answered
+  hosts_.cut_for(seconds(5));
+  EXPECT_EQ(correcting.wait(kLimit), 0) << correcting.standard_error();
+  EXPECT_EQ(test::read_file(folder_.file("there.csv")), wanted);
 }
 
 }  // namespace

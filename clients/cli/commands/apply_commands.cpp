@@ -59,7 +59,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
       return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
-    asked.q = pose.context.q;
+    asked.q = from_wire(to_wire(pose.context.q, list.joint_types), model->cell().robot);
     asked.tool = pose.context.tool;
     asked.payload = pose.context.payload;
     asked.direction = pose.context.direction;
@@ -150,7 +150,8 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   in_parallel(
       file.rows.size(),
       [&](std::size_t i) {
-        corrections.items[i] = to_wire(model->correct(file.rows[i].target, *tool, *payload), corrections.joint_types);
+        const Target target = from_wire(to_wire(file.rows[i].target, corrections.joint_types), model->cell().robot);
+        corrections.items[i] = to_wire(model->correct(target, *tool, *payload), corrections.joint_types);
       },
       [&](double share) { progress.show("correcting", share); });
   return corrections;

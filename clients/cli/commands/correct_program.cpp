@@ -33,26 +33,6 @@ std::string today() {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-/// As a server reads it, so that both give the same bytes.
-Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
-  Target target;
-  target.joint_target = wanted.joint_target;
-  if (!target.joint_target) {
-    const client::PoseMm& pose = wanted.pose;
-    const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
-    target.X_BT = make_pose(R.normalized().toRotationMatrix(), Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
-  }
-  target.conf = wanted.conf;
-  if (wanted.conf || wanted.seed_rad.empty()) return target;
-  JointVector seed(robot.size());
-  for (int j = 0; j < robot.size(); ++j) {
-    const double value = wanted.seed_rad[static_cast<std::size_t>(j)];
-    seed(j) = robot.joint(j).type == JointType::kPrismatic ? from_mm(value) : value;
-  }
-  target.seed = seed;
-  return target;
-}
-
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {

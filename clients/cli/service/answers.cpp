@@ -117,6 +117,31 @@ client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joi
           target.joint_target, client::Approach{target.direction, target.temperature, target.time}};
 }
 
+Target from_wire(const client::TargetMm& wanted, const Chain& robot) {
+  Target target;
+  target.joint_target = wanted.joint_target;
+  if (!target.joint_target) {
+    const client::PoseMm& pose = wanted.pose;
+    const Eigen::Quaterniond R(pose.qw, pose.qx, pose.qy, pose.qz);
+    target.X_BT = make_pose(R.normalized().toRotationMatrix(), Vector3(pose.x_mm, pose.y_mm, pose.z_mm) * from_mm(1));
+  }
+  target.direction = wanted.approach.directions;
+  target.temperature = wanted.approach.temperature_c;
+  target.time = wanted.approach.time_s;
+  target.conf = wanted.conf;
+  if (!wanted.conf && !wanted.seed_rad.empty()) target.seed = from_wire(wanted.seed_rad, robot);
+  return target;
+}
+
+JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
+  JointVector q(robot.size());
+  for (int j = 0; j < robot.size(); ++j) {
+    const double value = wire[static_cast<std::size_t>(j)];
+    q(j) = robot.joint(j).type == JointType::kPrismatic ? from_mm(value) : value;
+  }
+  return q;
+}
+
 JointUncertainty joint_uncertainty(const client::PredictedError& item) {
   return {item.cxy_mm2, item.cxz_mm2, item.cyz_mm2, item.slx_mm, item.sly_mm, item.slz_mm};
 }

@@ -18,6 +18,9 @@ namespace trammel::cli {
 /// rad, of a prismatic joint mm.
 [[nodiscard]] std::vector<double> to_wire(const JointVector& q, const std::vector<JointType>& joint_types);
 [[nodiscard]] client::TargetMm to_wire(const Target& target, const std::vector<JointType>& joint_types);
+/// As a server reads them: what is computed here has the same bytes as what a server answers.
+[[nodiscard]] Target from_wire(const client::TargetMm& wanted, const Chain& robot);
+[[nodiscard]] JointVector from_wire(const std::vector<double>& wire, const Chain& robot);
 
 /// How the arm comes to a pose, as far as that is known.
 [[nodiscard]] client::Approach approach_of(const PoseContext& context);
