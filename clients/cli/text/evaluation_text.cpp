@@ -373,6 +373,7 @@ ordered_json model_json(const CompensatedModel& model) {
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
   if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
   if (!parts.sessions.empty()) json["between_sessions"] = session_changes_json(session_changes(model));
+  if (!parts.sessions.empty()) json["changes"] = json["between_sessions"];  // as it was called before
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;
