@@ -489,6 +489,17 @@ Result<std::vector<std::string>> Session::fleet() {
   return texts;
 }
 
+Result<std::vector<std::string>> Session::health(const std::string& cell, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(-1);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_HEALTH, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::string> texts;
+  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  return texts;
+}
+
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
   const auto reply = participant_->read(cell, {}, wire::READ_MODELS);
   if (!reply) return tl::make_unexpected(reply.error());

@@ -96,6 +96,9 @@ class Session {
                                                      std::size_t most);
   /// From every server: its cells, their health, what is unusual about each, as `trammel fleet --json` prints it.
   [[nodiscard]] Result<std::vector<std::string>> fleet();
+  /// From every server: what checks said of a cell or (empty) of all, the newest `most` of each (0: all), when the next
+  /// one is due, and how what is in force was judged: JSON, `cells` with an entry each.
+  [[nodiscard]] Result<std::vector<std::string>> health(const std::string& cell, std::size_t most);
   [[nodiscard]] Result<std::vector<ModelInfo>> models(const std::string& cell);
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});

@@ -24,13 +24,16 @@ namespace {
 
 constexpr double kChance = 1e-7;                     // of a false jump in a batch
 constexpr double kAsGood = 9.2;                      // twice the log likelihood: 1 in 100
-constexpr double kBeforeSlow = 25;                   // twice the log likelihood: ahead of anything that grows slowly
+constexpr double kBeforeSlow = 13.8;                 // twice the log likelihood, 1000 to 1: ahead of what grows slowly
 constexpr std::size_t kMostDerivatives = 2'000'000;  // poses times parameters: 100 MB of equations
 constexpr std::size_t kFewestPoses = 40;             // to look at
 constexpr std::size_t kFewestBeyond = 6;             // poses before a jump, and from it on
 constexpr double kLeastSeen = 1;   // information of a candidate, prior units: below it the poses do not show it
 constexpr double kWholeBatch = 1;  // of its length: lags of what grows slowly
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
+constexpr Index kWaves = 16;              // half waves over the batch, of which a wandering course is made
+constexpr double kRoughness[] = {1, 2};   // power of the wave number that its amplitudes fall by: a walk, and smoother
+constexpr double kBeforeWandering = 4.6;  // nat, 100 to 1: ahead of the likeliest course of that kind
 
 /// The equations of one pose, in units of sigma: residual, derivatives by what is free (P) and by the kinds (K).
 struct PoseEquations {
@@ -71,34 +74,26 @@ class JumpSearch {
     free_sides();
     const Index P = poses_.empty() ? 0 : poses_.front().free.rows();
     MatrixXd information = MatrixXd::Identity(P, P);
-    VectorXd gradient = VectorXd::Zero(P);
-    for (const PoseEquations& pose : poses_) {
-      information.noalias() += pose.free * pose.free.transpose();
-      gradient.noalias() += pose.free * pose.residual;
-    }
+    for (const PoseEquations& pose : poses_) information.noalias() += pose.free * pose.free.transpose();
     factor_.compute(information);
-    at_rest_ = factor_.solve(gradient);
+    settle();
   }
 
   [[nodiscard]] std::optional<Jump> strongest() const {
     if (poses_.size() < kFewestPoses) return std::nullopt;
-    const double inflation = inflation_by_halves();
-    std::vector<Scored> all;
-    KindSums since(kinds(), unknowns());
-    for (std::size_t i = poses_.size() - 1; i >= kFewestBeyond; --i) {
-      since.add(poses_[i]);
-      if (poses_.size() - i < kFewestBeyond) continue;
-      for (const ChangeKind& kind : kinds_.kinds()) {
-        const Fitted fitted = fit(kind.first, kind.count, since);
-        if (fitted.gain > 0) all.push_back(scored(kind, i, fitted, inflation));
-      }
-    }
-    const auto best = std::max_element(all.begin(), all.end(),
-                                       [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+    const std::vector<Scored> seen = all_scored(inflation_by_halves());
+    const auto first = strongest_of(seen);
+    if (first == seen.end()) return std::nullopt;
+    // What jumps differs between the halves, too: it is no sign that the rest is not white.
+    const double inflation = without(*first).inflation_by_halves();
+    const std::vector<Scored> all = all_scored(inflation);
+    const auto best = strongest_of(all);
     if (best == all.end()) return std::nullopt;
     const double chance = std::min(
         1.0, static_cast<double>(all.size()) * chi_square_tail(best->gain, static_cast<int>(best->kind->count)));
     if (chance > kChance || best->gain < slow_gain(*best->kind) / inflation + kBeforeSlow) return std::nullopt;
+    if (evidence_of_jump(*best, inflation) < evidence_of_wandering(*best->kind, inflation) + kBeforeWandering)
+      return std::nullopt;
     return told(*best, chance, all);
   }
 
@@ -109,6 +104,42 @@ class JumpSearch {
     double gain = 0, evidence = 0;
     VectorXd size;
   };
+
+  [[nodiscard]] std::vector<Scored> all_scored(double inflation) const {
+    std::vector<Scored> all;
+    KindSums since(kinds(), unknowns());
+    for (std::size_t i = poses_.size() - 1; i >= kFewestBeyond; --i) {
+      since.add(poses_[i]);
+      if (poses_.size() - i < kFewestBeyond) continue;
+      for (const ChangeKind& kind : kinds_.kinds()) {
+        const Fitted fitted = fit(kind.first, kind.count, since);
+        if (fitted.gain > 0) all.push_back(scored(kind, i, fitted, inflation));
+      }
+    }
+    return all;
+  }
+  [[nodiscard]] static std::vector<Scored>::const_iterator strongest_of(const std::vector<Scored>& all) {
+    return std::max_element(all.begin(), all.end(),
+                            [](const Scored& a, const Scored& b) { return a.evidence < b.evidence; });
+  }
+
+  /// By how much what is free still moves.
+  void settle() {
+    VectorXd gradient = VectorXd::Zero(factor_.rows());
+    for (const PoseEquations& pose : poses_) gradient.noalias() += pose.free * pose.residual;
+    at_rest_ = factor_.solve(gradient);
+  }
+
+  /// The same poses without what the jump did.
+  [[nodiscard]] JumpSearch without(const Scored& jump) const {
+    JumpSearch rest = *this;
+    for (std::size_t i = jump.at; i < rest.poses_.size(); ++i) {
+      PoseEquations& pose = rest.poses_[i];
+      pose.residual -= pose.kinds.middleRows(jump.kind->first, jump.kind->count).transpose() * jump.size;
+    }
+    rest.settle();
+    return rest;
+  }
 
   [[nodiscard]] Index kinds() const { return static_cast<Index>(changes_.size()); }
   [[nodiscard]] Index unknowns() const { return poses_.front().free.rows(); }
@@ -187,6 +218,61 @@ class JumpSearch {
     KindSums sums(kinds(), unknowns());
     for (std::size_t i = 0; i < poses_.size(); ++i) sums.add(poses_[i], course(i));
     return fit(kind.first, kind.count, sums).gain;
+  }
+
+  /// Nat, of a jump there, its size likely by a scale that the data choose.
+  [[nodiscard]] double evidence_of_jump(const Scored& jump, double inflation) const {
+    KindSums since(kinds(), unknowns());
+    for (std::size_t i = jump.at; i < poses_.size(); ++i) since.add(poses_[i]);
+    const Index first = jump.kind->first, count = jump.kind->count;
+    const MatrixXd shared = since.shared.middleRows(first, count);
+    const MatrixXd left = since.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
+    const VectorXd along = since.along.segment(first, count) - shared * at_rest_;
+    return best_evidence(left / inflation, along / inflation, VectorXd::Ones(count)) -
+           std::log(static_cast<double>(poses_.size()));
+  }
+
+  /// Nat, of the kind as something that wanders: half waves over the batch, whose amplitudes are likely by a power of
+  /// the wave number and a scale that the data choose.
+  [[nodiscard]] double evidence_of_wandering(const ChangeKind& kind, double inflation) const {
+    const Index n = static_cast<Index>(poses_.size()), count = kind.count, all = kWaves * count;
+    MatrixXd own = MatrixXd::Zero(all, all), shared = MatrixXd::Zero(all, unknowns());
+    VectorXd along = VectorXd::Zero(all);
+    for (Index i = 0; i < n; ++i) {
+      const PoseEquations& pose = poses_[static_cast<std::size_t>(i)];
+      MatrixXd columns(all, pose.residual.size());
+      for (Index k = 0; k < kWaves; ++k) {
+        const double phase = static_cast<double>((k + 1) * (2 * i + 1)) / static_cast<double>(2 * n);
+        columns.middleRows(k * count, count) = std::cos(kPi * phase) * pose.kinds.middleRows(kind.first, count);
+      }
+      own.noalias() += columns * columns.transpose();
+      shared.noalias() += columns * pose.free.transpose();
+      along.noalias() += columns * pose.residual;
+    }
+    own -= shared * factor_.solve(shared.transpose());
+    along -= shared * at_rest_;
+    double best = 0;
+    for (const double power : kRoughness) {
+      VectorXd amplitude(all);
+      for (Index k = 0; k < all; ++k) amplitude(k) = std::pow(static_cast<double>(1 + k / count), -power);
+      best = std::max(best, best_evidence(own / inflation, along / inflation, amplitude));
+    }
+    return best;
+  }
+
+  /// Nat, of numbers that are normal about nothing: standard deviations `amplitude` times the likeliest scale.
+  [[nodiscard]] static double best_evidence(const MatrixXd& information, const VectorXd& along,
+                                            const VectorXd& amplitude) {
+    const MatrixXd scaled = amplitude.asDiagonal() * information * amplitude.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (scaled + scaled.transpose()));
+    const VectorXd values = eigen.eigenvalues().cwiseMax(0.0);
+    const VectorXd square = (eigen.eigenvectors().transpose() * amplitude.cwiseProduct(along)).cwiseAbs2();
+    double best = 0;
+    for (double scale = 1e-8; scale < 1e3; scale *= 2) {
+      const Eigen::ArrayXd grown = 1 + scale * values.array();
+      best = std::max(best, 0.5 * (scale * square.array() / grown - grown.log()).sum());
+    }
+    return best;
   }
 
   /// How much larger gains are than white noise makes them: the mean over single numbers between halves of the poses by

@@ -25,10 +25,12 @@ struct Jump {
 /// The jump that the poses, in the order of `batch`, speak for most; empty where none is beyond chance and materially
 /// likelier than what grows slowly. `found` was identified on them as one session, everything the cell lists free. Each
 /// kind of jump at each row is held against the residuals beside all that is free (a score test). What the model leaves
-/// over is no white noise, so the gains are divided by what the same kinds gain between halves of the joint ranges, and
-/// a joint that is approached from both sides may differ between them. Of several tools or payloads each is looked at
-/// by itself: who changes one says so. Fewer than 40 poses, and more than two million derivatives (poses times
-/// parameters), are not looked at.
+/// over is no white noise, so the gains are divided by what the same kinds gain between halves of the joint ranges once
+/// the strongest jump is taken off, and a joint that is approached from both sides may differ between them. It must be
+/// 100 times likelier than the same kind wandering: half waves over the batch, of amplitudes that fall with their
+/// number by a power, and by a size, that the data choose. Of several tools or payloads each is looked at by itself:
+/// who changes one says so. Fewer than 40 poses, and more than two million derivatives (poses times parameters), are
+/// not looked at.
 [[nodiscard]] std::optional<Jump> jump_within(const CalibrationResult& found, const MeasurementBatch& batch);
 
 /// The same of a batch that nothing was identified on yet, with the sources that `cell` lists. Empty also where they

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/calibrate/one_session.h"
 #include "server/compensate/paired_gain.h"
+#include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
 
 namespace trammel {
@@ -133,64 +133,10 @@ void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& no
   }
 }
 
-/// `from q3 -0.200 ± 0.004 mrad`: the numbers of a change.
-std::string size_of(const CompensatedModel::Parts& parts, const Change& change) {
-  std::vector<std::string> numbers;
-  std::size_t next = 0;
-  for (const ErrorSourcePtr& source : parts.physics.sources) {
-    for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
-      if (source->name() != change.source) continue;
-      const IdentifiedParameter& p = parts.parameters[next];
-      const bool angle = p.parameter.unit == "rad";
-      const double scale = p.parameter.scale * (angle ? 1e3 : 1);
-      numbers.push_back(fmt::format("{} {:.4f} ± {:.4f} {}", p.parameter.name, scale * p.value, 2 * scale * p.stddev,
-                                    angle ? "mrad" : p.parameter.unit));
-    }
-  }
-  return fmt::format("{}", fmt::join(numbers, ", "));
-}
-
-/// `joint 3 wanders`: how fast, and how far it is by now.
-std::string wandering_sentence(const CompensatedModel::Parts& parts, const Change& change) {
-  double moved = 0;
-  std::vector<Eigen::Index> places;
-  Eigen::Index next = 0;
-  for (const ErrorSourcePtr& source : parts.physics.sources) {
-    const bool is_step = std::find(change.steps.begin(), change.steps.end(), source->name()) != change.steps.end();
-    for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
-      if (!is_step) continue;
-      places.push_back(next);
-      moved += parts.parameters[static_cast<std::size_t>(next)].value;
-    }
-  }
-  const double variance = parts.covariance(places, places).sum();
-  return fmt::format(
-      "slow drift: {}, {:.4f} mrad from session to session (a random walk); since session {} it has moved by {:.4f} ± "
-      "{:.4f} mrad (U, k=2)",
-      cause_in_words(change.source), 1e3 * change.rate, parts.sessions.front().id, 1e3 * moved,
-      2e3 * std::sqrt(std::max(0.0, variance)));
-}
-
-void add_changes(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
-  for (const Change& change : parts.changes) {
-    if (change.rate > 0) {
-      notes.push_back(wandering_sentence(parts, change));
-      continue;
-    }
-    const SessionSetting& since = parts.sessions[change.session];
-    std::string note =
-        is_of_one_session(change)
-            ? fmt::format(
-                  "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat elsewhere "
-                  "({}; U, k=2): the sessions after it are as those before",
-                  since.id, since.first_pose, size_of(parts, change))
-            : fmt::format("since session {} (pose {}): {} ({}; U, k=2)", since.id, since.first_pose,
-                          cause_in_words(change.source), size_of(parts, change));
-    std::vector<std::string> others;
-    for (const std::string& other : change.could_also_be) others.push_back(cause_in_words(other));
-    if (!others.empty()) note += fmt::format("; ambiguous: it could also be {}", fmt::join(others, " or "));
-    notes.push_back(note);
-  }
+void add_changes(const CompensatedModel& model, std::vector<std::string>& notes) {
+  for (const SessionChange& change : session_changes(model)) notes.push_back(sentence(change));
+  if (const auto order = note_on_order(model.parts().sessions, model.parts().sessions_as_given))
+    notes.push_back(*order);
 }
 
 void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
@@ -212,11 +158,9 @@ void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>
 
 }  // namespace
 
-std::string cause_in_words(const std::string& source) { return in_words(source.substr(0, source.find('@'))); }
-
 std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
-  add_changes(model.parts(), notes);
+  add_changes(model, notes);
   add_sessions(model.parts(), notes);
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);

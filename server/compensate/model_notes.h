@@ -8,9 +8,6 @@
 
 namespace trammel {
 
-/// An error source for people, without the row at which it began: `lost zero in joint 3`.
-[[nodiscard]] std::string cause_in_words(const std::string& source);
-
 /// What a user of the model should know, one sentence each: error sources without effect, a bias that was learned with
 /// a tool that has moved since.
 [[nodiscard]] std::vector<std::string> notes_of(const CompensatedModel& model);

@@ -65,6 +65,7 @@ struct ModelParts {
   std::vector<double> cost_record;
   /// Of several sessions: what belongs to each, the newest last, in whose world the base stands; empty: there was one.
   std::vector<SessionSetting> sessions;
+  bool sessions_as_given = false;  ///< no clock told their order: they are in that in which they were given
   std::vector<LeftOutSession> sessions_left_out;
   std::vector<Change> changes;  ///< of the arm between these sessions; their sources are among those of the physics
   double discrepancy = 0;       ///< m per axis, see CalibrationResult

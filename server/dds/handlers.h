@@ -92,6 +92,9 @@ class Handlers {
                                                        std::size_t most) const;
   [[nodiscard]] Result<wire::ReadModelsReply> findings_of(const std::string& cell, std::int64_t job, bool page) const;
   [[nodiscard]] Result<wire::ReadModelsReply> fleet() const;
+  /// Of one cell or (empty) of all: the newest `most` checks of each since then.
+  [[nodiscard]] Result<wire::ReadModelsReply> health_of(const std::string& cell, std::int64_t since,
+                                                        std::size_t most) const;
 
   Trainer& trainer_;
   Store& store_;

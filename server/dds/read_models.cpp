@@ -6,6 +6,7 @@
 #include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/report/cell_health.h"
 #include "server/report/fleet_json.h"
 #include "server/store/audit_json.h"
 
@@ -29,6 +30,32 @@ Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches)
   return reply;
 }
 
+/// What the store has of a cell's checks, and of how its model in force was judged.
+Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry, const std::string& cell,
+                             std::int64_t since, std::size_t most) {
+  const auto checks = store.health_checks(cell, std::max<std::int64_t>(since, 0), most);
+  if (!checks) return tl::make_unexpected(checks.error());
+  const auto record = store.in_force_record(cell);
+  if (!record) return tl::make_unexpected(record.error());
+  CellHealth health{cell};
+  for (const StoredCheck& one : *checks) health.checks.push_back({one.job, one.at, one.batch_ids, one.findings});
+  const auto model = registry.in_force(cell);
+  if (!model) return health;
+  ServedOnRecord& served = health.served.emplace();
+  served.version = model->version;
+  served.model = model->model.provenance().id;
+  served.between_sessions = session_changes(model->model);
+  if (!*record || (*record)->version != model->version) return health;  // served from a copy
+  served.since = (*record)->since;
+  served.version_before = (*record)->before;
+  const JobOutcome judged = (*record)->judged.value_or(JobOutcome());
+  served.before = judged.before;
+  served.after = judged.after;
+  served.limit = judged.limit;
+  served.why = ((*record)->judged_when_made ? "when it was made: " : "") + judged.why;
+  return health;
+}
+
 Status check_fits(const std::string& what, std::size_t bytes) {
   if (bytes <= wire::kMaxText) return {};
   return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, bytes, wire::kMaxText)
@@ -40,11 +67,11 @@ Status check_fits(const std::string& what, std::size_t bytes) {
 Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   const std::string& cell = request.about().cell();
   const bool of_all = request.what() == wire::READ_JOBS || request.what() == wire::READ_QUARANTINE ||
-                      request.what() == wire::READ_BATCHES || request.what() == wire::READ_AUDIT;
+                      request.what() == wire::READ_BATCHES || request.what() == wire::READ_AUDIT ||
+                      request.what() == wire::READ_HEALTH;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
   if (request.what() == wire::READ_FLEET) return fleet();
-  if (request.what() == wire::READ_HEALTH || request.what() > wire::READ_AUDIT)
-    return unsupported<ReadModelsReply>("what");
+  if (request.what() > wire::READ_AUDIT) return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
     if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   }
@@ -72,6 +99,8 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
       return findings_of(cell, request.job(), request.page());
     case wire::READ_AUDIT:
       return audit_of(cell, request.since_unix_s(), request.most());
+    case wire::READ_HEALTH:
+      return health_of(cell, request.since_unix_s(), request.most());
     default:
       return unsupported<ReadModelsReply>("what");
   }
@@ -184,6 +213,22 @@ Result<ReadModelsReply> Handlers::fleet() const {
   ReadModelsReply reply;
   reply.text(fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the fleet", reply.text().size()); !fits) return tl::make_unexpected(fits.error());
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_t since, std::size_t most) const {
+  nlohmann::ordered_json cells = nlohmann::ordered_json::array();
+  for (const auto& [name, known] : trainer_.cells()) {
+    if (!cell.empty() && name != cell) continue;
+    const auto health = health_in(store_, registry_, name, since, most);
+    if (!health) return tl::make_unexpected(health.error());
+    cells.push_back(cell_health_json(*health));
+  }
+  ReadModelsReply reply;
+  reply.text(nlohmann::ordered_json{{"cells", std::move(cells)}}.dump(
+      -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (const Status fits = check_fits("the health of cells", reply.text().size()); !fits)
+    return Failure(fits.error()).next("ask for fewer checks");
   return reply;
 }
 

@@ -99,15 +99,17 @@ class Call final : public Job {
   /// False: a repeat of a request that is not answered yet. That one's answer is sent once more for it.
   [[nodiscard]] bool is_first() const { return answering_.is_first(); }
 
-  /// Instead of begin(), where something else is being answered under its id. True: it is answered so.
-  [[nodiscard]] bool is_refused_for_its_id() {
+  /// Instead of begin(), where something else is being answered under its id: what was answered under it before is
+  /// repeated, all else is refused. True: it is answered so.
+  [[nodiscard]] bool is_answered_for_its_id() {
     if (!answering_.is_other()) return false;
-    refuse(kIdIsUsed);
+    if (!find_known()) refuse(kIdIsUsed);
+    const bool is_good = !is_refused();
     put_identity();
     ++context_.counts.requests;
-    ++context_.counts.refused;
+    if (!is_good) ++context_.counts.refused;
     context_.operation.answered(reply_.header().result(), 1);
-    report(false);
+    report(is_good);
     const std::size_t bytes = bytes_of_reply(reply_);
     context_.replies.post(to_, std::make_shared<Reply>(std::move(reply_)), bytes);
     return true;

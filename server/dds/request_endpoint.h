@@ -131,7 +131,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
     Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
     Ask ask = ask_of(*request, to.participant);
     const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
-    if (call->is_refused_for_its_id() || !call->is_first()) return;
+    if (call->is_answered_for_its_id() || !call->is_first()) return;
     if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
   }
 

@@ -28,8 +28,11 @@ constexpr std::size_t kFewestPoses =
 
 /// Of a batch of several sessions.
 struct Placed {
-  std::vector<SessionSetting> sessions;  ///< where the instrument of each stood
-  std::vector<Change> changes;           ///< of the arm between them
+  CalibrationResult calibration;  ///< its sessions: where the instrument of each stood
+  std::vector<Change> changes;    ///< of the arm between them
+  bool as_given = false;          ///< no clock told their order
+
+  [[nodiscard]] const std::vector<SessionSetting>& sessions() const { return calibration.sessions; }
 };
 
 /// By the arm as the cell's sources have it, and what changed on it between two sessions: what a change does is no
@@ -44,8 +47,8 @@ Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatc
   return identify_sessions(
              identify, with_unknown_tool(cell->model.error_sources, *cell), merged,
              [&](double) { return report_progress(options, "asking what changed between the sessions", 0); })
-      .map([](IdentifiedSessions found) {
-        return Placed{std::move(found.calibration.sessions), std::move(found.changes)};
+      .map([&](IdentifiedSessions found) {
+        return Placed{std::move(found.calibration), std::move(found.changes), !batch.rows().clock};
       });
 }
 
@@ -66,8 +69,8 @@ bool is_beside_the_search(const Change& change) { return is_of_one_session(chang
 /// So is what the search could not name of what changed between the sessions.
 std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
   std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
-  for (std::size_t s = 1; s < placed.sessions.size(); ++s)
-    sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, placed.sessions[s].first + 1));
+  for (std::size_t s = 1; s < placed.sessions().size(); ++s)
+    sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, placed.sessions()[s].first + 1));
   for (const Change& change : placed.changes) {
     if (!is_beside_the_search(change)) continue;
     for (std::string& source : change.sources()) sources.push_back(std::move(source));
@@ -147,36 +150,23 @@ void tell_since(const MeasurementBatch& batch, Diagnosis& diagnosis) {
   }
 }
 
-/// `since session day-3 (pose day-3/1): lost zero in joint 3`
-std::string in_words(const Change& change, const Placed& placed) {
-  const auto words = [](const std::string& source) { return trammel::in_words(source.substr(0, source.find('@'))); };
-  const SessionSetting& since = placed.sessions[change.rate > 0 ? 1 : change.session];
-  if (is_of_one_session(change)) {
-    return fmt::format(
-        "in session {} alone (from pose {}) the reflector, or the tool that carries it, sat elsewhere: the sessions "
-        "after it are as those before",
-        since.id, since.first_pose);
-  }
-  if (change.rate > 0) {
-    return fmt::format("from session {} on (pose {}) {} wanders by {:.4f} mrad a session", since.id, since.first_pose,
-                       words(change.source), 1e3 * change.rate);
-  }
-  std::vector<std::string> causes = {words(change.source)};
-  for (const std::string& other : change.could_also_be) {
-    if (std::find(causes.begin(), causes.end(), words(other)) == causes.end()) causes.push_back(words(other));
-  }
-  return fmt::format("since session {} (pose {}): {}", since.id, since.first_pose, fmt::join(causes, ", or "));
+/// What changed on the arm between two sessions, and on what that rests.
+void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
+  const CalibrationResult& by = placed.calibration;
+  diagnosis.between_sessions =
+      session_changes({by.model, by.parameters, by.covariance, by.sessions, placed.changes, placed.as_given});
+  if (auto order = note_on_order(by.sessions, placed.as_given)) diagnosis.limits.push_back(std::move(*order));
 }
 
-/// What changed on the arm between two sessions and is no finding: what the search has no cause for, or did not name.
-std::string told_of_sessions(const Placed& placed, const Diagnosis& diagnosis) {
+/// What changed and is no finding: what the search has no cause for, or did not name.
+std::string told_of_sessions(const Diagnosis& diagnosis) {
   std::string text;
-  for (const Change& change : placed.changes) {
-    const std::string& since = placed.sessions[change.session].id;
-    const bool is_found = !is_beside_the_search(change) &&
-                          std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
-                                      [&](const Finding& finding) { return finding.since_session == since; });
-    if (!is_found) text += "; " + in_words(change, placed);
+  for (const SessionChange& change : diagnosis.between_sessions) {
+    const bool is_found =
+        change.course == SessionChange::Course::kSince &&
+        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(),
+                    [&](const Finding& finding) { return finding.since_session == change.session_id; });
+    if (!is_found) text += "; " + sentence(change);
   }
   return text;
 }
@@ -192,7 +182,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                             const DiagnoseOptions& options) {
   const Result<Placed> together = placed(cell, batch, options);
   if (!together) return tl::make_unexpected(together.error());
-  const Result<PreparedBatch> prepared = prepare(*cell, batch, together->sessions);
+  const Result<PreparedBatch> prepared = prepare(*cell, batch, together->sessions());
   if (!prepared) return tl::make_unexpected(prepared.error());
   Result<SearchResult> result = searched(cell, *prepared, *together, options);
   if (!result) return tl::make_unexpected(result.error());
@@ -227,7 +217,8 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                      tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
                    }});
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
-  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(*together, diagnosis);
+  tell_sessions(*together, diagnosis);
+  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis);
   return diagnosis;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/compensate/session_changes.h"
 #include "server/error_sources/catalogue.h"
 
 /// What a batch says of the simulation: which physical causes it lacks, how sure that is, and what cannot be told.
@@ -167,6 +168,7 @@ struct Diagnosis {
   std::optional<ErrorFigures> held_out_before_without, held_out_after_without;
   std::string held_out_how;  ///< `validation rows` or `8 blocks, each predicted from the others`
   std::vector<Finding> findings;
+  std::vector<SessionChange> between_sessions;  ///< what changed on the arm from one set-up to another; findings, too
   Unexplained unexplained;
   std::vector<Inseparable> not_separable;
   std::vector<Unseen> could_not_have_seen;

@@ -215,11 +215,12 @@ CheckedBatch joined(std::vector<CheckedBatch> batches) {
   TRAMMEL_CHECK(!batches.empty());
   if (batches.size() == 1) return batches.front();
   const auto clock = [](const CheckedBatch& batch) { return batch.rows().clock; };
+  MeasurementBatch all;
   if (std::all_of(batches.begin(), batches.end(), [&](const CheckedBatch& one) { return clock(one).has_value(); })) {
     std::stable_sort(batches.begin(), batches.end(),
                      [&](const CheckedBatch& a, const CheckedBatch& b) { return *clock(a) < *clock(b); });
+    all.clock = clock(batches.back());
   }
-  MeasurementBatch all;
   std::vector<bool> is_held_out;
   std::set<Fingerprint> met;
   std::size_t taken = 0;

@@ -39,6 +39,8 @@ void divide_into_sessions(MeasurementBatch& batch) {
   if (found.size() < 2) return;
   if (std::all_of(found.begin(), found.end(), [](const Found& one) { return one.began.has_value(); })) {
     std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return *a.began < *b.began; });
+  } else {
+    batch.clock.reset();
   }
   std::map<std::string, int> place;
   batch.sessions.clear();

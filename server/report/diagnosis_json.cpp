@@ -4,6 +4,7 @@
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/figures_json.h"
+#include "server/report/session_changes_json.h"
 
 namespace trammel {
 
@@ -182,6 +183,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
             {"after_without_suspects", figures_or_null(diagnosis.held_out_after_without)},
             {"how", diagnosis.held_out_how}}},
           {"findings", findings_json(diagnosis)},
+          {"between_sessions", session_changes_json(diagnosis.between_sessions)},
           {"unexplained", unexplained_json(diagnosis.unexplained)},
           {"not_separable", not_separable_json(diagnosis.not_separable)},
           {"could_not_have_seen", unseen_json(diagnosis)},

@@ -5,6 +5,7 @@
 #include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
+#include "server/compensate/session_changes.h"
 
 namespace trammel {
 

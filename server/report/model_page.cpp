@@ -14,6 +14,7 @@
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
+#include "server/report/session_changes_json.h"
 #include "server/report/shown_value.h"
 
 namespace trammel {
@@ -339,6 +340,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
                   {"provenance", provenance_rows(model, compared.evaluation)},
+                  {"sessions", session_changes_html(session_changes(model))},
                   {"parameters", parameter_table(model)},
                   {"unidentifiable", unidentifiable_text(model.parts())},
                   {"suspects", suspects_text(model.parts())},

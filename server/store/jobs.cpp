@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <string_view>
 #include <utility>
@@ -296,6 +297,26 @@ Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
       return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
     return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
                            row.getColumn(3).getString()};
+  });
+}
+
+Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, std::int64_t since,
+                                                      std::size_t most) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredCheck>> {
+    auto rows = prepare(database,
+                        "SELECT jobs.id, finished_at, findings FROM health_checks "
+                        "JOIN jobs ON jobs.id = health_checks.job JOIN diagnoses ON diagnoses.job = jobs.id "
+                        "JOIN job_times ON job_times.job = jobs.id "
+                        "WHERE cell = ? AND state = 'done' AND findings <> '' AND finished_at >= ? "
+                        "ORDER BY jobs.id DESC LIMIT ?",
+                        cell, since, most == 0 ? std::int64_t{-1} : static_cast<std::int64_t>(most));
+    std::vector<StoredCheck> checks;
+    while (rows.executeStep()) {
+      const std::int64_t job = rows.getColumn(0).getInt64();
+      checks.push_back({job, rows.getColumn(1).getInt64(), batches_of(database, job), rows.getColumn(2).getString()});
+    }
+    std::reverse(checks.begin(), checks.end());
+    return checks;
   });
 }
 

@@ -91,6 +91,46 @@ std::string spoken(const std::optional<Activation>& activation) {
   return activation ? fmt::format("version {}", activation->version) : "none";
 }
 
+template <typename Value>
+void bind_if(SQLite::Statement& row, int column, const std::optional<Value>& value) {
+  if (value) row.bind(column, *value);  // unbound is NULL
+}
+
+void record_figures(SQLite::Database& database, std::int64_t activation, const JobOutcome& judged) {
+  SQLite::Statement row(
+      database, "INSERT INTO activation_figures (number, before_m, after_m, limit_m, why) VALUES (?, ?, ?, ?, ?)");
+  row.bind(1, activation);
+  bind_if(row, 2, judged.before);
+  bind_if(row, 3, judged.after);
+  bind_if(row, 4, judged.limit);
+  row.bind(5, judged.why);
+  row.exec();
+}
+
+/// How the version that this activation put in force was judged: then, or when a job made it.
+void add_judgement(SQLite::Database& database, const std::string& cell, const Activation& activation,
+                   InForceRecord& record) {
+  constexpr const char* kFigures =
+      "SELECT before_m, after_m, limit_m, why, 0 FROM activation_figures WHERE number = ?1 "
+      "UNION ALL SELECT before_m, after_m, limit_m, why, 1 FROM job_outcomes JOIN jobs ON jobs.id = job_outcomes.job "
+      "WHERE cell = ?2 AND model_version = ?3 LIMIT 1";
+  auto row = prepare(database, kFigures, activation.number, cell, activation.version);
+  if (!row.executeStep()) return;
+  JobOutcome& judged = record.judged.emplace();
+  judged.verdict = JobVerdict::kInForce;
+  judged.before = optional_number(row, 0);
+  judged.after = optional_number(row, 1);
+  judged.limit = optional_number(row, 2);
+  judged.why = row.getColumn(3).getString();
+  record.judged_when_made = row.getColumn(4).getInt() != 0;
+}
+
+/// What the audit trail says of why it was done.
+std::string reason_of(const ChangeId& by, const std::optional<JobOutcome>& judged) {
+  if (!judged || judged->why.empty()) return by.reason;
+  return by.reason.empty() ? judged->why : by.reason + "; " + judged->why;
+}
+
 /// Puts `version` in force. The new activation remembers the present one. `what`: as the audit trail calls it.
 void activate_on_top(SQLite::Database& database, const std::string& cell, int version, const char* what,
                      const std::string& why, const ChangeId& by) {
@@ -167,7 +207,8 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
   return version_of(stored);
 }
 
-Status Store::activate(const std::string& cell, int version, const ChangeId& change_id) {
+Status Store::activate(const std::string& cell, int version, const ChangeId& change_id,
+                       const std::optional<JobOutcome>& judged) {
   const auto activate_in = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
     if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
@@ -177,7 +218,10 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
     if (is_pruned(database, "version", cell, std::to_string(version)))
       return pruned_failure(fmt::format("version {} of cell {}", version, cell)).of("version").with_value(version);
     release_batches_of(database, cell, version, change_id);
-    activate_on_top(database, cell, version, "activate", "", change_id);
+    const auto before = present_activation(database, cell);
+    activate_on_top(database, cell, version, "activate", reason_of(change_id, judged), change_id);
+    const auto now = present_activation(database, cell);
+    if (judged && now && (!before || now->number != before->number)) record_figures(database, now->number, *judged);
     return ChangeOutcome{version};
   };
   const auto activated = connection_->in_transaction([&](SQLite::Database& database) {
@@ -185,6 +229,25 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
   });
   if (activated) copy_after_change(cell);
   return activated.map([](const ChangeOutcome&) {});
+}
+
+Result<std::optional<InForceRecord>> Store::in_force_record(const std::string& cell) const {
+  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<InForceRecord>> {
+    const auto present = present_activation(database, cell);
+    if (!present) return std::optional<InForceRecord>();
+    auto since = prepare(database, "SELECT activated_at FROM activations WHERE number = ?", present->number);
+    since.executeStep();
+    InForceRecord record;
+    record.version = present->version;
+    record.since = since.getColumn(0).getInt64();
+    if (present->back) {
+      record.before = activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?",
+                                            *present->back))
+                          ->version;
+    }
+    add_judgement(database, cell, *present, record);
+    return std::optional(std::move(record));
+  });
 }
 
 Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const {

@@ -90,8 +90,9 @@ CREATE TABLE diagnoses (
 /// began, ended and with what outcome, when models were trained, and when their newest measurement was taken (Unix
 /// time, s; NULL = not recorded). They also hold the batches in quarantine that a job may train from; these are
 /// released if its model is put in force. Also which jobs are checks of a robot's health, which look like diagnoses to
-/// programs that know none. And the changes that clients asked for under an id, with what came of them;
-/// what of the rest has lost its text; which batches nothing takes any more; and the store's identity.
+/// programs that know none. How a version was judged when a person put it in force. And the changes that clients asked
+/// for under an id, with what came of them; what of the rest has lost its text; which batches nothing takes any more;
+/// and the store's identity.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -118,6 +119,13 @@ CREATE TABLE IF NOT EXISTS job_releases (
   FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS health_checks (job INTEGER PRIMARY KEY REFERENCES jobs (id));
+CREATE TABLE IF NOT EXISTS activation_figures (
+  number   INTEGER PRIMARY KEY REFERENCES activations (number),
+  before_m REAL,
+  after_m  REAL,
+  limit_m  REAL,
+  why      TEXT NOT NULL
+);
 CREATE TABLE IF NOT EXISTS model_times (
   cell        TEXT    NOT NULL,
   version     INTEGER NOT NULL,

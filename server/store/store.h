@@ -77,6 +77,23 @@ struct StoredModel {
   std::optional<std::int64_t> measured_at = {};  ///< see ModelProvenance
 };
 
+/// A check of a robot's health that is over.
+struct StoredCheck {
+  std::int64_t job = 0;
+  std::int64_t at = 0;                 ///< Unix time, s, of its end
+  std::vector<std::string> batch_ids;  ///< none: the batch came with it
+  std::string findings;                ///< JSON
+};
+
+/// What a cell is served with, and how that was judged beside what was before.
+struct InForceRecord {
+  int version = 0;
+  std::int64_t since = 0;                 ///< Unix time, s
+  std::optional<int> before = {};         ///< where a rollback leads; empty: nowhere
+  std::optional<JobOutcome> judged = {};  ///< when it was put in force, else when it was made; empty: never
+  bool judged_when_made = false;
+};
+
 /// How much of each cell is kept; 0: everything. What goes is the oldest of what nothing needs: never the version in
 /// force, one that a rollback returns to, what these were trained on, or what a job takes that is not over.
 struct KeepRule {
@@ -137,6 +154,9 @@ class Store {
                                                 const ChangeId& change_id = {});
   /// kNotFound: there is no such job, it is no diagnosis, or its findings were pruned.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
+  /// Of the cell, oldest first: those that ended since then (Unix time, s), the newest `most` (0: all).
+  [[nodiscard]] Result<std::vector<StoredCheck>> health_checks(const std::string& cell, std::int64_t since,
+                                                               std::size_t most) const;
   /// Stores the findings of an unfinished diagnosis. The job goes on.
   [[nodiscard]] Status store_findings(std::int64_t job, const std::string& findings, const std::string& page);
   /// kNotFound also where its text was pruned.
@@ -180,11 +200,15 @@ class Store {
                                       bool put_in_force, const std::string& message, bool release = false,
                                       const ChangeId& change_id = {}, const JobOutcome& outcome = {});
   /// Puts a stored version in force. Changes nothing if it is in force already. Refuses (kNotFound) an unknown one.
+  /// `judged`: how it did beside the one in force until now, for in_force_record() and the audit trail.
   ///
   /// How rollback works: an activation remembers the one that it replaced. A rollback restores that one with its own
   /// memory, so the next rollback goes further back: after 1, 2, 3 it gives 2, then 1, then kNotFound. A new activation
   /// remembers the version that is in force at that moment, even if a rollback put it there.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {});
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {},
+                                const std::optional<JobOutcome>& judged = {});
+  /// Empty: nothing is in force.
+  [[nodiscard]] Result<std::optional<InForceRecord>> in_force_record(const std::string& cell) const;
   /// The versions that repeated rollbacks restore, the next one first. kNotFound: there is none.
   [[nodiscard]] Result<std::vector<int>> previous_in_force(const std::string& cell) const;
   /// Puts one of previous_in_force() in force, as `steps` rollbacks do; returns it.

@@ -12,6 +12,7 @@
 #include "server/base/check.h"
 #include "server/base/hash.h"
 #include "server/base/name_check.h"
+#include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
@@ -406,47 +407,60 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
 }
 
 Status Trainer::activate(const std::string& cell, int version, const ChangeRequest& request, bool force) {
-  const bool as_expected = !request.expected || *request.expected == registry_.version_in_force(cell);
-  if (!force && as_expected) {
+  std::optional<GateVerdict> judged;
+  if (!request.expected || *request.expected == registry_.version_in_force(cell)) {
     const auto made = store_.outcome_of(request.id);
     if (!made) return tl::make_unexpected(made.error());
-    const Status wanted = *made ? Status() : check_not_worse(cell, version);
+    if (!*made) {
+      auto verdict = judged_import(cell, version);
+      if (!verdict && !force) return tl::make_unexpected(verdict.error());
+      if (verdict) judged = std::move(*verdict);
+    }
+    const Status wanted = judged && !force ? check_not_worse(cell, version, *judged) : Status();
     if (!wanted) return wanted;
   }
-  return history_.activate(cell, version, request);
+  return history_.activate(cell, version, request, judged);
 }
 
-Status Trainer::check_not_worse(const std::string& cell_name, int version) const {
+Result<std::optional<GateVerdict>> Trainer::judged_import(const std::string& cell_name, int version) const {
+  const std::optional<GateVerdict> nothing_to_judge;
   const auto cell = find_cell(cells_, cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto present = registry_.in_force(cell_name);
   const auto judged_here = store_.was_made_by_job(cell_name, version);
   if (!judged_here) return tl::make_unexpected(judged_here.error());
-  if (*judged_here || !present || present->version == version) return {};
+  if (*judged_here || !present || present->version == version) return nothing_to_judge;
   const auto imported = registry_.version(cell_name, version);
   if (!imported) return tl::make_unexpected(imported.error());
   StoredJob nothing;
   nothing.cell = cell_name;
   const auto sources = batch_sources(store_, nothing, true);
   if (!sources) return tl::make_unexpected(sources.error());
-  if (sources->empty()) return {};  // nothing to judge by: a person decides, and has
+  if (sources->empty()) return nothing_to_judge;  // a person decides, and has
   JobBatches batches(**cell, held_out_by_service(options_.validation_share, options_.seed), {});
   for (const BatchSource& source : *sources) {
     const auto stored = store_.batch(cell_name, source.id);
     if (!stored) return tl::make_unexpected(stored.error());
     batches.add({source.id, stored->csv, stored->accepted_at}, true);
   }
-  const GateVerdict verdict = verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
-                                         {Bar::kBetter, options_.accept_ratio});
+  return std::optional(verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
+                                  {Bar::kBetter, options_.accept_ratio}));
+}
+
+Status Trainer::check_not_worse(const std::string& cell, int version, const GateVerdict& verdict) const {
   const GateFigures& figures = verdict.figures;
   const bool has_figures = figures.before && figures.after;
-  const bool as_good = has_figures && *figures.after <= options_.accept_ratio * *figures.before;
-  if (verdict.put_in_force || as_good) return {};
-  return refused("cell {}: version {} was imported and is {} version {}: {}", cell_name, version,
-                 has_figures ? "worse than" : "not known to be as good as", present->version, verdict.why)
-      .of("version")
-      .with_value(version)
-      .next("activate --force where it is wanted all the same");
+  if (verdict.put_in_force || (has_figures && *figures.after <= options_.accept_ratio * *figures.before)) return {};
+  const int present = registry_.version_in_force(cell);
+  const char* how = has_figures ? "worse than" : "not known to be as good as";
+  Failure worse =
+      refused("cell {}: version {} was imported and is {} version {}: {}", cell, version, how, present, verdict.why)
+          .of(has_figures ? "after_mm" : "version")
+          .next(fmt::format("trammel activate --service --model {}@{} --force puts it in force all the same", cell,
+                            version));
+  if (!has_figures) return std::move(worse).with_value(version);
+  const double limit = options_.accept_ratio * *figures.before;
+  return std::move(worse).beyond(to_mm(*figures.after), to_mm(limit));
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {

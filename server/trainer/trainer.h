@@ -156,9 +156,11 @@ class Trainer {
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
-  /// Refuses an imported version that is worse than the one in force on what the cell measured, or was never held
-  /// against it where the cell has measurements.
-  [[nodiscard]] Status check_not_worse(const std::string& cell, int version) const;
+  /// An imported version held against the one in force on what the cell measured; empty: a job made it here, or there
+  /// is nothing to hold it against.
+  [[nodiscard]] Result<std::optional<GateVerdict>> judged_import(const std::string& cell, int version) const;
+  /// Refuses what the verdict finds worse, or not to be told.
+  [[nodiscard]] Status check_not_worse(const std::string& cell, int version, const GateVerdict& verdict) const;
   /// Whether the stored batches may be trained from together.
   [[nodiscard]] Status check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
                                       bool release) const;

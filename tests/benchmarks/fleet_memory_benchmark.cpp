@@ -3,7 +3,8 @@
 // mrad in twists, 10 % in compliances; joint zeros, as somebody set them, 0.5 mrad. True error over the joint ranges,
 // base refitted, of the thirteenth: 15 poses with the prior beside 40 without; an odd one (a joint twice as soft, a
 // link 3 mm off) with the prior beside without. An oracle that knows from what the robots are drawn says what any prior
-// could reach with these poses: for an odd robot it also knows in what it is odd. --seeds N.
+// could reach with these poses: for an odd robot it also knows in what it is odd. A bound by the second simulation's
+// own derivatives says what no calibration can pass: the expected error under that knowledge, noise alone. --seeds N.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -110,6 +111,37 @@ FleetPrior oracle_prior(const FleetPrior& learned, const Eigen::VectorXd& type, 
   return oracle;
 }
 
+/// Standard deviations of the arm's numbers about what the type has in common, in their units; of the base: as usual.
+Eigen::VectorXd known_spread(const Eigen::VectorXd& type, double spread) {
+  Eigen::VectorXd stddev = Eigen::VectorXd::Ones(type.size());
+  for (Index k = 0; k < type.size(); ++k) {
+    const auto& one = arm_parameters()[static_cast<std::size_t>(k)];
+    if (one.group == "compliance") stddev(k) = 0.1 * spread * type(k) / one.unit;
+    if (one.group != "geometry") continue;
+    const bool zero = one.name.front() == 'q', length = one.unit == 2;
+    stddev(k) = (zero ? 0.5e-3 : spread * (length ? 0.05 : 0.05e-3)) / one.unit;
+  }
+  return stddev;
+}
+
+/// mm: the error that noise alone leaves on average to whoever knows the spread, base refitted.
+double expected_error(const hidden::TrainedRobot& robot, const Eigen::VectorXd& stddev) {
+  const Eigen::MatrixXd J = arm_columns(robot.world, robot.world.poses);
+  Eigen::MatrixXd information = J.transpose() * J;
+  information.diagonal() += stddev.cwiseAbs2().cwiseInverse();
+  Random random(987);
+  hidden::PosePlan plan;
+  plan.count = 400;
+  plan.constant_temperature = true;
+  hidden::World asked = robot.world;
+  asked.orientation = false;
+  const Eigen::MatrixXd moved = asked.sigma_mm * arm_columns(asked, draw_poses(plan, random));
+  const Eigen::HouseholderQR<Eigen::MatrixXd> by_base(moved.leftCols(6));
+  const Eigen::MatrixXd base = by_base.householderQ() * Eigen::MatrixXd::Identity(moved.rows(), 6);
+  const Eigen::MatrixXd left = moved - base * (base.transpose() * moved);
+  return std::sqrt((left * information.llt().solve(left.transpose())).trace() / plan.count);
+}
+
 FleetPrior without(FleetPrior prior, const std::string& parameter) {
   std::erase_if(prior.parameters, [&](const FleetParameter& one) { return one.name == parameter; });
   return prior;
@@ -127,7 +159,8 @@ struct Odd {
 };
 
 void run(const FleetOptions& options) {
-  std::vector<double> with_15, oracle_15, without_15, without_40, odd_ratio, oracle_odd_ratio, usual_unlike;
+  std::vector<double> bound_15, bound_40, with_15, oracle_15, without_15, without_40, odd_ratio, oracle_odd_ratio,
+      usual_unlike;
   int named = 0, asked = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
     Random random(static_cast<std::uint64_t>(seed) * 7919);
@@ -144,6 +177,8 @@ void run(const FleetOptions& options) {
     const hidden::TrainedRobot many = measured(next, 40, number(51), !options.positions);
     const CompensatedModel drawn_to = model_of(few, fleet);
     with_15.push_back(true_error(few, drawn_to));
+    bound_15.push_back(expected_error(few, known_spread(type, options.spread)));
+    bound_40.push_back(expected_error(many, Eigen::VectorXd::Ones(type.size())));
     const FleetPrior oracle = oracle_prior(fleet, type, options.spread);
     oracle_15.push_back(true_error(few, model_of(few, oracle)));
     without_15.push_back(true_error(few, model_of(few, {})));
@@ -178,12 +213,14 @@ void run(const FleetOptions& options) {
   }
   test::tell_figure("fleet: 15 poses with the prior over 40 without", mean(with_15) / mean(without_40));
   test::tell_figure("fleet: 15 poses of an oracle over 40 without", mean(oracle_15) / mean(without_40));
+  test::tell_figure("fleet: bound of 15 poses with the spread known over 40 without", mean(bound_15) / mean(bound_40));
   test::tell_figure("fleet: 15 poses with the prior over those of an oracle", mean(with_15) / mean(oracle_15));
   test::tell_figure("fleet: 15 poses with the prior over 15 without", mean(with_15) / mean(without_15));
   test::tell_figure("fleet: odd ones named, %", 100.0 * named / asked);
   test::tell_figure("fleet: error of odd ones over that without, worst",
                     *std::max_element(odd_ratio.begin(), odd_ratio.end()));
   test::tell_figure("fleet: error of odd ones over that without, mean", mean(odd_ratio));
+  test::tell_figure("fleet: error of odd ones over that without, the oracle's mean", mean(oracle_odd_ratio));
   test::tell_figure("fleet: error of odd ones over that without, the oracle's worst",
                     *std::max_element(oracle_odd_ratio.begin(), oracle_odd_ratio.end()));
   test::tell_figure("fleet: usual ones said to be odd, %", 100 * mean(usual_unlike));

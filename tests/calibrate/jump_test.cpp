@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/learning_cell.h"
 #include "tests/support/virtual_robot.h"
 
@@ -58,6 +60,50 @@ TEST(Jump, ATrackerThatWasBumpedAndAToolThatWasKnockedAreFound) {
   const auto tool = jump_within(cell, batch);
   ASSERT_TRUE(tool);
   EXPECT_EQ(tool->source, "tool_changed@101");
+}
+
+/// `batch` with the share `course` (0 to 1) of the way to what was measured of another robot at the same poses.
+template <typename Course>
+MeasurementBatch on_the_way(MeasurementBatch batch, const MeasurementBatch& other, const Course& course) {
+  const auto n = static_cast<double>(batch.measurements.size());
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    Measurement& m = batch.measurements[i];
+    m.p_W += course(static_cast<double>(i) / n) * (other.measurements[i].p_W - m.p_W);
+  }
+  return batch;
+}
+
+TEST(Jump, AReflectorThatWasPutOnAnewIsFoundHoweverFarOffItSits) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const double mm : {0.1, 0.5, 1.0}) {
+    for (const Vector3& way : {Vector3(0.48, -0.6, 0.64), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, 1)}) {
+      VirtualRobot other = robot;
+      other.truth.tools.at("spindle").translation() += mm * 1e-3 * way;
+      const auto jump = jump_within(cell, changed_halfway(robot, other, 71));
+      ASSERT_TRUE(jump) << mm << " mm along " << way.transpose();
+      EXPECT_EQ(jump->source, "tool_changed@101") << mm << " mm along " << way.transpose();
+    }
+  }
+}
+
+TEST(Jump, WhatComesAndGoesOrSwaysIsNone) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const VirtualRobot hot = test::with_zero_off(test::with_zero_off(robot, 2, 3e-4), 3, -2e-4);
+  const auto heated_and_cooled = [](double x) { return x < 0.5 ? 1 - std::exp(-x / 0.1) : std::exp((0.5 - x) / 0.1); };
+  for (std::uint64_t seed = 21; seed <= 25; ++seed) {
+    const test::Day day{.poses = 2 * kHalf, .seed = seed};
+    const auto heat = jump_within(cell, on_the_way(measured_on(robot, day), measured_on(hot, day), heated_and_cooled));
+    EXPECT_FALSE(heat) << in_words(*heat);
+    MeasurementBatch swayed = measured_on(robot, day);
+    for (std::size_t i = 0; i < 2 * kHalf; ++i) {
+      const double phase = static_cast<double>(seed) + 0.05 * static_cast<double>(i);
+      swayed.measurements[i].p_W += Vector3(6e-5, -3e-5, 7e-5) * std::sin(phase);
+    }
+    const auto sway = jump_within(cell, swayed);
+    EXPECT_FALSE(sway) << in_words(*sway);
+  }
 }
 
 TEST(Jump, ThereIsNoneInAGoodBatch) {

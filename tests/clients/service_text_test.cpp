@@ -48,21 +48,24 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
 }
 
 TEST(ServiceText, AnActivationSaysBeforeAfterLimitWhyAndTheNextCommand) {
-  client::JobStatus made{3, "cell-7", "done", "not in force: worse", 1, 2, false};
-  made.before_mm = 0.0112;
-  made.after_mm = 0.0251;
-  made.limit_mm = 0.0114;
-  made.why = "worse";
-  EXPECT_EQ(in_force_text({"cell-7", 2, 1, made}),
+  const nlohmann::ordered_json said = {
+      {"version", 2},
+      {"before_mm", 0.0112},
+      {"after_mm", 0.0251},
+      {"limit_mm", 0.0114},
+      {"why", "when it was made: worse"},
+      {"next", "trammel rollback --service --cell cell-7 puts version 1 back in force"}};
+  EXPECT_EQ(in_force_text(in_force_json("cell-7", 2, said)),
             "cell cell-7: version 2 in force\n"
             "held-out rms: before 0.0112 mm, after 0.0251 mm, limit 0.0114 mm\n"
             "why: when it was made: worse\n"
             "next: trammel rollback --service --cell cell-7 puts version 1 back in force, if it is not wanted\n");
-  EXPECT_EQ(in_force_json({"cell-7", 2, 1, made})["after_mm"], 0.0251);
-  const InForce imported{"cell-7", 4, 0, {}};
-  EXPECT_NE(in_force_text(imported).find("it was imported"), std::string::npos) << in_force_text(imported);
-  EXPECT_TRUE(in_force_json(imported)["after_mm"].is_null());
-  EXPECT_EQ(in_force_json({"cell-7", 2, 2, made})["next"], "");
+  EXPECT_EQ(in_force_json("cell-7", 2, said)["after_mm"], 0.0251);
+  const auto another = in_force_json("cell-7", 4, said);
+  EXPECT_TRUE(another["after_mm"].is_null()) << "the figures are of another version";
+  EXPECT_NE(in_force_text(another).find("never held against"), std::string::npos) << in_force_text(another);
+  EXPECT_EQ(in_force_json("cell-7", 4, nullptr)["next"], "");
+  EXPECT_EQ(in_force_json("cell-7", 4, {{"version", 4}, {"why", 7}, {"after_mm", "x"}})["after_mm"], nullptr);
 }
 
 TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "server/dds/codec.h"
 #include "server/dds/reply_memory.h"
@@ -535,6 +536,53 @@ TEST_F(HandlersTest, ACheckIsQueuedAgainstTheModelInForceAndRefusedWithoutOne) {
   EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kUsage);
 }
 
+TEST_F(HandlersTest, TheHealthOfACellIsItsChecksTheNextOneAndHowWhatIsInForceWasJudged) {
+  const auto read = [this](const std::string& cell, std::uint32_t most) {
+    auto request = read_request(wire::READ_HEALTH);
+    request.about().cell(cell);
+    request.most(most);
+    request.since_unix_s(-1);
+    const auto reply = handlers_.answer(request);
+    EXPECT_TRUE(reply) << reply.error().message;
+    return nlohmann::json::parse(reply ? reply->text() : "{}").at("cells");
+  };
+  EXPECT_EQ(read("", 0).size(), 2u) << "every cell";
+  EXPECT_TRUE(read("cell-7", 0).at(0).at("in_force").is_null());
+  for (const double shift : {1e-4, 2e-4})
+    ASSERT_TRUE(backend_.store->add_model("cell-7", test::shifted_model(backend_.cell, shift), 0, false, ""));
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 1)));
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ACTIVATE, 2)));
+  const std::string model = backend_.registry.in_force("cell-7")->model.provenance().id;
+  const auto checked = [this](const std::string& findings) {
+    wire::CheckHealthRequest request;
+    request.about().cell("cell-7");
+    request.csv(test::small_batch_csv(*backend_.cell, {}));
+    request.tolerance_mm(0.05);
+    const auto queued = handlers_.answer(request);
+    ASSERT_TRUE(queued) << queued.error().message;
+    ASSERT_TRUE(backend_.store->store_findings(queued->job(), findings, ""));
+    ASSERT_TRUE(backend_.store->set_job_done(queued->job(), "checked"));
+  };
+  checked(fmt::format(R"({{"verdict": "healthy", "model": "{}", "due": "2026-12-01", "rms_mm": 0.02}})", model));
+  checked(fmt::format(R"({{"verdict": "changed", "model": "{}", "due": "", "due_because": "it changed"}})", model));
+  auto health = read("cell-7", 0).at(0);
+  ASSERT_EQ(health.at("checks").size(), 2u);
+  EXPECT_EQ(health["checks"][0]["verdict"], "healthy");
+  EXPECT_EQ(health["checks"][0]["due"], "2026-12-01");
+  EXPECT_EQ(health["checks"][0]["rms_mm"], 0.02);
+  EXPECT_TRUE(health["checks"][0]["tolerance_mm"].is_null());
+  EXPECT_EQ(health.at("verdict"), "changed");
+  EXPECT_EQ(health.at("due_because"), "it changed");
+  EXPECT_EQ(health.at("in_force").at("version"), 2);
+  EXPECT_EQ(health["in_force"]["version_before"], 1);
+  EXPECT_NE(health["in_force"]["next"].get<std::string>().find("trammel rollback"), std::string::npos);
+  EXPECT_EQ(read("cell-7", 1).at(0).at("checks").size(), 1u) << "the newest";
+  ASSERT_TRUE(handlers_.answer(manage_request(wire::MANAGE_ROLLBACK)));
+  health = read("cell-7", 0).at(0);
+  EXPECT_EQ(health.at("in_force").at("version"), 1);
+  EXPECT_TRUE(health.at("verdict").is_null()) << "the checks were of another model";
+}
+
 TEST_F(HandlersTest, TheFleetListsEveryCell) {
   const auto fleet = handlers_.answer(read_request(wire::READ_FLEET));
   ASSERT_TRUE(fleet) << fleet.error().message;
@@ -581,9 +629,7 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
   const auto is_unsupported = [](const auto& reply) {
     return reply && reply->header().result() == wire::RESULT_UNSUPPORTED && reply->header().problems().size() == 1;
   };
-  for (const auto what : {wire::READ_HEALTH, wire::READ_REPLAY}) {
-    EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(what)))) << what;
-  }
+  EXPECT_TRUE(is_unsupported(handlers_.answer(read_request(wire::READ_REPLAY))));
   EXPECT_TRUE(is_unsupported(handlers_.answer(manage_request(wire::MANAGE_BACKUP))));
   auto forced = manage_request(wire::MANAGE_ROLLBACK);
   forced.force(true);
@@ -739,6 +785,50 @@ TEST_F(HandlersTest, ARepeatedTrainingRequestIsCarriedOutOnce) {
 }
 
 constexpr wire::ContentId kThis{1, 4}, kThat{2, 4}, kThatElsewhere{2, 0};
+
+/// Keeps what was answered.
+class Kept final : public ReplySink {
+ public:
+  std::vector<wire::TrainReply> replies;
+  void send(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
+    replies.push_back(*static_cast<wire::TrainReply*>(reply.get()));
+  }
+  void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
+    send(to, std::move(reply), bytes);
+  }
+};
+
+TEST_F(HandlersTest, ARepeatIsNoConflictWhileSomethingElseUnderItsIdIsStillBeingRefused) {
+  ASSERT_TRUE(handlers_.answer(submit_request("lt-07")));
+  Kept kept;
+  CallCounts counts;
+  CallContext<wire::Train> context{"server-a", "replies", handlers_, kept, counts};
+  const auto call_for = [&](const wire::ContentId& content) {
+    auto request = std::make_unique<wire::Received<wire::TrainRequest>>();
+    request->change().expected_version(-1);
+    request->header().request_id().sequence_number(8);
+    request->about().cell("cell-7");
+    request->content = content;
+    return std::make_unique<Call<wire::Train>>(context, std::move(request), ReplyAddress{}, "8", nullptr);
+  };
+  {
+    const auto first = call_for(kThis);
+    first->compute(0, first->begin());
+    first->finish();
+  }
+  const auto other = call_for(kThat);
+  EXPECT_EQ(other->begin(), 0u) << "refused, and not answered yet";
+  EXPECT_TRUE(call_for(kThis)->is_answered_for_its_id());
+  EXPECT_TRUE(call_for({3, 4})->is_answered_for_its_id());
+  other->finish();
+  ASSERT_EQ(kept.replies.size(), 4u);
+  EXPECT_EQ(kept.replies[0].header().result(), wire::RESULT_OK) << kept.replies[0].header().message();
+  EXPECT_EQ(kept.replies[1].header().result(), wire::RESULT_OK) << "the repeat of the first";
+  EXPECT_EQ(kept.replies[1].job(), kept.replies[0].job());
+  for (std::size_t i = 2; i < kept.replies.size(); ++i)
+    EXPECT_EQ(kept.replies[i].header().result(), wire::RESULT_CONFLICT) << i;
+  EXPECT_EQ(counts.refused, kept.replies.size() - 2);
+}
 
 TEST(UnderWay, ARepeatIsNotCarriedOutBesideTheFirstAndHasItsAnswerAfterIt) {
   UnderWay under_way;

@@ -4,6 +4,7 @@
 
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/sessions.h"
+#include "server/report/diagnosis_json.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 #include "tests/support/virtual_robot.h"
@@ -36,6 +37,19 @@ TEST(BetweenSessions, AZeroThatWasLostIsToldWithItsSessionAndIsNoNoise) {
                                   [](const Finding& one) { return one.since_session == "day-2"; });
   ASSERT_NE(found, diagnosis.findings.end()) << diagnosis.sentence;
   EXPECT_EQ(found->cause.joint, 2);
+  ASSERT_EQ(diagnosis.between_sessions.size(), 1u);
+  const auto json = diagnosis_json(diagnosis).at("between_sessions").at(0);
+  EXPECT_EQ(json.at("cause"), "joint_slip");
+  EXPECT_EQ(json.at("joint"), 3);
+  EXPECT_EQ(json.at("since").at("session_id"), "day-2");
+  const auto& zero = json.at("parameters").begin().value();
+  EXPECT_NEAR(zero.at("value").get<double>(), 0.5, 2 * zero.at("u95").get<double>());
+  EXPECT_EQ(zero.at("unit"), "mrad");
+  EXPECT_TRUE(json.at("rests_on_order").get<bool>()) << "no row has a time";
+  EXPECT_TRUE(std::any_of(diagnosis.limits.begin(), diagnosis.limits.end(), [](const std::string& limit) {
+    return limit.find("in which they were given") != std::string::npos;
+  }));
+  EXPECT_TRUE(good.between_sessions.empty());
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
 }
 
@@ -46,6 +60,9 @@ TEST(BetweenSessions, AReflectorThatSatElsewhereForADayIsToldAndIsNoNoise) {
   const Diagnosis good = diagnosis_of({robot, robot, robot, robot}, 60);
   const Diagnosis diagnosis = diagnosis_of({robot, other, robot, robot}, 60);
   EXPECT_NE(diagnosis.sentence.find("in session day-2 alone"), std::string::npos) << diagnosis.sentence;
+  ASSERT_EQ(diagnosis.between_sessions.size(), 1u);
+  EXPECT_EQ(diagnosis.between_sessions.front().course, SessionChange::Course::kThatAlone);
+  EXPECT_EQ(diagnosis.between_sessions.front().sizes.size(), 6u) << "where it sits, and how it is turned";
   EXPECT_TRUE(diagnosis.findings.empty()) << diagnosis.sentence;
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
 }

@@ -730,6 +730,53 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
   EXPECT_EQ(imported(train(measure("other", 30, 3), "M1")), 3);
 }
 
+TEST_F(CommandLineWithService, ACheckIsAnsweredThereAsOnFilesAndTheServiceKeepsWhatItSaid) {
+  must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 120, 1), "--watch"});
+  EXPECT_NE(must_answer({"check", "--model", "cell-7"}).out.find("was not checked yet"), std::string::npos);
+  must({"plan", "--cell", cell_, "--check", "12", "-o", file("check-plan.csv")});
+  must({"simulate", "--cell", cell_, "--truth", kTruth, "--plan", file("check-plan.csv"), "--seed", "5", "-o",
+        file("few.csv")});
+  must_answer({"export", "--model", "cell-7", "-o", file("served.model")});
+  must({"check", "--model", file("served.model"), "--batch", file("few.csv"), "--json", file("here.json")});
+  must_answer({"check", "--model", "cell-7", "--batch", file("few.csv"), "--json", file("there.json")});
+  const json here = json::parse(test::read_file(file("here.json")));
+  const json there = json::parse(test::read_file(file("there.json")));
+  for (const char* key : {"verdict", "rms_mm", "expected_rms_mm", "would_have_seen_mm", "model", "changed", "why"})
+    EXPECT_EQ(there.at(key), here.at(key)) << key;
+  const json known = json::parse(must_answer({"check", "--model", "cell-7", "--json", "-"}).out).at("cells").at(0);
+  EXPECT_EQ(known.at("cell"), "cell-7");
+  EXPECT_EQ(known.at("verdict"), here.at("verdict"));
+  EXPECT_EQ(known.at("due_because"), there.at("due_because"));
+  ASSERT_EQ(known.at("checks").size(), 1u);
+  EXPECT_EQ(known["checks"][0]["would_have_seen_mm"], here.at("would_have_seen_mm"));
+  EXPECT_EQ(known.at("in_force").at("version"), 1);
+  EXPECT_TRUE(known["in_force"]["after_mm"].is_number()) << "as its training was judged";
+  const json status = json::parse(must_answer({"status", "--json", "-"}).out);
+  EXPECT_EQ(status.at("health").at(0).at("verdict"), here.at("verdict"));
+  EXPECT_NE(must_answer({"status"}).out.find("cell cell-7: " + here.at("verdict").get<std::string>()),
+            std::string::npos);
+  EXPECT_EQ(trammel({"check", "--model", file("served.model")}).exit_code, kWrongUsage);
+}
+
+TEST_F(CommandLineWithService, AnActivatedImportSaysItsFiguresAndTheServiceKeepsThem) {
+  must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 120, 1), "--watch"});
+  const int version = imported(train(measure("other", 30, 3), "M1"));
+  const std::string model = fmt::format("cell-7@{}", version);
+  const Finished refused = ask({"activate", "--model", model});
+  EXPECT_EQ(refused.exit_code, kRefusedData);
+  for (const char* part : {"is worse than version 1", "mm before (version 1)", "--force puts it in force all the same"})
+    EXPECT_NE(refused.err.find(part), std::string::npos) << part << " is not in:\n" << refused.err;
+  const json now =
+      json::parse(must_answer({"activate", "--model", model, "--force", "--reason", "a trial", "--json", "-"}).out);
+  ASSERT_TRUE(now.at("before_mm").is_number() && now.at("after_mm").is_number()) << now.dump();
+  EXPECT_GT(now.at("after_mm").get<double>(), now.at("before_mm").get<double>());
+  EXPECT_NE(now.at("next").get<std::string>().find("trammel rollback"), std::string::npos);
+  const json known = json::parse(must_answer({"check", "--model", "cell-7", "--json", "-"}).out).at("cells").at(0);
+  EXPECT_EQ(known.at("in_force").at("after_mm"), now.at("after_mm"));
+  const json trail = json::parse(must_answer({"audit", "--cell", "cell-7", "--json", "-"}).out);
+  EXPECT_NE(trail.dump().find("a trial; "), std::string::npos) << "the figures stand in the trail, too";
+}
+
 TEST_F(CommandLineWithService, ABatchIsDiagnosedThereAndWhatItNamesPutInForce) {
   must({"plan", "--cell", cell_, "--count", "150", "-o", file("plan.csv")});
   must({"simulate", "--cell", cell_, "--truth", oscillating_truth(folder_), "--plan", file("plan.csv"), "-o",

@@ -71,6 +71,9 @@ TEST(LearningFromSessions, AnImportedModelThatIsWorseIsPutInForceByForceOnly) {
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("mm before (version 1)"), std::string::npos) << refused.error().message;
   EXPECT_NE(refused.error().next.find("--force"), std::string::npos);
+  EXPECT_EQ(refused.error().field, "after_mm");
+  ASSERT_TRUE(refused.error().value && refused.error().limit) << "the figures as data";
+  EXPECT_GT(*refused.error().value, *refused.error().limit);
   EXPECT_EQ(learning.in_force(), 1);
   ASSERT_TRUE(learning.trainer().activate("cell-7", version, {}, true));
   EXPECT_EQ(learning.in_force(), version);

@@ -7,6 +7,7 @@
 #include "server/calibrate/one_session.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
+#include "server/compensate/session_changes.h"
 #include "server/compensate/world.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
@@ -73,6 +74,60 @@ TEST(Sessions, AZeroLostBetweenTwoIsFoundAndDatedAndTheRestOfTheOldDataGoesOnCou
     EXPECT_EQ(test::demand(deserialize(serialize(model), "again")).parts().changes.front().source,
               parts.changes.front().source);
   }
+}
+
+TEST(Sessions, WhatChangedIsDataWithItsSessionAndItsUncertainty) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch batch = sessions_of(robot, test::with_zero_off(robot, 3, 2e-4), 4, 2, 1003);
+  const std::vector<SessionChange> changes = session_changes(test::demand(train(cell, batch, kPhysics)));
+  ASSERT_EQ(changes.size(), 1u);
+  const SessionChange& change = changes.front();
+  EXPECT_EQ(change.cause, "joint_slip");
+  EXPECT_EQ(change.joint, 3);
+  EXPECT_EQ(change.session_id, "day-3");
+  EXPECT_EQ(change.pose_id, "day-3/1");
+  ASSERT_EQ(change.sizes.size(), 1u);
+  EXPECT_EQ(change.sizes.front().unit, "mrad");
+  EXPECT_LT(change.sizes.front().u95, 0.05);
+  EXPECT_NEAR(change.sizes.front().value, 0.2, 2 * change.sizes.front().u95);
+}
+
+TEST(Sessions, WhereNoClockTellsTheirOrderTheModelSaysOnWhatItRests) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const VirtualRobot after = test::with_zero_off(robot, 3, 2e-4);
+  const auto model_of = [&](bool first_has_time) {
+    std::vector<CheckedBatch> days;
+    for (int s = 0; s < 3; ++s) {
+      const test::Day day{.poses = 60, .seed = 500 + 17 * static_cast<std::uint64_t>(s), .set_up_anew = true};
+      MeasurementBatch batch = measured_on(s < 2 ? robot : after, day);
+      // Given as day 3, day 1, day 2; the clocks say otherwise.
+      const double at = 1.7e9 + 86400.0 * s;
+      for (Measurement& m : batch.measurements) {
+        if (first_has_time || s > 0) m.context.time = at + 60.0 * static_cast<double>(m.row);
+      }
+      batch = dated(std::move(batch), 1'800'000'000);
+      days.push_back(checked(std::move(batch), fmt::format("day-{}", s + 1), *cell));
+    }
+    return test::demand(train(cell, joined({days[2], days[0], days[1]}), kPhysics));
+  };
+  const CompensatedModel by_time = model_of(true), as_given = model_of(false);
+  const auto dated_changes = session_changes(by_time), given_changes = session_changes(as_given);
+  ASSERT_EQ(dated_changes.size(), 1u);
+  EXPECT_EQ(dated_changes.front().session_id, "day-3");
+  EXPECT_FALSE(dated_changes.front().rests_on_order);
+  EXPECT_FALSE(note_on_order(by_time.parts().sessions, by_time.parts().sessions_as_given));
+  ASSERT_EQ(given_changes.size(), 1u);
+  EXPECT_EQ(given_changes.front().session_id, "day-1") << "by their order the arm has changed back";
+  EXPECT_TRUE(given_changes.front().rests_on_order);
+  const std::vector<std::string> notes = notes_of(as_given);
+  EXPECT_NE(notes.front().find("rests on the order"), std::string::npos) << notes.front();
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+    return note.find("day-2 is taken for the newest") != std::string::npos;
+  })) << fmt::format("{}", fmt::join(notes, "\n"));
+  const CompensatedModel again = test::demand(deserialize(serialize(as_given), "again"));
+  EXPECT_TRUE(again.parts().sessions_as_given);
 }
 
 TEST(Sessions, NothingHasChangedWhereOnlyTheTrackerMoved) {
@@ -305,6 +360,10 @@ TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
   EXPECT_LT(true_error(model, robot), 1e-5);
   EXPECT_NE(notes_of(model).front().find(fmt::format("it has moved by {:.2f}", 1e3 * moved)), std::string::npos)
       << notes_of(model).front();
+  const SessionChange told = session_changes(model).front();
+  EXPECT_EQ(told.course, SessionChange::Course::kWanders);
+  ASSERT_EQ(told.sizes.size(), 1u);
+  EXPECT_NEAR(told.sizes.front().value, 1e3 * moved, 2 * told.sizes.front().u95);
   EXPECT_EQ(serialize(test::demand(deserialize(serialize(model), "again"))), serialize(model));
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/service/health_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/json_guard.h"
@@ -12,6 +13,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/files/batch_file.h"
+#include "server/report/cell_health.h"
 #include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
 
@@ -66,6 +68,16 @@ std::string check_text(const nlohmann::ordered_json& check) {
          due_text(check);
 }
 
+/// What earlier checks said.
+Status tell_health(client::Session& session, const std::string& cell, const CheckArguments& arguments) {
+  const auto cells = health_at(session, cell, 0);
+  if (!cells) return tl::make_unexpected(cells.error());
+  std::string text;
+  for (const auto& one : *cells) text += cell_health_text(one);
+  tell(text, {arguments.json});
+  return write_json(arguments.json, {{"cells", *cells}});
+}
+
 Status check_at_service(const CheckArguments& arguments) {
   if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
   if (!arguments.earlier.empty()) return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
@@ -78,6 +90,7 @@ Status check_at_service(const CheckArguments& arguments) {
   }
   const auto session = open_session(arguments.service);
   if (!session) return tl::make_unexpected(session.error());
+  if (arguments.batch.empty()) return tell_health(**session, model->cell, arguments);
   const Result<std::int64_t> job = ask(**session, model->cell, arguments);
   if (!job) return tl::make_unexpected(job.error());
   const Result<client::JobStatus> end = [&] {
@@ -107,6 +120,11 @@ Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& fil
 }
 
 Status check(const CheckArguments& arguments) {
+  if (arguments.batch.empty()) {
+    return failure(ErrorCode::kUsage, "a check needs measurements")
+        .of("--batch")
+        .next("trammel plan --check N plans the poses");
+  }
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   const Result<CheckedBatch> batch = read_batch(arguments.batch).and_then([&](MeasurementBatch read) {
@@ -136,11 +154,11 @@ void add_check_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("check", "Say by a few poses whether the robot still is as its model has it");
   command->add_option("--model", arguments->model, "Model file; with --service a cell's id: its model in force")
       ->required();
-  command
-      ->add_option("--batch", arguments->batch,
-                   "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check plans them; "
-                   "with --service also the id of a batch that the service has")
-      ->required();
+  command->add_option(
+      "--batch", arguments->batch,
+      "A few measurements (CSV: joints in deg, rails in mm; positions in mm), as plan --check plans them; "
+      "with --service also the id of a batch that the service has, or left out: what checks have said so far, "
+      "and when the next one is due");
   command->add_option(
       "--earlier", arguments->earlier,
       "What an earlier check of this robot wrote with --json, once for each: the next one is due by all of "

@@ -4,12 +4,14 @@
 #include <type_traits>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/service/health_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/model_file.h"
+#include "server/report/cell_health.h"
 
 namespace trammel::cli {
 
@@ -94,6 +96,8 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
   return started(session, *job, arguments);
 }
 
+bool is_checked(const ordered_json& cell) { return cell.contains("verdict") && cell["verdict"].is_string(); }
+
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::vector<client::ServerStatus>> servers = session.servers();
   if (!servers) return tl::make_unexpected(servers.error());
@@ -103,15 +107,19 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   if (!apart) return tl::make_unexpected(apart.error());
   const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
   if (!jobs) return tl::make_unexpected(jobs.error());
-  std::string text;
+  const Result<std::vector<ordered_json>> health = health_at(session, "", 1);
+  if (!health) return tl::make_unexpected(health.error());
+  std::string text, checked;
+  for (const ordered_json& cell : *health) checked += is_checked(cell) ? cell_health_line(cell) : "";
   ordered_json list = ordered_json::array();
   for (const client::ServerStatus& server : *servers) {
     text += server_text(server);
     list.push_back(server_json(server));
   }
-  tell(text + models_text(*models) + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
+  tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
   return write_json(arguments.json, {{"servers", list},
                                      {"models", models_json(*models)},
+                                     {"health", *health},
                                      {"jobs", jobs_json(*jobs)},
                                      {"quarantine", quarantine_json(*apart)}});
 }
@@ -154,12 +162,6 @@ Status list_batches(client::Session& session, const ServiceArguments& arguments)
   return write_json(arguments.json, {{"batches", batches_json(*batches)}});
 }
 
-Status now_in_force(const std::string& cell, const Result<int>& version, const ServiceArguments& arguments) {
-  if (!version) return tl::make_unexpected(version.error());
-  tell(fmt::format("cell {}: version {} in force\n", cell, *version), {arguments.json});
-  return write_json(arguments.json, {{"cell", cell}, {"version", *version}});
-}
-
 client::ChangeOptions because(const ServiceArguments& arguments) {
   client::ChangeOptions change;
   change.reason = arguments.reason;
@@ -188,21 +190,19 @@ Status discard(client::Session& session, const ServiceArguments& arguments) {
                             "discarded", arguments);
 }
 
-/// 0: none, or it cannot be asked.
-int version_in_force(client::Session& session, const std::string& cell) {
-  const auto models = session.models(cell);
-  if (!models) return 0;
-  const auto found = std::find_if(models->begin(), models->end(), [](const auto& model) { return model.in_force; });
-  return found == models->end() ? 0 : found->version;
+/// What the service says of what is in force in the cell, with the figures it was judged by; null where it does not.
+ordered_json in_force_at(client::Session& session, const std::string& cell) {
+  const auto cells = health_at(session, cell, 1);
+  if (!cells) return nullptr;
+  for (const ordered_json& one : *cells)
+    if (one.contains("in_force") && one["in_force"].is_object()) return one["in_force"];
+  return nullptr;
 }
 
-/// Of the jobs that the service still lists.
-std::optional<client::JobStatus> job_that_made(client::Session& session, const std::string& cell, int version) {
-  const auto jobs = session.jobs(cell);
-  if (!jobs) return std::nullopt;
-  const auto found = std::find_if(jobs->begin(), jobs->end(),
-                                  [&](const client::DatedJob& job) { return job.status.model_version == version; });
-  return found == jobs->end() ? std::nullopt : std::optional(found->status);
+Status now_in_force(client::Session& session, const std::string& cell, int version, const ServiceArguments& arguments) {
+  const ordered_json now = in_force_json(cell, version, in_force_at(session, cell));
+  tell(in_force_text(now), {arguments.json});
+  return write_json(arguments.json, now);
 }
 
 Status activate(client::Session& session, const ServiceArguments& arguments) {
@@ -215,18 +215,17 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
   }
   client::ChangeOptions options = because(arguments);
   options.force = arguments.force;
-  InForce now{model->cell, model->version, version_in_force(session, model->cell), {}};
   const Result<int> version = session.activate(model->cell, model->version, options);
   if (!version) return tl::make_unexpected(version.error());
-  now.made_by = job_that_made(session, now.cell, now.version);
-  tell(in_force_text(now), {arguments.json});
-  return write_json(arguments.json, in_force_json(now));
+  return now_in_force(session, model->cell, *version, arguments);
 }
 
 Status rollback(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  return now_in_force(*cell, session.rollback(*cell, because(arguments)), arguments);
+  const Result<int> version = session.rollback(*cell, because(arguments));
+  if (!version) return tl::make_unexpected(version.error());
+  return now_in_force(session, *cell, *version, arguments);
 }
 
 /// What a stored version is, as train tells of a new one.

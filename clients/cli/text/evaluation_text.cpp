@@ -9,6 +9,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
+#include "server/report/session_changes_json.h"
 
 namespace trammel::cli {
 
@@ -307,40 +308,6 @@ ordered_json sessions_json(const CompensatedModel::Parts& parts) {
   return list;
 }
 
-/// As the contract names a cause: `cause`, `joint` from 1 where it concerns one.
-ordered_json cause_json(const std::string& source) {
-  const std::string spelled = source.substr(0, source.find('@'));
-  const std::size_t colon = spelled.find(':');
-  ordered_json json = {{"cause", spelled.substr(0, colon)}};
-  if (colon != std::string::npos) json["joint"] = std::stoi(spelled.substr(colon + 1));
-  return json;
-}
-
-ordered_json changes_json(const CompensatedModel::Parts& parts) {
-  ordered_json list = ordered_json::array();
-  for (const Change& change : parts.changes) {
-    ordered_json json = cause_json(change.source);
-    const SessionSetting& since = parts.sessions[change.session];
-    json["since"] = {{"session_id", since.id}, {"pose_id", since.first_pose}};
-    json["source"] = change.source;
-    json["strength"] = change.gain;
-    json["p_value"] = change.p_value;
-    if (change.rate > 0) json["wanders_rad_per_session"] = change.rate;
-    std::size_t next = 0;
-    for (const ErrorSourcePtr& source : parts.physics.sources) {
-      for (std::size_t k = 0; k < source->parameters().size(); ++k, ++next) {
-        if (source->name() != change.source) continue;
-        const ordered_json one = parameters_json({parts.parameters[next]});
-        json["parameters"][one.front().at("name").get<std::string>()] = one.front();
-      }
-    }
-    json["could_also_be"] = ordered_json::array();
-    for (const std::string& other : change.could_also_be) json["could_also_be"].push_back(cause_json(other));
-    list.push_back(json);
-  }
-  return list;
-}
-
 ordered_json unidentifiable_json(const std::vector<UnidentifiableCombination>& combinations) {
   ordered_json list = ordered_json::array();
   for (const UnidentifiableCombination& one : combinations) {
@@ -404,7 +371,9 @@ ordered_json model_json(const CompensatedModel& model) {
   json["training"] = evaluation_json(parts.training);
   if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
-  if (!parts.sessions.empty()) json["changes"] = changes_json(parts);
+  if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
+  if (!parts.sessions.empty()) json["between_sessions"] = session_changes_json(session_changes(model));
+  if (!parts.sessions.empty()) json["changes"] = json["between_sessions"];  // as it was called before
   if (!parts.provenance.refits.empty()) json["refits"] = refits_json(parts.provenance.refits);
   if (parts.rotation_bias) json["bias_of_orientation"] = true;
   if (parts.oriented_poses > 0) json["oriented_poses"] = parts.oriented_poses;

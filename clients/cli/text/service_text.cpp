@@ -202,49 +202,27 @@ ordered_json batches_json(const std::vector<client::BatchOfService>& batches) {
   return list;
 }
 
-namespace {
-
-std::string why_of(const InForce& now) {
-  if (now.before == now.version) return "it was in force already";
-  if (!now.made_by) return "no job of this service that is still listed made and judged it: it was imported, or is old";
-  return "when it was made: " + (now.made_by->why.empty() ? now.made_by->what : now.made_by->why);
+ordered_json in_force_json(const std::string& cell, int version, const ordered_json& said) {
+  ordered_json now = {{"cell", cell}, {"version", version}};
+  const bool is_it = said.is_object() && said.value("version", ordered_json()) == version;
+  for (const char* key : {"before_mm", "after_mm", "limit_mm"})
+    now[key] = is_it && said.contains(key) && said[key].is_number() ? said[key] : ordered_json(nullptr);
+  for (const char* key : {"why", "next"})
+    now[key] = is_it && said.contains(key) && said[key].is_string() ? said[key] : ordered_json("");
+  if (now["why"] == "") now["why"] = "it was never held against another one on poses held out";
+  return now;
 }
 
-/// The command that takes it back.
-std::string way_back(const InForce& now) {
-  if (now.before == 0 || now.before == now.version) return "";
-  return fmt::format("trammel rollback --service --cell {} puts version {} back in force", now.cell, now.before);
-}
-
-}  // namespace
-
-ordered_json in_force_json(const InForce& now) {
-  const auto figure = [&](std::optional<double> client::JobStatus::*mm) {
-    const bool is_known = now.made_by && (*now.made_by).*mm;
-    return is_known ? ordered_json(*((*now.made_by).*mm)) : ordered_json(nullptr);
-  };
-  return {{"cell", now.cell},
-          {"version", now.version},
-          {"before_mm", figure(&client::JobStatus::before_mm)},
-          {"after_mm", figure(&client::JobStatus::after_mm)},
-          {"limit_mm", figure(&client::JobStatus::limit_mm)},
-          {"why", why_of(now)},
-          {"next", way_back(now)}};
-}
-
-std::string in_force_text(const InForce& now) {
-  std::string text = fmt::format("cell {}: version {} in force\n", now.cell, now.version);
+std::string in_force_text(const ordered_json& now) {
+  std::string text =
+      fmt::format("cell {}: version {} in force\n", now.at("cell").get<std::string>(), now.at("version").get<int>());
   std::vector<std::string> figures;
-  const auto add = [&](const char* name, std::optional<double> client::JobStatus::*mm) {
-    if (now.made_by && (*now.made_by).*mm) figures.push_back(fmt::format("{} {:.4f} mm", name, *((*now.made_by).*mm)));
-  };
-  add("before", &client::JobStatus::before_mm);
-  add("after", &client::JobStatus::after_mm);
-  add("limit", &client::JobStatus::limit_mm);
+  for (const auto& [name, key] : {std::pair("before", "before_mm"), {"after", "after_mm"}, {"limit", "limit_mm"}})
+    if (now.at(key).is_number()) figures.push_back(fmt::format("{} {:.4f} mm", name, now.at(key).get<double>()));
   if (!figures.empty()) text += fmt::format("held-out rms: {}\n", fmt::join(figures, ", "));
-  text += fmt::format("why: {}\n", why_of(now));
-  const std::string back = way_back(now);
-  return back.empty() ? text : text + fmt::format("next: {}, if it is not wanted\n", back);
+  text += fmt::format("why: {}\n", now.at("why").get<std::string>());
+  const std::string next = now.at("next").get<std::string>();
+  return next.empty() ? text : text + fmt::format("next: {}, if it is not wanted\n", next);
 }
 
 std::string next_step(const client::JobStatus& job) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,16 +29,12 @@ namespace trammel::cli {
 /// A line a batch.
 [[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches);
 
-/// A version that was put in force, and what is known of it beside the one before.
-struct InForce {
-  std::string cell;
-  int version = 0;
-  int before = 0;                            ///< in force until now; 0: none, or not known
-  std::optional<client::JobStatus> made_by;  ///< the job that made it and judged it; empty: imported, or long ago
-};
-/// Before, after, limit, why, and what to do next, as far as that is known.
-[[nodiscard]] nlohmann::ordered_json in_force_json(const InForce& now);
-[[nodiscard]] std::string in_force_text(const InForce& now);
+/// A version that was put in force: before, after, limit, why, and what to do next, as far as the service says so.
+/// `said`: its `in_force` of the cell (READ_HEALTH), from outside; null: nothing.
+[[nodiscard]] nlohmann::ordered_json in_force_json(const std::string& cell, int version,
+                                                   const nlohmann::ordered_json& said);
+/// The same for people.
+[[nodiscard]] std::string in_force_text(const nlohmann::ordered_json& now);
 
 /// What to do next where a job did not put a model in force, by its verdict; empty where there is nothing.
 [[nodiscard]] std::string next_step(const client::JobStatus& job);

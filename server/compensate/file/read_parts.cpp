@@ -126,6 +126,7 @@ void read_sessions(const Json& content, ModelParts& parts) {
   if (content.contains("sessions")) {
     for (const Json& session : list_from(content.at("sessions"))) parts.sessions.push_back(session_from(session));
   }
+  parts.sessions_as_given = content.contains("sessions_as_given") && truth_from(content.at("sessions_as_given"));
   if (content.contains("changes")) {
     for (const Json& change : list_from(content.at("changes"))) {
       parts.changes.push_back({.source = change.at("source"),

@@ -188,6 +188,7 @@ void add_calibration(const ModelParts& parts, Json& content) {
   content["cost_record"] = parts.cost_record;
   content["discrepancy_m"] = parts.discrepancy;
   if (!parts.sessions.empty()) content["sessions"] = list_of(parts.sessions);
+  if (parts.sessions_as_given) content["sessions_as_given"] = true;
   if (!parts.changes.empty()) content["changes"] = list_of(parts.changes);
   if (!parts.sessions_left_out.empty()) content["sessions_left_out"] = list_of(parts.sessions_left_out);
 }

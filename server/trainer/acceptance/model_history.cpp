@@ -122,7 +122,8 @@ Status ModelHistory::check_expected(const std::string& cell, const ChangeRequest
       .next("look again, and decide anew");
 }
 
-Status ModelHistory::activate(const std::string& cell, int version, const ChangeRequest& request) {
+Status ModelHistory::activate(const std::string& cell, int version, const ChangeRequest& request,
+                              const std::optional<GateVerdict>& judged) {
   if (auto found = find_cell(cells_, cell); !found) return tl::make_unexpected(found.error());
   const auto made = store_.outcome_of(request.id);
   if (!made) return tl::make_unexpected(made.error());
@@ -134,7 +135,8 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   if (!made_meanwhile) return tl::make_unexpected(made_meanwhile.error());
   if (*made_meanwhile) return {};
   if (auto as_expected = check_expected(cell, request); !as_expected) return as_expected;
-  if (auto activated = store_.activate(cell, version, request.id); !activated) return activated;
+  const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
+  if (auto activated = store_.activate(cell, version, request.id, figures); !activated) return activated;
   if (registry_.version_in_force(cell) != version) put_in_force(std::move(*model));
   return {};
 }

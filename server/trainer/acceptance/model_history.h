@@ -88,7 +88,9 @@ class ModelHistory {
   /// Of a cell that is served here; refused when its robot or its tools are not the cell's any more.
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
   /// Puts a stored version in force and publishes it. A version that is served already is not published again.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {});
+  /// `judged`: how it did beside the one in force.
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
+                                const std::optional<GateVerdict>& judged = {});
   /// Back to the version in force before, or the last one before it that can be served; returns it. Refuses (kBusy)
   /// where others change what is in force all the time.
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {});

@@ -189,6 +189,7 @@ Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, con
   const LeftOut left_out(found->calibration, split.train);
   CompensatedModel::Parts parts = calibrated_parts(std::move(found->calibration), left_out);
   parts.changes = std::move(found->changes);
+  parts.sessions_as_given = !parts.sessions.empty() && !batch.rows().clock;
   parts.sessions_left_out = std::move(unplaced);
   const std::string asked = options.bias.value_or(cell->model.bias);
   const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
