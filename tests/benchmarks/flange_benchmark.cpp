@@ -1,8 +1,10 @@
 // Reflectors on one flange, and whether 95 % intervals hold 95 %, on drawn arms of the second simulation.
-// `flange_benchmark [--only fourth|coverage|speed] [--seeds N] [--poses N]`.
+// `flange_benchmark [--only fourth|coverage|ur10|speed] [--seeds N] [--poses N]`.
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -171,6 +173,54 @@ void coverage(const Options& options) {
   }
 }
 
+/// 95 % of the share inside, by runs of poses drawn with replacement: neighbours in time have errors in common.
+std::pair<double, double> block_bootstrap(const std::vector<double>& inside) {
+  constexpr int kDraws = 4000;
+  constexpr std::size_t kRun = 20;
+  Random random(1);
+  const std::size_t runs = (inside.size() + kRun - 1) / kRun;
+  std::vector<double> means;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    double sum = 0;
+    for (std::size_t run = 0; run < runs; ++run) {
+      const auto first = static_cast<std::size_t>(hidden::whole(random, 0, static_cast<int>(inside.size()) - 1));
+      for (std::size_t i = 0; i < kRun; ++i) sum += inside[(first + i) % inside.size()];
+    }
+    means.push_back(sum / static_cast<double>(runs * kRun));
+  }
+  std::sort(means.begin(), means.end());
+  return {means[kDraws / 40], means[kDraws - kDraws / 40]};
+}
+
+// Every pose whose id ends in 7, 8 or 9 is held out, as the tests do it.
+void ur10(const Options&) {
+  const auto cell = std::make_shared<const Cell>(demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
+  for (const char* name : {"c", "d"}) {
+    const std::string file = fmt::format(TRAMMEL_SOURCE_DIR "/../shared/data/ur10_series_{}.csv", name);
+    if (!std::filesystem::exists(file)) continue;
+    MeasurementBatch batch = demand(check_against_cell(demand(read_batch_csv(file)), *cell)).rows();
+    MeasurementBatch held_out = batch;
+    std::erase_if(held_out.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 < 7; });
+    std::erase_if(batch.measurements, [](const Measurement& m) { return std::stoi(m.pose_id) % 10 >= 7; });
+    TrainOptions options;
+    options.level = "M3";
+    options.bias = "matern52 + joint_map + parameters";
+    const CompensatedModel model = demand(train(cell, demand(check_against_cell(batch, *cell, drawn(0, 1))), options));
+    const CompensatedModel::LevelErrors errors = model.errors_B(held_out);
+    std::vector<double> inside;
+    for (Eigen::Index i = 0; i < errors.compensated.cols(); ++i) {
+      const auto z = errors.compensated.col(i).array().abs() / errors.stddev.col(i).array();
+      inside.push_back(static_cast<double>((z < 1.96).count()) / 3);
+    }
+    const auto limits = block_bootstrap(inside);
+    double mean = 0;
+    for (const double share : inside) mean += 100 * share / static_cast<double>(inside.size());
+    tell_figure(fmt::format("UR10 {} held out inside 95 %", name), mean);
+    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks from", name), 100 * limits.first);
+    tell_figure(fmt::format("UR10 {} held out inside 95 %, by blocks to", name), 100 * limits.second);
+  }
+}
+
 void speed(const Options& options) {
   const World world = drawn_world(1);
   const std::vector<MeasuringPose> poses = scattered(options.poses, 1);
@@ -191,6 +241,7 @@ int run(int argc, char** argv) {
   const auto asked = [&](const char* name) { return options.only.empty() || options.only == name; };
   if (asked("fourth")) fourth(options);
   if (asked("coverage")) coverage(options);
+  if (asked("ur10")) ur10(options);
   if (asked("speed")) speed(options);
   return 0;
 }

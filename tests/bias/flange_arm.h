@@ -24,7 +24,7 @@ inline Matrix3 flange_stands(const JointVector& q) {
 }
 
 inline BiasFeatures at_lever(const JointVector& q, const Vector3& lever_F) {
-  return {Eigen::MatrixXd::Zero(6, 6), Eigen::MatrixXd::Zero(6, 0), lever_F, flange_stands(q)};
+  return {Eigen::MatrixXd::Zero(6, 6), Eigen::MatrixXd::Zero(6, 2), lever_F, flange_stands(q)};
 }
 
 /// The true error of the point at this lever.
