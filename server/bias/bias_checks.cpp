@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/bias/flange/flange_views.h"
 
 namespace trammel {
 namespace {
@@ -91,9 +92,19 @@ Status check_features(const std::string& kernel, const std::vector<BiasFeatures>
           .in("bias data")
           .of("features")
           .at_row(i + 1);
-    if (!at.by_joint.allFinite() || !at.by_parameter.allFinite())
+    if (!at.by_joint.allFinite() || !at.by_parameter.allFinite() || !at.lever_F.allFinite() || !at.R_BF.allFinite())
       return refused("a feature is not finite").of("features").in("bias data").at_row(i + 1);
   }
+  return {};
+}
+
+Status check_flange(const MatrixXd& q, const std::vector<BiasFeatures>& features) {
+  const Index numbers = views_of(q, VectorXd::Ones(q.rows()), features).size;
+  if (numbers > kMostFlangeNumbers)
+    return refused("bias at the flange: its joint vectors tell {} numbers, at most {}", numbers, kMostFlangeNumbers)
+        .of("bias")
+        .beyond(numbers, kMostFlangeNumbers)
+        .next("take a kernel without flange, or fewer poses");
   return {};
 }
 
@@ -108,7 +119,7 @@ Status check_hyperparameters(const BiasState& state, const SpelledBias& bias) {
     return refused("bias state: {} offsets, should be 3", state.offset.size())
         .of("offset")
         .beyond(state.offset.size(), kCoordinates);
-  Index of_blocks = 0;
+  Index of_blocks = bias.flange ? rows - 1 : 0;  // of the rotation: kernel parameters and its size
   for (const LinearBlockPtr& block : bias.blocks) of_blocks += block->parameter_count(state.features.front());
   if (state.block_hyperparameters.size() != of_blocks)
     return refused("bias state: {} hyperparameters of blocks, should be {} for kernel `{}`",

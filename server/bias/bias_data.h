@@ -19,7 +19,7 @@ struct BiasProblem {
   Eigen::MatrixXd q;                        ///< N x n, rad
   Eigen::MatrixXd residual_B;               ///< N x 3, m, expressed in B
   Eigen::VectorXd sigma;                    ///< N, m: standard deviation of one measured coordinate
-  std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks
+  std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };
 
 struct BiasOptions {
@@ -52,8 +52,9 @@ struct BiasState {
   Eigen::VectorXd sigma;            ///< N, m
   Eigen::VectorXd offset;           ///< of each coordinate, m: the mean residual, predicted far from all data
   Eigen::MatrixXd hyperparameters;  ///< a column for each coordinate, natural logarithms: kernel, log σ_f, log σ_n
-  Eigen::VectorXd block_hyperparameters = {};  ///< of all blocks in their order, natural logarithms
-  std::vector<BiasFeatures> features = {};     ///< N; empty for a kernel without blocks
+  /// Of all blocks in their order, natural logarithms; of `flange` kernel and log σ (rad) of the rotation.
+  Eigen::VectorXd block_hyperparameters = {};
+  std::vector<BiasFeatures> features = {};  ///< N; empty for a kernel without blocks or flange
 };
 
 /// How the fit went.

@@ -53,6 +53,29 @@ OutputData data_of(const BiasState& state) {
   return {state.q, state.residual_B.rowwise() - state.offset.transpose(), noise_shape(state.sigma), state.features};
 }
 
+Status check_described(const SpelledBias& bias, const BiasState& state) {
+  if (!bias.needs_features()) return {};
+  return check_features(state.kernel, state.features, state.q.rows()).and_then([&]() -> Status {
+    if (!bias.flange) return {};
+    return check_flange(state.q, state.features);
+  });
+}
+
+BiasOutputsPtr conditioned(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at,
+                           VarianceForm form) {
+  if (bias.flange) return condition_flange(bias.kernel, data, at);
+  if (!bias.blocks.empty()) return condition_coupled(bias, data, at, form);
+  return condition_independent(bias.kernel, data, at.outputs, form);
+}
+
+std::optional<CoupledSearchResult> searched(const SpelledBias& bias, const OutputData& data,
+                                            const VectorXd& metrology_stddev, const SearchOptions& options,
+                                            const CoupledHyperparameters* last) {
+  if (bias.flange) return search_flange_outputs(bias.kernel, data, metrology_stddev, options, last);
+  if (!bias.blocks.empty()) return search_coupled_outputs(bias, data, metrology_stddev, options, last);
+  return search_independent(bias.kernel, data, metrology_stddev, options, last);
+}
+
 double row_rms(const MatrixXd& rows) { return std::sqrt(rows.squaredNorm() / static_cast<double>(rows.rows())); }
 
 }  // namespace
@@ -60,12 +83,13 @@ double row_rms(const MatrixXd& rows) { return std::sqrt(rows.squaredNorm() / sta
 struct BiasModel::Fitted {
   BiasState state;
   BiasFitReport report;
-  bool coupled = false;
+  bool coupled = false;    // has blocks
+  bool described = false;  // needs features
   BiasOutputsPtr outputs;
   double mean_noise_shape = 1;  // noise variance of an average measurement, relative to the learned one
 
-  Fitted(BiasState of, bool with_blocks, BiasOutputsPtr conditioned)
-      : state(std::move(of)), coupled(with_blocks), outputs(std::move(conditioned)) {
+  Fitted(BiasState of, bool with_blocks, bool with_features, BiasOutputsPtr conditioned)
+      : state(std::move(of)), coupled(with_blocks), described(with_features), outputs(std::move(conditioned)) {
     mean_noise_shape = noise_shape(state.sigma).mean();
     report.log_likelihood = outputs->log_likelihood();
     report.noise_stddev = outputs->noise_variance().cwiseSqrt();
@@ -82,22 +106,17 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   if (state.kernel == kNone) {
     BiasState silent = state;
     silent.offset = VectorXd::Zero(kCoordinates);
-    return std::make_shared<Fitted>(std::move(silent), false, make_silent_outputs(state.residual_B));
+    return std::make_shared<Fitted>(std::move(silent), false, false, make_silent_outputs(state.residual_B));
   }
   const auto bias = spelled_bias(state.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
-  const bool coupled = !bias->blocks.empty();
-  if (coupled) {
-    const Status fine = check_features(state.kernel, state.features, state.q.rows());
-    if (!fine) return tl::make_unexpected(fine.error());
-  }
+  if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
   if (const Status fine = check_hyperparameters(state, *bias); !fine) return tl::make_unexpected(fine.error());
   const CoupledHyperparameters at = hyperparameters_of(state);
   const OutputData data = data_of(state);
-  BiasOutputsPtr outputs =
-      coupled ? condition_coupled(*bias, data, at, form) : condition_independent(bias->kernel, data, at.outputs, form);
+  BiasOutputsPtr outputs = conditioned(*bias, data, at, form);
   if (!outputs) return refused("bias: the covariance of {} observations is not positive definite", state.q.rows());
-  return std::make_shared<Fitted>(state, coupled, std::move(outputs));
+  return std::make_shared<Fitted>(state, !bias->blocks.empty(), bias->needs_features(), std::move(outputs));
 }
 
 Result<BiasModel> BiasModel::restore(const BiasState& state) {
@@ -126,12 +145,8 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   if (!bias) return tl::make_unexpected(bias.error());
   if (options.starts < 1)
     return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
-  const bool coupled = !bias->blocks.empty();
-  if (coupled) {
-    const Status fine = check_features(options.kernel, problem.features, problem.q.rows());
-    if (!fine) return tl::make_unexpected(fine.error());
-    state.features = problem.features;
-  }
+  if (bias->needs_features()) state.features = problem.features;
+  if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
 
   state.offset = problem.residual_B.colwise().mean().transpose();
   const OutputData data = data_of(state);
@@ -140,8 +155,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   std::optional<CoupledHyperparameters> from;
   if (last != nullptr) from = hyperparameters_of(*last);
   const CoupledHyperparameters* start = from ? &*from : nullptr;
-  const auto found = coupled ? search_coupled_outputs(*bias, data, metrology_stddev, search, start)
-                             : search_independent(bias->kernel, data, metrology_stddev, search, start);
+  const auto found = searched(*bias, data, metrology_stddev, search, start);
   if (!found)
     return refused("bias fit: no start of {} gave a positive definite covariance of {} observations", options.starts,
                    problem.q.rows());
@@ -219,16 +233,18 @@ Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) con
 
 Result<BiasModel> BiasModel::regrown(BiasState state, BiasOutputsPtr outputs) const {
   if (!outputs) return restore(state);
-  auto fitted = std::make_shared<Fitted>(std::move(state), fitted_->coupled, std::move(outputs));
+  auto fitted = std::make_shared<Fitted>(std::move(state), fitted_->coupled, fitted_->described, std::move(outputs));
   fitted->report.starts_at_best = fitted_->report.starts_at_best;
   fitted->report.evaluations = fitted_->report.evaluations;
   return BiasModel(std::move(fitted));
 }
 
-bool BiasModel::needs_features() const { return fitted_->coupled; }
+bool BiasModel::needs_features() const { return fitted_->described; }
+
+bool BiasModel::has_blocks() const { return fitted_->coupled; }
 
 Vector3 BiasModel::mean_B(const JointVector& q, const BiasFeatures& features) const {
-  if (!fitted_->coupled) return mean_all_B(q.transpose()).row(0);
+  if (!fitted_->described) return mean_all_B(q.transpose()).row(0);
   return mean_all_B(q.transpose(), {features}).row(0);
 }
 
@@ -244,7 +260,7 @@ MatrixXd BiasModel::nearby_mean_all_B(const MatrixXd& q) const {
 }
 
 BiasPrediction BiasModel::predict(const JointVector& q, const BiasFeatures& features) const {
-  if (!fitted_->coupled) return predict_all(q.transpose()).front();
+  if (!fitted_->described) return predict_all(q.transpose()).front();
   return predict_all(q.transpose(), {features}).front();
 }
 

@@ -38,12 +38,15 @@ class BiasModel {
   /// Fitted again to its own observations, starting where the last fit ended: a few evaluations, no new starts.
   [[nodiscard]] Result<BiasModel> refit(const BiasOptions& options) const;
 
-  /// Whether the kernel has blocks. Only then features must be given; else they are ignored.
+  /// Whether the kernel has blocks or is of the flange. Only then features must be given; else they are ignored.
   [[nodiscard]] bool needs_features() const;
+  /// Whether it has blocks: parts that do not fade with the distance from the training poses.
+  [[nodiscard]] bool has_blocks() const;
   [[nodiscard]] BiasPrediction predict(const JointVector& q, const BiasFeatures& features = {}) const;
   /// The mean alone, much cheaper: what the iteration of a correction needs.
   [[nodiscard]] Vector3 mean_B(const JointVector& q, const BiasFeatures& features = {}) const;
-  /// M x 3, m: BiasPrediction::nearby_B alone; rows of `q` are joint vectors.
+  /// M x 3, m: BiasPrediction::nearby_B alone; rows of `q` are joint vectors. Not of a kernel of the flange, all of
+  /// whose mean is nearby.
   [[nodiscard]] Eigen::MatrixXd nearby_mean_all_B(const Eigen::MatrixXd& q) const;
   /// P: what the block `parameters` found of each parameter, in prior standard deviations; empty without that block.
   [[nodiscard]] Eigen::VectorXd parameter_weights() const;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/bias/flange/flange_views.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/bias/process/halves.h"
 
@@ -19,6 +20,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::array kCheap = {"se", "matern52", "se + parameters"};
+/// Where the tool's point is seen at several levers.
+constexpr std::array kAtFlange = {"se + flange", "matern52 + flange"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
 constexpr Index kBlocks = 8;                  // eight give a standard error, and seven eighths still show the physics
 constexpr std::size_t kFewestBlocks = 4;      // half of them: of fewer the standard error means little
@@ -176,7 +179,10 @@ class Choosing {
  public:
   Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without,
            Index most_coupled)
-      : problem_(problem), options_(options), most_coupled_(most_coupled) {
+      : problem_(problem),
+        options_(options),
+        most_coupled_(most_coupled),
+        several_levers_(!problem.features.empty() && has_several_levers(problem.features)) {
     if (problem.q.rows() < kFewestToJudge) return;
     const Index count = problem.q.rows();
     in_time_ = folds(problem, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
@@ -201,6 +207,11 @@ class Choosing {
     for (const char* kernel : kCheap) {
       if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
     }
+    if (several_levers_) {
+      for (const char* kernel : kAtFlange) {
+        if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
+      }
+    }
     const double noise = std::sqrt(3 * problem_.sigma.squaredNorm() / static_cast<double>(problem_.sigma.size()));
     for (const char* kernel : kDear) {
       if (choice_.candidates[best_.candidate].leave_one_out_rms < kAboveNoise * noise) break;
@@ -220,17 +231,15 @@ class Choosing {
   }
 
   Status ask(const std::string& kernel) {
-    if (!spelled_bias(kernel)->blocks.empty()) {
-      if (problem_.features.empty()) return {};
-      if (problem_.q.rows() > most_coupled_) {
-        choice_.candidates.push_back(
-            {.kernel = kernel, .verdict = fmt::format("more than {} poses", most_coupled_), .skipped = true});
-        return {};
-      }
+    const Result<SpelledBias> bias = spelled_bias(kernel);
+    if (bias->needs_features() && problem_.features.empty()) return {};
+    if (const std::string too_many = too_many_for(*bias); !too_many.empty()) {
+      choice_.candidates.push_back({.kernel = kernel, .verdict = too_many, .skipped = true});
+      return {};
     }
     BiasOptions options = options_;
     options.kernel = kernel;
-    const double most = kCheap.size() + kDear.size();
+    const auto most = static_cast<double>(kCheap.size() + kDear.size() + (several_levers_ ? kAtFlange.size() : 0));
     const auto report = [this, most, done = asked_++](double share) {
       return !options_.progress || options_.progress((done + share) / most);
     };
@@ -262,6 +271,15 @@ class Choosing {
     } else {
       best_ = {choice_.candidates.size() - 1, nlpd, hyperparameters, std::move(*model)};
     }
+    return {};
+  }
+
+  /// Why the kernel cannot be asked; empty: it can.
+  [[nodiscard]] std::string too_many_for(const SpelledBias& bias) const {
+    if (!bias.blocks.empty() && problem_.q.rows() > most_coupled_)
+      return fmt::format("more than {} poses", most_coupled_);
+    if (bias.flange && !check_flange(problem_.q, problem_.features))
+      return fmt::format("more than {} numbers at the flange", kMostFlangeNumbers);
     return {};
   }
 
@@ -314,6 +332,7 @@ class Choosing {
   const BiasProblem& problem_;
   const BiasOptions& options_;
   const Index most_coupled_;
+  const bool several_levers_;
   std::vector<Fold> in_time_, in_joint_space_;
   Missed without_in_time_, without_in_joint_space_;  // by `none`
   BiasChoice choice_;

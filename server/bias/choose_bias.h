@@ -46,8 +46,9 @@ using ResidualWithout = std::function<std::optional<Eigen::MatrixXd>(const std::
 [[nodiscard]] bool is_worth_it(const BiasProblem& problem, const BiasModel& model);
 
 /// Takes the simplest bias that no other beats. The cheap ones are tried first: `none`, `se`, `matern52`,
-/// `se + parameters`. Where the best of them leaves clearly more than the instrument's noise, so are
-/// `matern52 + joint_map + parameters` and `se + joint_map`.
+/// `se + parameters`, and where the observations have several levers `se + flange` and `matern52 + flange`. Where the
+/// best of them leaves clearly more than the instrument's noise, so are `matern52 + joint_map + parameters` and `se +
+/// joint_map`.
 ///
 /// One bias beats another where
 /// - its leave-one-out log density, summed over the observations, is higher by more than one nat for each additional
@@ -61,7 +62,7 @@ using ResidualWithout = std::function<std::optional<Eigen::MatrixXd>(const std::
 /// judge, nothing is taken.
 ///
 /// Kernels with blocks are tried only where `problem` has features and not beyond `most_coupled` observations. At most
-/// five fits. The same problem and seed give the same choice. Of `options` the kernel is not used. With fewer than 30
+/// seven fits. The same problem and seed give the same choice. Of `options` the kernel is not used. With fewer than 30
 /// observations nothing is taken. Refuses what BiasModel::fit() refuses.
 [[nodiscard]] Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& options,
                                              const ResidualWithout& residual_without = {},

@@ -43,7 +43,7 @@ BiasFeatures turned(const BiasFeatures& features) {
     other << rows.bottomRows<3>(), rows.topRows<3>();
     return other;
   };
-  return {swapped(features.by_joint), swapped(features.by_parameter)};
+  return {swapped(features.by_joint), swapped(features.by_parameter), features.lever_F, features.R_BF};
 }
 
 BiasPhysics::BiasPhysics(const PhysicalModel& physics) : BiasPhysics(with_standard_sources(physics), AsItIs{}) {}
@@ -87,8 +87,9 @@ Vector3 BiasPhysics::beyond_first_order(const PoseContext& context, const Eigen:
 
 BiasFeatures BiasPhysics::at(const PoseContext& context) const {
   Eigen::MatrixXd J_W;
-  whole_.pose_W(context, whole_.values, &J_W);
-  const Eigen::MatrixXd by_deflection_W = ArmKinematics(whole_.state(context)).deflection_jacobian();
+  const Matrix3 R_WT = whole_.pose_W(context, whole_.values, &J_W).linear();
+  const ArmState state = whole_.state(context);
+  const Eigen::MatrixXd by_deflection_W = ArmKinematics(state).deflection_jacobian();
   const Matrix3 R_BW = whole_.X_WB.linear().transpose();
   const auto in_B = [&](const Eigen::MatrixXd& of_W) {
     Eigen::MatrixXd of_B(6, of_W.cols());
@@ -97,6 +98,8 @@ BiasFeatures BiasPhysics::at(const PoseContext& context) const {
     return of_B;
   };
   BiasFeatures features{in_B(by_deflection_W), in_B(J_W * prior_stddev_.asDiagonal())};
+  features.lever_F = state.X_FT.translation();
+  features.R_BF = R_BW * R_WT * state.X_FT.linear().transpose();
   for (int j = 0; j < whole_.cell->robot.size(); ++j) {
     if (whole_.cell->robot.joint(j).type != JointType::kRevolute) features.by_joint.col(j).setZero();
   }

@@ -51,7 +51,7 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
   return {};
 }
 
-/// At the observations of a bias with blocks.
+/// At the observations of a bias with blocks or at the flange.
 Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const BiasPhysics& physics) {
   const BiasState& bias = *parts.bias;
   if (static_cast<Eigen::Index>(parts.bias_contexts.size()) != bias.q.rows()) {
@@ -116,7 +116,7 @@ Status check_fit(const ModelParts& parts) {
 
 /// The bias of the orientation, told what that of the position, `of_position`, is told.
 Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_position) {
-  if (rotation.kernel != of_position.kernel || rotation.q != of_position.q)
+  if (rotation.kernel != without_flange(of_position.kernel) || rotation.q != of_position.q)
     return refused("model: the bias of the orientation is not of the same poses and kernel as that of the position");
   for (const BiasFeatures& features : of_position.features) rotation.features.push_back(turned(features));
   return BiasModel::restore(rotation);
@@ -127,7 +127,7 @@ Result<BiasModel> restored_rotation(BiasState rotation, const BiasState& of_posi
 Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside) {
   BiasState state = *parts.bias;
   const Result<SpelledBias> spelled = spelled_bias(state.kernel);
-  if (spelled && !spelled->blocks.empty()) {
+  if (spelled && spelled->needs_features()) {
     Result<std::vector<BiasFeatures>> features = features_of(parts, then);
     if (!features) return tl::make_unexpected(features.error());
     state.features = std::move(*features);
@@ -140,7 +140,7 @@ Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& t
   Result<BiasModel> bias = BiasModel::restore(state);
   if (!bias) return tl::make_unexpected(bias.error());
   inside->bias = std::move(*bias);
-  if (!inside->bias->needs_features()) inside->bias_size_B = turned_rms(state.residual_B);
+  if (!inside->bias->has_blocks()) inside->bias_size_B = turned_rms(state.residual_B);
   if (!parts.rotation_bias) return {};
   Result<BiasModel> rotation = restored_rotation(*parts.rotation_bias, state);
   if (!rotation) return tl::make_unexpected(rotation.error());
@@ -165,8 +165,17 @@ Result<CompensatedModel> CompensatedModel::make(Parts parts) {
 
 BiasPhysics CompensatedModel::learned_physics() const { return physics_of_bias(parts()); }
 
+bool CompensatedModel::learned_with(const std::string& tool, const std::string& payload) const {
+  if (parts().trained_with.contains({tool, payload})) return true;
+  if (!inside_->bias || !inside_->bias->needs_features() || inside_->bias->has_blocks()) return false;
+  const auto known = cell().tools.find(tool);
+  if (known == cell().tools.end() || !known->second) return false;
+  return std::any_of(parts().trained_with.begin(), parts().trained_with.end(),
+                     [&](const auto& trained) { return trained.second == payload; });
+}
+
 Status CompensatedModel::check_trained_with(const std::string& tool, const std::string& payload) const {
-  if (parts().trained_with.contains({tool, payload})) return {};
+  if (learned_with(tool, payload)) return {};
   std::string known;
   for (const auto& [one, load] : parts().trained_with) {
     known += fmt::format("{}'{}' and '{}'", known.empty() ? "" : ", ", one, load);

@@ -45,7 +45,8 @@ class CompensatedModel {
   [[nodiscard]] const Cell& cell() const { return *inside_->parts.physics.cell; }
   [[nodiscard]] const ModelProvenance& provenance() const { return inside_->parts.provenance; }
 
-  /// Refuses a tool with a payload that no training pose had: what was learned holds for the trained ones only.
+  /// Refuses a tool with a payload that no training pose had: what was learned holds for the trained ones only. A bias
+  /// at the flange holds for every tool of the cell file that weighs what a trained one did.
   [[nodiscard]] Status check_trained_with(const std::string& tool, const std::string& payload) const;
   /// The error expected at `q`, whose size the caller has checked; tool and payload as resolve_tool() gives them.
   [[nodiscard]] ErrorPrediction predict(const JointVector& q, const std::string& tool,
@@ -101,6 +102,8 @@ class CompensatedModel {
   };
   /// Restores the biases that `parts` have; `then`: the physics that they were learned beside.
   [[nodiscard]] static Status restore_biases(const Parts& parts, const BiasPhysics& then, Inside* inside);
+  /// Whether the bias holds for this tool and payload.
+  [[nodiscard]] bool learned_with(const std::string& tool, const std::string& payload) const;
   /// What the biases say at a pose.
   struct Learned {
     BiasPrediction position;

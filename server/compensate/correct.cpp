@@ -108,7 +108,7 @@ std::string why_not(const Chain& robot, const InverseResult& joints, const std::
 
 /// The message of a target out of domain.
 std::string corrected_by(const std::optional<BiasModel>& bias, double weight) {
-  const bool has_blocks = bias && bias->needs_features();
+  const bool has_blocks = bias && bias->has_blocks();
   return fmt::format("too far from the training poses: corrected by the calibrated model{} and {:.0f} % of {}",
                      has_blocks ? ", the blocks of the bias" : "", 100 * weight,
                      has_blocks ? "its kernel" : "the learned bias");

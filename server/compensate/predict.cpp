@@ -28,7 +28,8 @@ void share_as_learned(const BiasModel& bias, const BiasPhysics& then, const std:
   bool moved = false;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     as_learned.push_back(then.at(poses[i]));
-    moved = moved || as_learned.back().by_parameter != now[i].by_parameter;
+    moved =
+        moved || as_learned.back().by_parameter != now[i].by_parameter || as_learned.back().lever_F != now[i].lever_F;
   }
   if (!moved) return;
   const std::vector<BiasPrediction> known = bias.predict_all(q, as_learned);
@@ -107,6 +108,7 @@ Vector3 taken(const Vector3& mean_B, const Vector3& nearby_B, double weight) {
 
 Vector3 taken(const BiasModel& bias, const JointVector& q, const BiasFeatures& features, double weight) {
   const Vector3 mean_B = bias.mean_B(q, features);
+  if (!bias.has_blocks()) return weight * mean_B;
   return weight == 1 ? mean_B : taken(mean_B, bias.nearby_mean_all_B(q.transpose()).row(0), weight);
 }
 
@@ -225,7 +227,7 @@ Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const Bi
                  .unlearned = unlearned(pose),
                  .growth = 0,
                  .bias_size = inside_->bias_size_B};
-  if (inside_->bias->needs_features()) {
+  if (inside_->bias->has_blocks()) {
     // With blocks the slope is of what the bias misses beyond its own covariance; else it is of the physics.
     of.unlearned = of.metrology;
     of.growth = pose.growth;
@@ -259,7 +261,7 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   prediction.X_BT_predicted = pose.X_BW * physics.pose_W(context, physics.values, &pose.J_W);
   const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
   const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
-  const bool trained_with = parts().trained_with.contains({context.tool, context.payload});
+  const bool trained_with = learned_with(context.tool, context.payload);
   prediction.in_domain = trained_with && domain.in_range(context.q);
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 

@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "server/base/check.h"
+#include "server/bias/choose_bias.h"
 
 namespace trammel {
 namespace {
@@ -13,11 +14,19 @@ constexpr std::size_t kRest = 256 * 1024;      // bytes of a model that do not g
 constexpr std::size_t kOfAPose = 2 * 1024;     // bytes of one pose besides the variances
 constexpr std::size_t kMostOfAnExpert = 1200;  // poses
 
+/// Of a bias at the flange, at most: one matrix of all its numbers.
+std::size_t bytes_at_flange(std::size_t poses) {
+  const std::size_t numbers = std::min(3 * poses, static_cast<std::size_t>(kMostFlangeNumbers));
+  return numbers * numbers * sizeof(double);
+}
+
 }  // namespace
 
 std::size_t bytes_of(const CompensatedModel& model) {
   if (!model.bias()) return kRest;
   const auto poses = static_cast<std::size_t>(model.bias()->state().q.rows());
+  if (model.bias()->needs_features() && !model.bias()->has_blocks())
+    return kRest + poses * kOfAPose + bytes_at_flange(poses) + 3 * poses * std::min(poses, kMostOfAnExpert) * 4;
   const std::size_t outputs = model.parts().rotation_bias ? 6 : 3;
   const std::size_t triangle = poses * std::min(poses, kMostOfAnExpert) / 2 * sizeof(double);
   const std::size_t triangles = outputs * (model.bias()->needs_features() ? 2 : 1);

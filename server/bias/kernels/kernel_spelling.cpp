@@ -17,6 +17,8 @@ constexpr std::size_t kMostShownBytes = 80;       // of a spelling in a message
 constexpr std::size_t kMostWords =
     32;  // the search for their hyperparameters takes more than twice as long for twice as many
 
+constexpr std::string_view kFlange = "flange";
+
 const std::array<LinearBlockPtr, 2>& known_blocks() {
   static const std::array<LinearBlockPtr, 2> known = {make_joint_map_block(), make_parameter_block()};
   return known;
@@ -51,7 +53,14 @@ class Reader {
     SpelledBias bias;
     do {
       const std::string_view before = rest_;
-      const LinearBlockPtr block = find_block(word());
+      const std::string_view first = word();
+      if (first == kFlange) {
+        if (bias.flange) return twice(kFlange);
+        if (take('*') || take('(')) return misplaced(kFlange);
+        bias.flange = true;
+        continue;
+      }
+      const LinearBlockPtr block = find_block(first);
       if (!block) {
         rest_ = before;
         auto part = product();
@@ -59,15 +68,19 @@ class Reader {
         parts.push_back(*std::move(part));
         continue;
       }
-      if (bias.has(block->name()))
-        return refused("bias kernel `{}`: `{}` is named twice", shown_, block->name()).of("bias").with_text(all_);
+      if (bias.has(block->name())) return twice(block->name());
       if (take('*') || take('(')) return misplaced(block->name());
       bias.blocks.push_back(block);
     } while (take('+'));
     skip_space();
     if (!rest_.empty()) return expected("`+`, `*` or the end");
+    if (bias.flange && !bias.blocks.empty())
+      return refused("bias kernel `{}`: `flange` and `{}` do not stand together; the block sees levers by itself",
+                     shown_, bias.blocks.front()->name())
+          .of("bias")
+          .with_text(all_);
     if (parts.empty()) {
-      const std::string_view block = bias.blocks.front()->name();
+      const std::string_view block = bias.flange ? kFlange : bias.blocks.front()->name();
       return refused("bias kernel `{}`: a kernel is expected beside `{}`, for instance `se + {}`", shown_, block, block)
           .of("bias")
           .with_text(all_);
@@ -110,17 +123,21 @@ class Reader {
   Result<KernelPtr> leaf() {
     const std::string_view name = word();
     if (name.empty()) return expected("a kernel");
-    if (find_block(name)) return misplaced(name);
+    if (name == kFlange || find_block(name)) return misplaced(name);
     KernelPtr kernel = make_leaf_kernel(name);
     if (!kernel)
       return refused("bias kernel `{}`: `{}` is unknown", shown_, shown_short(name))
           .of("bias")
           .with_text(name)
-          .next(fmt::format("known are none and auto (alone), {}, and to be added joint_map, parameters",
+          .next(fmt::format("known are none and auto (alone), {}, and to be added joint_map, parameters, flange",
                             kernel_names()));
     if (!take('(')) return kernel;
     if (word() != "sincos" || !take(')')) return expected(fmt::format("`{}(sincos)`", name));
     return make_sincos_kernel(std::move(kernel));
+  }
+
+  Failure twice(std::string_view word) const {
+    return refused("bias kernel `{}`: `{}` is named twice", shown_, word).of("bias").with_text(all_);
   }
 
   Failure misplaced(std::string_view block) const {
@@ -193,6 +210,19 @@ bool SpelledBias::has(std::string_view block) const {
 
 Result<SpelledBias> spelled_bias(std::string_view spelling) {
   return check_length(spelling).and_then([&] { return Reader(spelling).bias(); });
+}
+
+std::string without_flange(std::string_view spelling) {
+  std::string rest;
+  while (!spelling.empty()) {
+    const std::size_t end = std::min(spelling.find('+'), spelling.size());
+    std::string_view part = spelling.substr(0, end);
+    part.remove_prefix(std::min(part.find_first_not_of(" \t"), part.size()));
+    part = part.substr(0, part.find_last_not_of(" \t") + 1);
+    spelling.remove_prefix(std::min(end + 1, spelling.size()));
+    if (part != kFlange) rest.append(rest.empty() ? "" : " + ").append(part);
+  }
+  return rest;
 }
 
 Status check_bias_spelling(std::string_view spelling) {

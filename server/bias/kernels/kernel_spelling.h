@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -18,13 +19,19 @@ namespace trammel {
 struct SpelledBias {
   KernelPtr kernel;                    ///< of each coordinate by itself
   std::vector<LinearBlockPtr> blocks;  ///< whose weights the coordinates share
+  bool flange = false;                 ///< the kernel is of the flange's error, seen through the tool's lever
+  /// Whether it must be told more of a pose than its joints.
+  [[nodiscard]] bool needs_features() const { return flange || !blocks.empty(); }
   [[nodiscard]] bool has(std::string_view block) const;
 };
 
-/// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 + joint_map`. Refuses
-/// what spelled_kernel() refuses, and a block that stands in a product or in parentheses, comes twice, or has no kernel
-/// beside it.
+/// A kernel as above, to which the blocks `joint_map` and `parameters` may be added: `matern52 + joint_map`; or the
+/// word `flange` (flange/README.md): `se + flange`. Refuses what spelled_kernel() refuses; a block that stands in a
+/// product or in parentheses, comes twice, or has no kernel beside it; and `flange` beside a block.
 [[nodiscard]] Result<SpelledBias> spelled_bias(std::string_view spelling);
+
+/// The same without the word `flange`: a rotation is the same at every lever.
+[[nodiscard]] std::string without_flange(std::string_view spelling);
 
 /// Whether a bias may be written so: as above, `none`, or `auto` (choose_bias.h).
 [[nodiscard]] Status check_bias_spelling(std::string_view spelling);

@@ -13,8 +13,10 @@ namespace trammel {
 
 /// How the tool moves when the arm changes a little. Rows: position (m), rotation vector (rad), both in B.
 struct BiasFeatures {
-  Eigen::MatrixXd by_joint;      ///< 6 x n, per rad that the joint gives way; zero for a prismatic joint
-  Eigen::MatrixXd by_parameter;  ///< 6 x P, per prior standard deviation of the parameter
+  Eigen::MatrixXd by_joint;            ///< 6 x n, per rad that the joint gives way; zero for a prismatic joint
+  Eigen::MatrixXd by_parameter;        ///< 6 x P, per prior standard deviation of the parameter
+  Vector3 lever_F = Vector3::Zero();   ///< m: the tool's point, seen from the flange
+  Matrix3 R_BF = Matrix3::Identity();  ///< how the flange stands
 };
 
 /// One block of columns of H. A value without state: its hyperparameters are passed in as natural logarithms.

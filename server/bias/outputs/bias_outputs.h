@@ -8,7 +8,7 @@
 #include "server/bias/coupled/coupled_search.h"
 #include "server/bias/kernels/kernel_spelling.h"
 
-/// What a BiasModel predicts with: D outputs that are silent, independent, or coupled by blocks.
+/// What a BiasModel predicts with: D outputs that are silent, independent, coupled by blocks, or seen at the flange.
 namespace trammel {
 
 /// Outputs that share a unit: the coordinates of a position, or of a rotation.
@@ -92,5 +92,14 @@ using BiasOutputsPtr = std::shared_ptr<const BiasOutputs>;
                                                                         const Eigen::VectorXd& metrology_stddev,
                                                                         const SearchOptions& options,
                                                                         const CoupledHyperparameters* last);
+
+/// Outputs that are the error of the flange, seen through the levers of `features`. Of the kernel alone. Null when the
+/// covariance is not positive definite.
+[[nodiscard]] BiasOutputsPtr condition_flange(const KernelPtr& kernel, const OutputData& data,
+                                              const CoupledHyperparameters& at);
+[[nodiscard]] std::optional<CoupledSearchResult> search_flange_outputs(const KernelPtr& kernel, const OutputData& data,
+                                                                       const Eigen::VectorXd& metrology_stddev,
+                                                                       const SearchOptions& options,
+                                                                       const CoupledHyperparameters* last);
 
 }  // namespace trammel

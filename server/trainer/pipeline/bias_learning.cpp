@@ -119,7 +119,7 @@ Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBa
   }
   const Result<SpelledBias> spelled = spelled_bias(options.kernel);
   if (!spelled) return tl::make_unexpected(spelled.error());
-  BiasProblem problem = problem_of(parts, batch, !spelled->blocks.empty());
+  BiasProblem problem = problem_of(parts, batch, spelled->needs_features());
   Result<BiasModel> fitted = BiasModel::fit(problem, options);
   if (!fitted) return tl::make_unexpected(fitted.error());
   return Learned{std::move(problem), std::move(*fitted)};
@@ -130,8 +130,8 @@ void take_over(CompensatedModel::Parts& parts, const BiasModel& bias, const Meas
                const LeftOut& left_out) {
   parts.bias = bias.state();
   parts.bias->features.clear();
+  if (bias.has_blocks()) parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, bias);
   if (bias.needs_features()) {
-    parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, bias);
     for (const Measurement& m : batch.measurements) parts.bias_contexts.push_back(m.context);
   }
   parts.prior_share_limit = domain_limit(bias);
@@ -164,7 +164,7 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   if (!learned) return tl::make_unexpected(learned.error());
   if (!learned->bias) return {};
   take_over(parts, *learned->bias, batch, left_out);
-  options.kernel = learned->bias->state().kernel;
+  options.kernel = without_flange(learned->bias->state().kernel);
   options.progress = [&](double share) { return progress(0.6 + 0.4 * share); };
   return add_rotation_bias(parts, batch, learned->problem, options);
 }

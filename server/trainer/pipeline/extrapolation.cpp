@@ -105,7 +105,7 @@ JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot) {
 }
 
 JointVector extrapolation_slope(const LeftOut& poses, const Chain& robot, const BiasModel& bias) {
-  TRAMMEL_CHECK(bias.needs_features() && bias.state().q.rows() == poses.size());
+  TRAMMEL_CHECK(bias.has_blocks() && bias.state().q.rows() == poses.size());
   const auto beyond_blocks =
       slope_of(poses, robot, [&](const LeftOut::Without& anew, const auto& asked, const auto& rest) {
         return surplus_of_blocks(bias.state(), anew, asked, rest);

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "server/bias/kernels/linear_block.h"
+
+/// The arm's error at the flange, seen through levers (README.md).
+namespace trammel {
+
+/// Of the six numbers of a twist [position; rotation], each row a number that was seen of it.
+using TwistRows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6>;
+/// What one coordinate of each row sees of the twist.
+using TwistRow = Eigen::Matrix<double, 3, 6>;
+
+/// All rows of one joint vector, brought to as few numbers as tell the same of the twist: rows / sqrt(noise shape) =
+/// basis (view twist + noise of unit shape) + what no twist explains.
+struct FlangeView {
+  std::vector<Eigen::Index> rows;  ///< of the observations, rising
+  TwistRows view;                  ///< r x 6, r <= 6
+  Eigen::MatrixXd basis;           ///< 3 rows x r, orthonormal columns
+  Eigen::Index first = 0;          ///< place of its r numbers among those of all views
+};
+
+struct FlangeViews {
+  Eigen::MatrixXd q;                      ///< M x n: each joint vector once, rad
+  std::vector<FlangeView> views;          ///< M
+  Eigen::Index size = 0;                  ///< numbers of all views
+  Eigen::VectorXd noise_shape;            ///< N, of the observations
+  std::vector<TwistRow> seen;             ///< N
+  Vector3 reference_F = Vector3::Zero();  ///< where the position part of the twist is: the mean lever
+};
+
+/// How an observation sees the twist at `reference_F`: [I  -[R_BF (lever - reference)]x].
+[[nodiscard]] TwistRow seen_through(const BiasFeatures& features, const Vector3& reference_F);
+/// Whether not all levers are the same, to a millimetre.
+[[nodiscard]] bool has_several_levers(const std::vector<BiasFeatures>& features);
+
+/// Rows with the same joints become one view.
+[[nodiscard]] FlangeViews views_of(const Eigen::MatrixXd& q, const Eigen::VectorXd& noise_shape,
+                                   const std::vector<BiasFeatures>& features);
+/// These views alone.
+[[nodiscard]] FlangeViews some_of(const FlangeViews& all, const std::vector<Eigen::Index>& views);
+
+/// `y` (N x 3) as the views have it: their numbers, and the square of what no twist explains.
+struct SeenNumbers {
+  Eigen::VectorXd of_twist;  ///< size
+  double beside = 0;
+  Eigen::Index beside_freedom = 0;  ///< coordinates beyond the numbers
+  double log_shape = 0;             ///< of the noise shapes of all coordinates, summed
+};
+[[nodiscard]] SeenNumbers numbers_of(const FlangeViews& views, const Eigen::MatrixXd& y);
+/// The coordinates of the rows of a view, each over the root of its noise shape.
+[[nodiscard]] Eigen::VectorXd even_rows(const FlangeViews& views, const FlangeView& view, const Eigen::MatrixXd& y);
+
+}  // namespace trammel
