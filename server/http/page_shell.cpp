@@ -32,7 +32,7 @@ constexpr std::string_view kStyle = R"(
     tr { padding: 8px 0; border-bottom: 1px solid var(--line); } td { border: 0; padding: 1px 0 1px 8px; }
     td[title]:not([title=""]):not(:empty)::before { content: attr(title) ": "; color: var(--soft); font-weight: 400; }
   }
-  @media print { nav { display: none; } .wide { overflow: visible; } a { color: inherit; text-decoration: none; } }
+  @media print { nav { display: none; } td { min-width: 11ch; } .wide { overflow: visible; } a { color: inherit; text-decoration: none; } }
 )";
 
 constexpr std::string_view kWayBackStyle = R"(

@@ -1,6 +1,7 @@
 #include "server/report/model_parameters.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/base/coverage.h"
 #include "server/base/units.h"
@@ -12,6 +13,7 @@ namespace trammel {
 namespace {
 
 constexpr int kColumns = 7;
+constexpr double kSmallestShown = 1e-7;  // mm, deg: of an uncertainty without powers of ten
 
 HtmlRow source_row(const ErrorSource& source) {
   return {
@@ -56,6 +58,14 @@ Reading reading_of(const Parameter& parameter) {
                                  : Reading{parameter.scale, parameter.unit};
 }
 
+/// To two digits of the uncertainty, without powers of ten for what people read in mm and degrees.
+ShownValue shown_as(double value, double u95, const std::string& unit) {
+  const bool plain = (unit == "mm" || unit == "deg") && u95 > kSmallestShown && std::isfinite(u95);
+  if (!plain) return show_with_uncertainty(value, u95);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(u95))));
+  return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", u95, decimals)};
+}
+
 HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source, const IdentifiedParameter& identified) {
   const Parameter& parameter = identified.parameter;
   const auto [scale, unit] = reading_of(parameter);
@@ -63,9 +73,9 @@ HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source, 
   const double nominal = drawn.value_or(parameter.prior);
   const double correction = drawn ? identified.value : identified.value - parameter.prior;
   const double u95 = kExpanded * scale * identified.stddev;
-  const ShownValue shown = show_with_uncertainty(scale * correction, u95);
+  const ShownValue shown = shown_as(scale * correction, u95, unit);
   return {.cells = {html_text(parameter.name), fmt::format("{:.7g}", scale * nominal), shown.value,
-                    show_with_uncertainty(scale * (nominal + correction), u95).value, shown.expanded, html_text(unit),
+                    shown_as(scale * (nominal + correction), u95, unit).value, shown.expanded, html_text(unit),
                     identified.identified ? "" : "not identified by itself"},
           .kind = identified.identified ? "" : "unknown"};
 }

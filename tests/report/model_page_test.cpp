@@ -215,6 +215,7 @@ TEST_F(ModelPage, TellsOfEveryLengthWhatIsDrawnByHowMuchItIsOffAndWhatItIs) {
     while (cells.get(skip) && skip != '>') {
     }
   };
+  EXPECT_EQ(page.substr(from, 200).find("e-0"), std::string::npos) << page.substr(from, 200);
   number(&nominal);
   number(&correction);
   number(&result);
