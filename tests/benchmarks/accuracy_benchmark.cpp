@@ -4,7 +4,7 @@
 // --models N: less of it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <iostream>
+#include <cstdio>
 #include <random>
 
 #include "server/base/units.h"
@@ -93,7 +93,7 @@ void promised(int models) {
     fmt::print("  model {:2}: {:3} poses, {}, bias {}: {:.4f} mm ({:.4f} to {:.4f}), right at {:.1f} %\n", number,
                one.poses, one.kind, model.parts().bias ? model.parts().bias->kernel : "none", to_mm(radius),
                to_mm(accuracy.least()), to_mm(accuracy.most()), 100 * shares.back());
-    std::cout.flush();
+    std::fflush(stdout);
   }
   double sum = 0;
   for (const double share : shares) sum += share;
