@@ -237,9 +237,9 @@ ServicePage fleet_page(const Watched& server) {
   const auto running = server.trainer.unfinished_jobs().size();
   const std::string body =
       section("Now", fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run.</p><p class=\"note\">{} {}, read "
-                                 "at {} UTC, again every {} s.</p>",
+                                 "again every {} s.</p>",
                                  verdict, still, html_link("/jobs", "Jobs"), running, html_text(server.server_id),
-                                 html_text(server.program_version), shown_time(unix_now()), kLiveAgain)) +
+                                 html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
       section("Cells",
               table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));

@@ -6,7 +6,9 @@
 #include <ctime>
 #include <string_view>
 
+#include "server/base/unix_time.h"
 #include "server/report/html.h"
+#include "server/report/page_parts.h"
 #include "server/report/page_policy.h"
 
 namespace trammel {
@@ -14,34 +16,23 @@ namespace {
 
 constexpr const char* kHtml = "text/html; charset=utf-8";
 
-/// The pages' own style, the same as that of the reports.
+/// What the pages of the service have beside the style of all pages.
 constexpr std::string_view kStyle = R"(
-  :root { --ink: #1d2733; --soft: #5d6b7a; --line: #dde3ea; --mark: #2f6fb2; --good: #1f6f4a; --dark: #9a3412; }
-  * { box-sizing: border-box; }
-  body { margin: 0; background: #f4f6f8; color: var(--ink); font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-  main { max-width: 1080px; margin: 0 auto; padding: 24px 24px 64px; }
-  h1 { font-size: 26px; margin: 0 0 16px; overflow-wrap: anywhere; }
-  h2 { font-size: 18px; margin: 0 0 12px; }
-  section { background: #fff; border: 1px solid var(--line); border-radius: 8px; padding: 20px 24px; margin-bottom: 20px; }
+  :root { --good: #007a59; --dark: #b23c00; }
+  h1 { margin-bottom: 16px; }
   .wide { overflow-x: auto; }
   a { color: var(--mark); }
-  table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-  th { text-align: left; color: var(--soft); font-weight: 600; }
-  th, td { padding: 5px 12px 5px 0; border-bottom: 1px solid var(--line); vertical-align: top; overflow-wrap: break-word; }
-  tr:last-child td { border-bottom: 0; }
+  td { overflow-wrap: break-word; }
   .now td { font-weight: 600; }
   .dark td:first-child { border-left: 4px solid var(--dark); padding-left: 8px; }
   .served td:first-child { border-left: 4px solid var(--good); padding-left: 8px; }
   .verdict { font-size: 17px; margin: 0 0 8px; }
-  p, ul { margin: 8px 0; overflow-wrap: anywhere; }
-  .note { color: var(--soft); font-size: 14px; }
-  @media (max-width: 760px) {
-    main { padding: 16px 8px; } section { padding: 12px; } body { font-size: 14px; }
+  @media screen and (max-width: 760px) {
     table, tbody, tr, td { display: block; } thead { display: none; } td { overflow-wrap: anywhere; }
     tr { padding: 8px 0; border-bottom: 1px solid var(--line); } td { border: 0; padding: 1px 0 1px 8px; }
-    td[title]:not(:empty)::before { content: attr(title) ": "; color: var(--soft); font-weight: 400; }
+    td[title]:not([title=""]):not(:empty)::before { content: attr(title) ": "; color: var(--soft); font-weight: 400; }
   }
-  @media print { body { background: #fff; } nav { display: none; } tr { break-inside: avoid; } }
+  @media print { nav { display: none; } td { min-width: 11ch; } .wide { overflow: visible; } a { color: inherit; text-decoration: none; } }
 )";
 
 constexpr std::string_view kWayBackStyle = R"(
@@ -52,7 +43,8 @@ constexpr std::string_view kWayBackStyle = R"(
 
 std::string way_back(const std::string& cell) {
   std::string links = html_link("/", "Cells") + html_link("/jobs", "Jobs");
-  if (!cell.empty()) links += html_link(cell_address(cell), cell);
+  if (!cell.empty())
+    links += html_link(cell_address(cell), cell) + html_link(cell_address(cell) + "/history", "History");
   return "<nav class=\"service\">" + links + "</nav>";
 }
 
@@ -85,18 +77,21 @@ HttpReply html_reply(int code, std::string html, std::string policy) {
 }  // namespace
 
 HttpReply page_reply(const ServicePage& page, int code) {
-  static const std::string kPolicy = content_policy({{}, {std::string(kStyle), std::string(kWayBackStyle)}});
+  static const std::string kPolicy =
+      content_policy({{}, {std::string(page_style()), std::string(kStyle), std::string(kWayBackStyle)}});
   const std::string again =
       page.again_after > 0 ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">\n", page.again_after) : "";
   const std::string title = html_text(page.title);
-  return html_reply(code,
-                    fmt::format("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                                "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-                                "<link rel=\"icon\" href=\"data:,\">\n{}"
-                                "<title>{}</title>\n<style>{}</style>\n<style>{}</style>\n</head>\n<body>\n{}\n<main>\n"
-                                "<h1>{}</h1>\n{}\n</main>\n</body>\n</html>\n",
-                                again, title, kStyle, kWayBackStyle, way_back(""), title, page.body),
-                    kPolicy);
+  return html_reply(
+      code,
+      fmt::format(
+          "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+          "<link rel=\"icon\" href=\"data:,\">\n{}"
+          "<title>{}</title>\n<style>{}</style>\n<style>{}</style>\n<style>{}</style>\n</head>\n<body>\n{}\n<main>\n"
+          "<h1>{}</h1>\n{}\n<p class=\"note\">Read at {} UTC.</p>\n</main>\n</body>\n</html>\n",
+          again, title, page_style(), kStyle, kWayBackStyle, way_back(""), title, page.body, shown_time(unix_now())),
+      kPolicy);
 }
 
 HttpReply report_reply(const std::string& page, const std::string& cell) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "server/http/check_page.h"
 #include "server/http/live_pages.h"
 #include "server/http/page_shell.h"
 #include "server/report/html.h"
@@ -35,13 +36,14 @@ std::optional<Number> number_in(const std::string& word) {
   return number;
 }
 
-/// What a diagnosis or a check found: its page, or its findings as they are.
-HttpReply findings_reply(const Watched& server, std::int64_t job) {
+/// What a diagnosis or a check found: a page, or as programs read it.
+HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_programs) {
   const auto asked = server.store.job(job);
   if (!asked) return refused_reply(asked.error());
   const auto found = server.trainer.diagnosis(job);
   if (!found) return refused_reply(found.error());
-  if (!found->page.empty()) return stored_page_reply(found->page, asked->cell);
+  if (!for_programs && !found->page.empty()) return stored_page_reply(found->page, asked->cell);
+  if (!for_programs && asked->kind == JobKind::kCheck) return page_reply(check_page(found->findings, asked->cell, job));
   return {200, "application/json", found->findings};
 }
 
@@ -80,7 +82,8 @@ HttpReply Pages::of_job(const HttpAsk& ask) {
   const auto job = number_in<std::int64_t>(path[1]);
   if (!job || path.size() > 3) return not_there();
   if (path.size() == 2) return reply_of(job_page(server_, *job));
-  return path[2] == "findings" ? findings_reply(server_, *job) : not_there();
+  if (path[2] == "findings") return findings_reply(server_, *job, false);
+  return path[2] == "findings.json" ? findings_reply(server_, *job, true) : not_there();
 }
 
 std::optional<HttpReply> Pages::find_kept(const std::string& address) {

@@ -10,6 +10,7 @@
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
+#include "server/report/page_parts.h"
 #include "server/report/shown_value.h"
 
 namespace trammel {
@@ -309,12 +310,20 @@ std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
   return html_rows(rows);
 }
 
+/// ` · measured 2026-11-22`; empty where it is not known.
+std::string measured_on(const Diagnosis& diagnosis) {
+  const auto& at = diagnosis.batch.measured_at;
+  return at ? " · measured " + shown_day(*at) : "";
+}
+
 }  // namespace
 
 std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
   return fill_in(embedded::diagnosis_page_html,
-                 {{"title", html_text(fmt::format("Cell {}: what batch {} says", cell.name, diagnosis.batch.id))},
-                  {"subtitle", html_text(fmt::format("{} · {} poses", cell.robot.name(), diagnosis.poses))},
+                 {{"page_css", std::string(page_style())},
+                  {"title", html_text(fmt::format("Cell {}: what batch {} says", cell.name, diagnosis.batch.id))},
+                  {"subtitle", html_text(fmt::format("{} · {} poses{}", cell.robot.name(), diagnosis.poses,
+                                                     measured_on(diagnosis)))},
                   {"verdict", std::string(to_string(diagnosis.verdict))},
                   {"sentence", html_text(diagnosis.sentence)},
                   {"tiles", tiles(diagnosis)},

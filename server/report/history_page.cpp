@@ -8,6 +8,7 @@
 #include "server/report/embedded.h"
 #include "server/report/history.h"
 #include "server/report/html.h"
+#include "server/report/page_parts.h"
 #include "server/report/shown_value.h"
 
 namespace trammel {
@@ -178,7 +179,8 @@ std::string verdict(const CellHistory& history, const std::vector<Moved>& moved)
 std::string history_page(const CellHistory& history) {
   const std::vector<Moved> moved = moved_parameters(history);
   const std::string title = "History of cell " + html_text(history.cell);
-  return fill_in(embedded::history_page_html, {{"title", title},
+  return fill_in(embedded::history_page_html, {{"page_css", std::string(page_style())},
+                                               {"title", title},
                                                {"verdict", verdict(history, moved)},
                                                {"versions", version_table(history)},
                                                {"trainings", training_table(history)},

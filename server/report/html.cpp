@@ -54,7 +54,8 @@ std::string html_head(const std::vector<std::string>& names) {
 }
 
 std::string html_table(const HtmlTable& table) {
-  return fmt::format("<table{}>\n{}{}</table>", class_of(table.kind), html_head(table.head), html_rows(table.rows));
+  return fmt::format("<table{}>\n{}{}</table>", class_of(table.kind), table.head.empty() ? "" : html_head(table.head),
+                     html_rows(table.rows));
 }
 
 std::string script_json(const nlohmann::ordered_json& data) {

@@ -23,8 +23,8 @@ struct HtmlRow {
 [[nodiscard]] std::string html_head(const std::vector<std::string>& names);
 
 struct HtmlTable {
-  std::string kind = {};  ///< class for the style sheet; empty: none
-  std::vector<std::string> head;
+  std::string kind = {};          ///< class for the style sheet; empty: none
+  std::vector<std::string> head;  ///< empty: no row of names
   std::vector<HtmlRow> rows;
 };
 [[nodiscard]] std::string html_table(const HtmlTable& table);

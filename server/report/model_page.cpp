@@ -7,24 +7,24 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
 #include "server/report/html.h"
+#include "server/report/model_parameters.h"
+#include "server/report/model_poses.h"
+#include "server/report/model_promise.h"
+#include "server/report/model_scene.h"
+#include "server/report/page_parts.h"
 #include "server/report/session_changes_json.h"
-#include "server/report/shown_value.h"
 
 namespace trammel {
 
 namespace {
 
 using nlohmann::ordered_json;
-
-constexpr double kFewestBins = 12;    // of a histogram
-constexpr double kLeastError = 1e-6;  // mm: the histogram of a model without any error is that wide
 
 /// What the page compares the model with.
 struct Compared {
@@ -193,50 +193,6 @@ std::string provenance_rows(const CompensatedModel& model, const Evaluation& eva
   return html_rows(rows);
 }
 
-HtmlRow source_row(const ErrorSource& source) {
-  return {
-      .cells = {fmt::format("{} <span>{}</span>", html_text(in_words(source.name())), html_text(source.explanation()))},
-      .kind = "cause",
-      .last_spans = 5};
-}
-
-HtmlRow parameter_row(const IdentifiedParameter& identified) {
-  const Parameter& parameter = identified.parameter;
-  const ShownValue shown =
-      show_with_uncertainty(parameter.scale * identified.value, kExpanded * parameter.scale * identified.stddev);
-  return {.cells = {html_text(parameter.name), shown.value, shown.expanded, html_text(parameter.unit),
-                    identified.identified ? "" : "not identified by itself"},
-          .kind = identified.identified ? "" : "unknown"};
-}
-
-std::string parameter_table(const CompensatedModel& model) {
-  const CompensatedModel::Parts& parts = model.parts();
-  if (parts.parameters.empty()) return "<p>Nothing: the model is the nominal robot.</p>\n";
-  std::vector<HtmlRow> rows;
-  std::size_t next = 0;
-  for (const ErrorSourcePtr& source : parts.physics.sources) {
-    rows.push_back(source_row(*source));
-    for (std::size_t k = 0; k < source->parameters().size(); ++k)
-      rows.push_back(parameter_row(parts.parameters[next++]));
-  }
-  return html_table({"parameters", {"parameter", "value", "U (k = 2)", "unit", ""}, rows}) + "\n";
-}
-
-std::string unidentifiable_text(const CompensatedModel::Parts& parts) {
-  if (parts.unidentifiable.empty()) {
-    return parts.parameters.empty() ? "<p>Nothing was asked of them.</p>\n"
-                                    : "<p>Nothing: every combination of parameters shows in them.</p>\n";
-  }
-  std::string html = fmt::format(
-      "<p>{} of {} directions in parameter space are determined. In the others the measurements say less than what was "
-      "believed before, so the model keeps that belief:</p>\n<ul>\n",
-      parts.rank, parts.parameters.size());
-  for (const UnidentifiableCombination& combination : parts.unidentifiable) {
-    html += "<li>" + html_text(combination.sentence) + "</li>\n";
-  }
-  return html + "</ul>\n";
-}
-
 std::string suspects_text(const CompensatedModel::Parts& parts) {
   if (parts.suspects.empty()) return "<p>None: every pose fits the others.</p>\n";
   std::vector<HtmlRow> rows;
@@ -248,67 +204,9 @@ std::string suspects_text(const CompensatedModel::Parts& parts) {
          html_table({"", {"pose", "row", "off by, mm", "sigma"}, rows}) + "\n";
 }
 
-/// |error| of each pose, mm, at two levels.
-struct PoseErrors {
-  std::vector<double> calibrated, compensated;
-  std::string title;
-};
-
-PoseErrors errors_of(const CompensatedModel& model, const MeasurementBatch& batch) {
-  PoseErrors errors{{}, {}, fmt::format("Poses of batch {} by their error", batch.id)};
-  const CompensatedModel::LevelErrors levels = model.errors_B(batch);
-  for (Eigen::Index i = 0; i < levels.calibrated.cols(); ++i) {
-    errors.calibrated.push_back(to_mm(levels.calibrated.col(i).norm()));
-    errors.compensated.push_back(to_mm(levels.compensated.col(i).norm()));
-  }
-  return errors;
-}
-
-/// What each training pose would show if it were new: the bias predicts it from all the others.
-PoseErrors errors_of_training(const BiasModel& bias) {
-  PoseErrors errors{{}, {}, "Training poses by their error, each left out of the bias"};
-  const BiasState& state = bias.state();
-  const Eigen::MatrixXd left = state.residual_B - bias.leave_one_out_mean_B();
-  for (Eigen::Index i = 0; i < left.rows(); ++i) {
-    errors.calibrated.push_back(to_mm(state.residual_B.row(i).norm()));
-    errors.compensated.push_back(to_mm(left.row(i).norm()));
-  }
-  return errors;
-}
-
-/// The largest of 1, 2, 5, 10, 20... that is not above `limit`, which is positive.
-double round_width(double limit) {
-  const double power = std::pow(10, std::floor(std::log10(limit)));
-  for (const double digit : {5., 2.}) {
-    if (digit * power <= limit) return digit * power;
-  }
-  return power;
-}
-
-ordered_json histogram_json(const PoseErrors& errors) {
-  double largest = kLeastError;
-  for (const double error : errors.calibrated) largest = std::max(largest, error);
-  for (const double error : errors.compensated) largest = std::max(largest, error);
-  const double width = round_width(largest / kFewestBins);
-  const std::size_t bins = static_cast<std::size_t>(largest / width) + 1;
-  const auto counts = [&](const std::vector<double>& values) {
-    std::vector<int> counted(bins, 0);
-    for (const double value : values) ++counted[static_cast<std::size_t>(value / width)];
-    return counted;
-  };
-  std::vector<std::string> labels;
-  for (std::size_t bin = 0; bin < bins; ++bin) {
-    labels.push_back(fmt::format("{:.3g}", (static_cast<double>(bin) + 0.5) * width));
-  }
-  return {{"title", errors.title},
-          {"labels_mm", labels},
-          {"calibrated", counts(errors.calibrated)},
-          {"compensated", counts(errors.compensated)}};
-}
-
 /// What the charts are drawn from.
-ordered_json chart_data(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch,
-                        const Evaluation& evaluation) {
+ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluation, const ShownPoses& shown,
+                        const std::optional<LearningCurve>& curve) {
   ordered_json data;
   if (is_doubtful(evaluation)) data["doubtful"] = true;
   data["levels"] = ordered_json::object();
@@ -316,35 +214,54 @@ ordered_json chart_data(const CompensatedModel& model, const std::optional<Measu
     if (evaluation.poses == 0) break;
     data["levels"][level] = {to_mm(figures->rms), to_mm(figures->mean), to_mm(figures->p997), to_mm(figures->max)};
   }
-  const auto& bias = model.bias();
-  if (batch) {
-    data["histogram"] = histogram_json(errors_of(model, *batch));
-  } else if (bias) {
-    data["histogram"] = histogram_json(errors_of_training(*bias));
+  const auto put = [&](const char* key, const ordered_json& value) {
+    if (!value.is_null()) data[key] = value;
+  };
+  put("histogram", histogram_json(shown));
+  put("coverage", coverage_json(shown));
+  put("scene", scene_json(model, shown));
+  if (curve) {
+    std::vector<double> error_mm;
+    for (const double error : curve->error) error_mm.push_back(to_mm(error));
+    data["learning"] = {{"what", curve->what}, {"poses", curve->poses}, {"error_mm", error_mm}};
   }
   return data;
+}
+
+std::string learning_text(const std::optional<LearningCurve>& curve) {
+  return curve ? "<p>" + html_text(curve->sentence) + "</p>"
+               : "<p>Not known: there are too few poses to leave some out, or too many to do it for a page.</p>";
 }
 
 }  // namespace
 
 std::string model_page(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
   const Compared compared = compared_with(model, batch);
+  const std::optional<PositionAccuracy> accuracy = PositionAccuracy::of(model, batch);
+  const ShownPoses shown = poses_to_show(model, batch);
+  const std::optional<LearningCurve> curve = learning_curve(model);
   const std::string title = html_text(fmt::format("Cell {}: model {}", model.cell().name, model.provenance().id));
   return fill_in(embedded::model_page_html,
                  {{"title", title},
                   {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
                                                      date_of(model.provenance().trained_at)))},
+                  {"promise", html_text(promise_sentence(model, accuracy))},
+                  {"certificate", certificate(model, accuracy, batch)},
                   {"tiles", tiles(compared.evaluation)},
                   {"warnings", warnings(model, compared.evaluation)},
                   {"compared", html_text(compared.text)},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
+                  {"worst", worst_poses(shown)},
+                  {"learning", learning_text(curve)},
                   {"provenance", provenance_rows(model, compared.evaluation)},
                   {"sessions", session_changes_html(session_changes(model))},
                   {"parameters", parameter_table(model)},
                   {"unidentifiable", unidentifiable_text(model.parts())},
                   {"suspects", suspects_text(model.parts())},
-                  {"data", script_json(chart_data(model, batch, compared.evaluation))},
+                  {"data", script_json(chart_data(model, compared.evaluation, shown, curve))},
+                  {"page_css", std::string(page_style())},
+                  {"view3d_js", std::string(view3d_script())},
                   {"chart_js", std::string(embedded::chart_js)}});
 }
 

@@ -26,6 +26,14 @@ std::vector<std::string> texts_of(std::string_view page, std::string_view name) 
   return texts;
 }
 
+/// What stands in the place of `{{name}}`, for texts that are the same on every page.
+std::string shared_text(std::string_view text) {
+  if (text == "{{chart_js}}") return std::string(embedded::chart_js);
+  if (text == "{{view3d_js}}") return std::string(embedded::view3d_js);
+  if (text == "{{page_css}}") return std::string(embedded::page_css);
+  return std::string(text);
+}
+
 void append(PageInserts& all, const PageInserts& more) {
   all.scripts.insert(all.scripts.end(), more.scripts.begin(), more.scripts.end());
   all.styles.insert(all.styles.end(), more.styles.begin(), more.styles.end());
@@ -56,9 +64,8 @@ PageInserts inserts_of_our_pages() {
   for (const std::string_view page :
        {embedded::model_page_html, embedded::diagnosis_page_html, embedded::history_page_html}) {
     PageInserts inserts = inserts_of(page);
-    for (std::string& script : inserts.scripts) {
-      if (script == "{{chart_js}}") script = embedded::chart_js;
-    }
+    for (std::string& script : inserts.scripts) script = shared_text(script);
+    for (std::string& style : inserts.styles) style = shared_text(style);
     append(all, inserts);
   }
   return all;

@@ -9,6 +9,7 @@
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"
 #include "server/robot/cell.h"
+#include "server/robot/cell_papers.h"
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
 #include "server/robot/gauge.h"
@@ -302,9 +303,30 @@ CellRules read_rules(const YamlMap& map) {
   return rules;
 }
 
+CellPapers read_papers(const YamlMap& map) {
+  CellPapers papers;
+  const auto read = [&](const char* key, std::string* text) {
+    map.attempt([&] {
+      if (!map.is_null(key)) *text = map.text(key);
+    });
+  };
+  read("serial_number", &papers.serial_number);
+  read("instrument", &papers.instrument);
+  read("operator", &papers.operator_name);
+  return papers;
+}
+
 Cell read_cell_map(const YamlMap& map) {
-  map.only({"version", "cell", "robot", "base", "gravity", "tools", "payloads", "tracker", "model", "joint_ranges_deg",
-            "workspace_mm", "sessions", "tolerance_mm", "step_limit_mm", "prior", "controller_compensates", "anchors"});
+  map.only({"version",      "cell",
+            "robot",        "base",
+            "gravity",      "tools",
+            "payloads",     "tracker",
+            "model",        "joint_ranges_deg",
+            "workspace_mm", "sessions",
+            "tolerance_mm", "step_limit_mm",
+            "prior",        "controller_compensates",
+            "anchors",      "serial_number",
+            "instrument",   "operator"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -323,6 +345,7 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { static_cast<void>(read_anchors(map)); });
   map.attempt([&] { read_model(map, cell); });
   static_cast<void>(read_rules(map));
+  static_cast<void>(read_papers(map));
   return cell;
 }
 
@@ -426,6 +449,11 @@ std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
 Result<CellRules> rules_of(const Cell& cell) {
   if (cell.cell_yaml.empty()) return CellRules{};
   return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_rules(map); });
+}
+
+Result<CellPapers> papers_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return CellPapers{};
+  return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_papers(map); });
 }
 
 Result<Anchors> anchors_of(const Cell& cell) {

@@ -2,44 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "server/report/diagnosis_charts.h"
 #include "tests/report/diagnosis_fixture.h"
-#include "tests/support/process.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/report/seen_by_browser.h"
 
 namespace trammel {
 namespace {
-
-constexpr const char* kBrowser = "/usr/bin/chromium";
-
-/// Runs in the page: says of each canvas how many of its pixels have a colour that is none of text and grid, what went
-/// wrong, and how far the page is wider than its window.
-constexpr const char* kLookAtIt = R"(<script>
-window.addEventListener("load", () => {
-  const coloured = canvas => {
-    const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4) {
-      const [r, g, b, a] = pixels.slice(i, i + 4);
-      if (a > 100 && Math.max(r, g, b) - Math.min(r, g, b) > 45) ++count;
-    }
-    return count;
-  };
-  const seen = [...document.querySelectorAll("canvas")].map(c => `${c.id} ${coloured(c)}`);
-  seen.push(`page-too-wide ${document.documentElement.scrollWidth - document.documentElement.clientWidth}`);
-  seen.push(`errors ${window.wentWrong}`);
-  const text = document.createElement("pre");
-  text.id = "seen";
-  text.textContent = seen.join("\n") + "\n";
-  document.body.append(text);
-});
-</script>)";
-constexpr const char* kListen = R"(<script>window.wentWrong = 0; window.onerror = () => ++window.wentWrong;</script>)";
 
 bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
 
@@ -47,26 +18,8 @@ class DiagnosisPage : public testing::Test {
  protected:
   DiagnosisPage() : cell_(test::cell_7()), diagnosis_(test::made_up_diagnosis(cell_)) {}
 
-  /// What a browser of that width finds on the page: a number a name.
   std::map<std::string, int> seen_by_a_browser(int width) const {
-    const test::TemporaryFolder folder;
-    std::string page = diagnosis_page(diagnosis_, *cell_);
-    page.replace(page.find("<head>"), 6, std::string("<head>") + kListen);
-    page.replace(page.rfind("</body>"), 7, std::string(kLookAtIt) + "</body>");
-    const std::string file = folder.write("page.html", page);
-    const test::Finished browser =
-        test::run({kBrowser, "--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000",
-                   fmt::format("--window-size={},900", width), "--user-data-dir=" + folder.file("profile"),
-                   "--dump-dom", "file://" + file});
-    const std::string opening = "<pre id=\"seen\">";
-    const std::size_t from = browser.out.find(opening);
-    EXPECT_NE(from, std::string::npos) << browser.err;
-    std::map<std::string, int> seen;
-    if (from == std::string::npos) return seen;
-    std::istringstream text(browser.out.substr(from + opening.size()));
-    std::string name;
-    for (int number = 0; text >> name >> number;) seen[name] = number;
-    return seen;
+    return test::seen_by_browser(diagnosis_page(diagnosis_, *cell_), width);
   }
 
   std::shared_ptr<const Cell> cell_;
@@ -181,7 +134,7 @@ TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {
 }
 
 TEST_F(DiagnosisPage, HasNoEmptyPlotInARealBrowserHoweverWide) {
-  if (!std::filesystem::exists(kBrowser)) GTEST_SKIP() << kBrowser << " is not installed";
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
   for (const int width : {1280, 520}) {
     std::map<std::string, int> seen = seen_by_a_browser(width);
     EXPECT_EQ(seen["errors"], 0) << width;
@@ -201,7 +154,7 @@ TEST_F(DiagnosisPage, WithoutAnyFindingStillOpens) {
   const std::string page = diagnosis_page(empty, *cell_);
   EXPECT_TRUE(has(page, "Nothing beyond the noise."));
   EXPECT_TRUE(has(page, "None: every pose fits the others."));
-  if (!std::filesystem::exists(kBrowser)) GTEST_SKIP() << kBrowser << " is not installed";
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
   diagnosis_ = empty;
   EXPECT_EQ(seen_by_a_browser(1000)["errors"], 0);
 }

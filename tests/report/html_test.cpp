@@ -18,6 +18,10 @@ TEST(Html, ATableHasACellForEachTextAndARowSaysWhatItIs) {
             "<tr class=\"wide\"><td></td><td colspan=\"2\">3</td></tr>\n</table>");
 }
 
+TEST(Html, ATableWithoutNamesHasNoRowOfThem) {
+  EXPECT_EQ(html_table({"k", {}, {{{"1"}}}}), "<table class=\"k\">\n<tr><td>1</td></tr>\n</table>");
+}
+
 TEST(Html, NoTextEndsTheScriptThatHoldsIt) {
   EXPECT_EQ(script_json({{"a", "</script>"}}), R"({"a":"\u003c/script>"})");
 }

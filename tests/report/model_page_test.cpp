@@ -2,11 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <sstream>
 
 #include "server/measurement/checked_batch.h"
+#include "server/report/model_poses.h"
+#include "server/report/model_promise.h"
+#include "server/report/model_scene.h"
 #include "server/trainer/pipeline/train.h"
+#include "tests/report/seen_by_browser.h"
 #include "tests/support/from_rows.h"
 #include "tests/support/small_cell.h"
 
@@ -104,7 +111,7 @@ TEST_F(ModelPage, OpensWithoutANetwork) {
 TEST_F(ModelPage, CountsEveryPoseOfTheBatchInItsHistogram) {
   const auto checked = check_against_cell(batch_, *cell_);
   const auto histogram = chart_data(model_page(trained("none"), checked->rows())).at("histogram");
-  for (const char* level : {"calibrated", "compensated"}) {
+  for (const char* level : {"nominal", "calibrated", "compensated"}) {
     const auto counts = histogram.at(level).get<std::vector<int>>();
     EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0), 30) << level;
     EXPECT_EQ(counts.size(), histogram.at("labels_mm").size());
@@ -120,6 +127,172 @@ TEST_F(ModelPage, WithoutABatchShowsThePosesHeldOutAndTheTrainingLeftOutOneByOne
 
 TEST_F(ModelPage, DrawsNoHistogramWhereItKnowsNoPoses) {
   EXPECT_FALSE(chart_data(model_page(trained("none"), std::nullopt)).contains("histogram"));
+}
+
+/// small_cell() with more keys.
+std::shared_ptr<const Cell> cell_with(const std::string& keys) {
+  return std::make_shared<const Cell>(
+      parse_cell(test::small_cell_yaml("cell-3", "none") + keys, test::small_robot_yaml(), "cell-3.yaml").value());
+}
+
+CompensatedModel trained_on(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch,
+                            const std::string& level = "M1") {
+  TrainOptions options;
+  options.level = level;
+  options.bias = "none";
+  options.trained_at = 1'763'942'400;  // 2025-11-24
+  return train(cell, check_against_cell(batch, *cell, drawn(0.3, 1)).value(), options).value();
+}
+
+TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
+  const CompensatedModel model = trained_on(cell_with(""), batch_);
+  const auto accuracy = PositionAccuracy::of(model);
+  const std::string promise = promise_sentence(model, accuracy);
+  EXPECT_EQ(promise, fmt::format("Good to {} mm at 95 % in this volume; not known beyond; check again by 2025-12-24.",
+                                 rounded_up_mm(accuracy->at(0.95))));
+  const std::string page = model_page(model, std::nullopt);
+  EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
+  EXPECT_LT(page.find(promise), page.find("<table"));
+}
+
+TEST(RoundedUp, IsNeverSmallerThanTheLength) {
+  EXPECT_EQ(rounded_up_mm(0.0811e-3), "0.082");
+  EXPECT_EQ(rounded_up_mm(0.08e-3), "0.080");
+  EXPECT_EQ(rounded_up_mm(1.31e-3), "1.4");
+  EXPECT_EQ(rounded_up_mm(0.00811e-3), "0.0082");
+}
+
+TEST_F(ModelPage, ItsFirstPageNamesRobotInstrumentAndOperatorAsTheCellFileHasThem) {
+  const std::string page =
+      model_page(trained_on(cell_with("serial_number: 66-70 <b>\ninstrument: AT960\noperator: I. Newton\n"), batch_),
+                 std::nullopt);
+  for (const char* part : {"<td>serial number</td><td>66-70 &lt;b&gt;</td>", "AT960; 0.02 mm", "I. Newton"})
+    EXPECT_TRUE(has(page, part)) << part;
+  EXPECT_TRUE(has(model_page(trained("none"), std::nullopt), "<td>serial number</td><td>not in the cell file</td>"));
+}
+
+TEST_F(ModelPage, HoldsThePromiseAgainstTheToleranceOfTheCell) {
+  EXPECT_TRUE(has(model_page(trained_on(cell_with("tolerance_mm: 0.2\n"), batch_), std::nullopt),
+                  "The cell must hold 0.2 mm: <b>yes</b>"));
+  EXPECT_TRUE(has(model_page(trained_on(cell_with("tolerance_mm: 0.002\n"), batch_), std::nullopt),
+                  "The cell must hold 0.002 mm: <b>no</b>"));
+  EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "The cell must hold"));
+}
+
+TEST_F(ModelPage, KnowsTheRepeatabilityFromRepeatsOnly) {
+  const CompensatedModel model = trained("none");
+  MeasurementBatch repeated = check_against_cell(batch_, *cell_)->rows();
+  const auto row = [&](const MeasurementBatch& batch) {
+    const std::string page = model_page(model, batch);
+    const std::size_t from = page.find("repeatability RP");
+    return page.substr(from, page.find("</tr>", from) - from);
+  };
+  EXPECT_TRUE(has(row(repeated), "not measured")) << row(repeated);
+  const auto once = repeated.measurements;
+  repeated.measurements.insert(repeated.measurements.end(), once.begin(), once.end());
+  for (std::size_t i = 0; i < once.size(); ++i) repeated.measurements[i].p_W.x() += 40e-6;
+  // Two that are 40 um apart: 28 um along x, 16 um an axis; 3.615 of them.
+  EXPECT_TRUE(has(row(repeated), "0.060 mm, instrument included (60 measurements of 30 poses)")) << row(repeated);
+}
+
+TEST_F(ModelPage, TellsOfEveryLengthWhatIsDrawnByHowMuchItIsOffAndWhatItIs) {
+  const CompensatedModel model = trained_on(cell_with(""), batch_, "M2");
+  const auto& parameters = model.parts().parameters;
+  const auto a2 =
+      std::find_if(parameters.begin(), parameters.end(), [](const auto& one) { return one.parameter.name == "a2"; });
+  ASSERT_NE(a2, parameters.end());
+  const std::string page = model_page(model, std::nullopt);
+  const std::size_t from = page.find("<tr><td>a2</td>");
+  ASSERT_NE(from, std::string::npos);
+  std::istringstream cells(page.substr(from + 15, 200));
+  const double drawn = 1e3 * cell_->robot.joint(1).link.a;
+  char skip = 0;
+  double nominal = 0, correction = 0, result = 0;
+  const auto number = [&](double* into) {
+    while (cells.get(skip) && skip != '>') {
+    }
+    cells >> *into;
+    while (cells.get(skip) && skip != '>') {
+    }
+  };
+  EXPECT_EQ(page.substr(from, 200).find("e-0"), std::string::npos) << page.substr(from, 200);
+  number(&nominal);
+  number(&correction);
+  number(&result);
+  EXPECT_NEAR(nominal, drawn, 1e-9);
+  EXPECT_NEAR(correction, 1e3 * a2->value, 0.01);
+  EXPECT_NEAR(result, nominal + correction, 0.02);
+}
+
+TEST_F(ModelPage, DrawsTheArmFromTheBaseToTheToolAndTheDomainAroundItsPoses) {
+  const CompensatedModel model = trained("none");
+  const auto checked = check_against_cell(batch_, *cell_);
+  const auto scene = scene_json(model, poses_to_show(model, checked->rows()));
+  ASSERT_EQ(scene.at("poses").size(), 30u);
+  for (std::size_t i = 0; i < 30; ++i) {
+    const auto& arm = scene.at("poses")[i].at("arm");
+    const Measurement& m = checked->rows().measurements[i];
+    const Vector3 tool = (cell_->robot.flange_pose(m.context.q) * *cell_->tools.at(m.context.tool)).translation();
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(arm.back()[static_cast<std::size_t>(k)].get<double>(), 1e3 * tool(k), 0.06);
+    EXPECT_EQ(arm.front(), nlohmann::ordered_json({0.0, 0.0, 0.0}));
+    EXPECT_GT(arm.size(), 4u);
+  }
+  double farthest = 0;
+  for (const auto& ring : scene.at("shell")) {
+    for (const auto& p : ring)
+      if (!p.is_null()) farthest = std::max(farthest, std::hypot(p[0].get<double>(), p[1].get<double>()));
+  }
+  EXPECT_GT(farthest, 500);
+}
+
+TEST_F(ModelPage, WithoutAnyMeasuredPoseItsArrowsAreWhatTheModelCorrects) {
+  const CompensatedModel model = trained("none");
+  const auto scene = scene_json(model, poses_to_show(model, std::nullopt));
+  EXPECT_EQ(scene.at("measured"), false);
+  const auto& before = scene.at("poses")[0].at("before");
+  // The base stands 2 mm along x from where it should be.
+  EXPECT_NEAR(std::hypot(before[0].get<double>(), before[1].get<double>(), before[2].get<double>()), 2, 0.2);
+}
+
+TEST_F(ModelPage, TheCurveOfABiasEndsAtAllPosesAndThatOfParametersFallsWithThem) {
+  test::SmallBatch shape;
+  shape.poses = 60;
+  batch_ = parse_batch_csv(test::small_batch_csv(*cell_, shape), "b.csv").value();
+  const CompensatedModel learned = trained("se");
+  const auto curve = learning_curve(learned);
+  ASSERT_TRUE(curve);
+  EXPECT_EQ(curve->poses, (std::vector<int>{15, 30, 45, 60}));
+  EXPECT_NEAR(curve->error.back(), learned.bias()->report().leave_one_out_rms, 1e-9);
+  const auto parameters = learning_curve(trained("none"));
+  ASSERT_TRUE(parameters);
+  EXPECT_EQ(parameters->poses, (std::vector<int>{30, 60, 120, 240}));
+  EXPECT_GT(parameters->error[0], parameters->error[3]);
+  EXPECT_TRUE(has(model_page(learned, std::nullopt), curve->sentence));
+}
+
+TEST_F(ModelPage, ListsTheWorstPosesFirst) {
+  const auto checked = check_against_cell(batch_, *cell_);
+  MeasurementBatch rows = checked->rows();
+  rows.measurements[7].p_W.z() += 1e-3;
+  const std::string page = model_page(trained("none"), rows);
+  const std::size_t table = page.find("<table class=\"poses\">");
+  ASSERT_NE(table, std::string::npos);
+  const std::size_t first = page.find("<tr><td>", table);
+  EXPECT_EQ(page.substr(first + 8, rows.measurements[7].pose_id.size() + 1), rows.measurements[7].pose_id + "<");
+}
+
+TEST_F(ModelPage, HasNoEmptyPlotInARealBrowserHoweverNarrowAndIsLight) {
+  const CompensatedModel model = trained("se", 0.3);
+  const std::string page = model_page(model, check_against_cell(batch_, *cell_)->rows());
+  EXPECT_LT(page.size(), 1'500'000u);
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
+  for (const int width : {1200, 500}) {  // no window of this browser is narrower
+    std::map<std::string, int> seen = test::seen_by_browser(page, width);
+    EXPECT_EQ(seen["errors"], 0) << width;
+    EXPECT_LE(seen["page-too-wide"], 0) << width;
+    for (const char* canvas : {"levels", "histogram", "coverage", "space"})
+      EXPECT_GT(seen[canvas], 100) << canvas << width;
+  }
 }
 
 TEST_F(ModelPage, NamesFromFilesStayText) {

@@ -7,6 +7,7 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/robot/cell.h"
+#include "server/robot/cell_papers.h"
 #include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
@@ -62,6 +63,19 @@ TEST(CellFile, AnUnknownBaseAndToolAreUnknown) {
   const Cell cell = *read_cell(shipped("config/ur10.yaml"));
   EXPECT_FALSE(cell.X_WB);
   EXPECT_FALSE(cell.tools.at("tmac"));
+}
+
+TEST(CellFile, ItsPapersAreWhatACertificateNames) {
+  const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
+  const CellPapers none = *papers_of(*parse_cell(text, robot, "c.yaml"));
+  EXPECT_EQ(none.serial_number + none.instrument + none.operator_name, "");
+  const std::string keys = "serial_number: 66-70\ninstrument: AT960, 7512\noperator: I. Newton\n";
+  const CellPapers papers = *papers_of(*parse_cell(text + keys, robot, "c.yaml"));
+  EXPECT_EQ(papers.serial_number, "66-70");
+  EXPECT_EQ(papers.instrument, "AT960, 7512");
+  EXPECT_EQ(papers.operator_name, "I. Newton");
+  EXPECT_FALSE(parse_cell(text + "operator: [a, b]\n", robot, "c.yaml"));
 }
 
 TEST(CellFile, RefusesWithFileKeyAndReason) {

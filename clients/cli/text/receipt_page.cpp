@@ -11,6 +11,7 @@
 #include "server/base/unix_time.h"
 #include "server/error_sources/cause_words.h"
 #include "server/report/html.h"
+#include "server/report/page_parts.h"
 
 namespace trammel::cli {
 
@@ -151,10 +152,14 @@ std::string receipt_page(const CorrectedProgram& program, double tolerance_mm) {
   std::string more;
   if (program.rows.size() > kMostRows)
     more = fmt::format("<p>The first {} of {} targets; the CSV receipt has all.</p>", kMostRows, program.rows.size());
-  return fill_in(kReceiptPage, {{"facts", facts(program, tolerance_mm)},
-                                {"targets", targets(program) + more},
-                                {"points", script_json(points(program))},
-                                {"tolerance", fmt::format("{}", tolerance_mm)}});
+  return fill_in(kReceiptPage,
+                 {{"page_css", std::string(page_style())},
+                  {"view3d_js", std::string(view3d_script())},
+                  {"subtitle", html_text(fmt::format("Cell {} · {}", program.model.cell, shown_day(unix_now())))},
+                  {"facts", facts(program, tolerance_mm)},
+                  {"targets", targets(program) + more},
+                  {"points", script_json(points(program))},
+                  {"tolerance", fmt::format("{}", tolerance_mm)}});
 }
 
 }  // namespace trammel::cli

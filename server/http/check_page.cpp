@@ -1,0 +1,93 @@
+#include "server/http/check_page.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "server/error_sources/spelling.h"
+#include "server/report/html.h"
+
+namespace trammel {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kShownSizes = 8;  // those that are hardest to see
+
+std::string text_in(const json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+}
+
+std::string mm_in(const json& object, const char* key) {
+  const bool known = object.is_object() && object.contains(key) && object[key].is_number();
+  return known ? fmt::format("{:.4f} mm", object[key].get<double>()) : "–";
+}
+
+const json& list_in(const json& object, const char* key) {
+  static const json kNone = json::array();
+  return object.is_object() && object.contains(key) && object[key].is_array() ? object[key] : kNone;
+}
+
+/// `gear ripple in joint 3, order`
+std::string cause_of(const json& one) {
+  std::string spelling = text_in(one, "cause");
+  if (one.is_object() && one.contains("joint") && one["joint"].is_number_integer())
+    spelling += fmt::format(":{}", one["joint"].get<int>());
+  const std::string parameter = text_in(one, "parameter");
+  return in_words(spelling) + (parameter.empty() ? "" : ", " + parameter);
+}
+
+std::string figures(const json& found) {
+  std::vector<HtmlRow> rows;
+  const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
+  add("tolerance", mm_in(found, "tolerance_mm"));
+  add("what the poses are off by, rms", mm_in(found, "rms_mm"));
+  add("what a healthy robot is off by, rms", mm_in(found, "expected_rms_mm"));
+  add("largest change that could hide", mm_in(found, "would_have_seen_mm"));
+  const std::string due = text_in(found, "due"), because = text_in(found, "due_because");
+  add("check again by", (due.empty() ? "cannot be said" : due) + (because.empty() ? "" : ": " + because));
+  return html_table({"", {}, rows});
+}
+
+std::string changes(const json& found) {
+  std::vector<HtmlRow> rows;
+  for (const json& one : list_in(found, "changed")) {
+    std::vector<std::string> others;
+    for (const json& other : list_in(one, "could_also_be")) others.push_back(cause_of(other));
+    rows.push_back({{html_text(cause_of(one)), mm_in(one, "effect_rms_mm"), mm_in(one, "u95"),
+                     html_text(fmt::format("{}", fmt::join(others, ", ")))}});
+  }
+  return rows.empty() ? "<p>Nothing that these poses show.</p>"
+                      : html_table({"", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});
+}
+
+std::string hardest_to_see(const json& found) {
+  std::vector<HtmlRow> rows;
+  for (const json& one : list_in(found, "smallest_seen")) {
+    if (rows.size() == kShownSizes) break;
+    const std::string size = mm_in(one, "effect_rms_mm");
+    rows.push_back({{html_text(cause_of(one)), size == "–" ? "never" : size}});
+  }
+  return rows.empty() ? "<p>Not known.</p>" : html_table({"", {"cause", "seen from, rms"}, rows});
+}
+
+std::string section(const char* title, const std::string& body) {
+  return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", title, body);
+}
+
+}  // namespace
+
+ServicePage check_page(const std::string& findings, const std::string& cell, std::int64_t job) {
+  const json found = json::parse(findings, nullptr, false);
+  std::string verdict = text_in(found, "verdict");
+  std::replace(verdict.begin(), verdict.end(), '_', ' ');
+  const std::string links = html_link(cell_address(cell), "Cell " + cell) + " · " +
+                            html_link(fmt::format("/jobs/{}", job), fmt::format("Job {}", job)) + " · " +
+                            html_link(fmt::format("/jobs/{}/findings.json", job), "all of it as JSON");
+  return {fmt::format("Health of cell {}", cell),
+          section("Verdict", fmt::format("<p class=\"verdict\">{}: {}</p>\n<p>{}</p>", html_text(verdict),
+                                         html_text(text_in(found, "why")), links) +
+                                 figures(found)) +
+              section("What changed", changes(found)) + section("Hardest to see", hardest_to_see(found))};
+}
+
+}  // namespace trammel

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// Every parameter with its nominal value, correction and result, angles in degrees, ± U(k = 2), as HTML.
+[[nodiscard]] std::string parameter_table(const CompensatedModel& model);
+/// In words, what the measurements could not tell of them.
+[[nodiscard]] std::string unidentifiable_text(const ModelParts& parts);
+
+}  // namespace trammel

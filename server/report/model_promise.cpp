@@ -1,0 +1,180 @@
+#include "server/report/model_promise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+#include "server/measurement/pose_columns.h"
+#include "server/measurement/repeats.h"
+#include "server/report/html.h"
+#include "server/report/page_parts.h"
+#include "server/robot/cell_papers.h"
+#include "server/robot/cell_rules.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr std::int64_t kDay = 86400;
+/// How long a model is taken for good where no check has told how fast its arm drifts, days.
+constexpr std::int64_t kFirstCheck = 30;
+constexpr int kFewestRepeats = 6;  // degrees of freedom
+/// RP of ISO 9283 is the mean distance from the barycentre and three of its standard deviations: 3.615 standard
+/// deviations of an axis, where the three axes are alike and normal.
+constexpr double kRepeatability = 3.615;
+
+std::int64_t newest_measurement(const ModelProvenance& provenance) {
+  return provenance.measured_at.value_or(provenance.trained_at);
+}
+
+std::string check_by(const ModelProvenance& provenance) {
+  const std::int64_t from = newest_measurement(provenance);
+  return from > 0 ? "check again by " + shown_day(from + kFirstCheck * kDay)
+                  : "when it was measured is not known, so check before use";
+}
+
+std::string or_not_told(const std::string& text) { return text.empty() ? "not in the cell file" : text; }
+
+std::string volume(const PositionAccuracy& accuracy) {
+  std::string text;
+  for (int k = 0; k < 3; ++k)
+    text += fmt::format("{}{}\u00a0{:.0f}\u00a0to\u00a0{:.0f}", k == 0 ? "" : ", ", "xyz"[k],
+                        to_mm(accuracy.lower()(k)), to_mm(accuracy.upper()(k)));
+  return text + " mm of the tool from the robot's base, as far as its joints are where they were in training";
+}
+
+std::string joint_ranges(const CompensatedModel& model) {
+  const ModelParts& parts = model.parts();
+  std::string text;
+  for (int j = 0; j < model.cell().robot.size(); ++j) {
+    const JointType type = model.cell().robot.joint(j).type;
+    text += fmt::format("{}q{}\u00a0{:.1f}\u00a0to\u00a0{:.1f}\u00a0{}", j == 0 ? "" : ", ", j + 1,
+                        joint_to_column(parts.q_min(j), type), joint_to_column(parts.q_max(j), type),
+                        type == JointType::kRevolute ? "deg" : "mm");
+  }
+  return text;
+}
+
+std::string tools(const ModelParts& parts) {
+  std::string text;
+  for (const auto& [tool, payload] : parts.trained_with)
+    text += (text.empty() ? "" : ", ") + tool + (payload.empty() ? "" : " with payload " + payload);
+  return text;
+}
+
+std::string judged_by(const std::optional<PositionAccuracy>& accuracy) {
+  if (!accuracy) return "nothing";
+  return accuracy->judged_by() > 0
+             ? fmt::format("{} poses that were not trained on", accuracy->judged_by())
+             : "the scatter of its own training poses; none was held out, so it is believed, not tested";
+}
+
+std::string papers_table(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
+  const CellPapers papers = papers_of(model.cell()).value_or(CellPapers{});
+  const ModelProvenance& made = model.provenance();
+  const double sigma = to_mm(model.cell().tracker.sigma);
+  std::vector<HtmlRow> rows;
+  const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
+  add("robot", model.cell().robot.name());
+  add("serial number", or_not_told(papers.serial_number));
+  add("cell", model.cell().name);
+  add("tool", tools(model.parts()));
+  add("instrument", fmt::format("{}; {:.4g} mm (1 sigma, per axis) as stated", or_not_told(papers.instrument), sigma));
+  add("operator", or_not_told(papers.operator_name));
+  add("measured", made.measured_at ? shown_day(*made.measured_at) : "not recorded");
+  add("model", fmt::format("{}, trained {} on {} poses of {}", made.id, shown_day(made.trained_at), made.training_poses,
+                           made.batch_id));
+  if (accuracy) add("this volume", volume(*accuracy));
+  add("joints", joint_ranges(model));
+  add("judged by", judged_by(accuracy));
+  return html_table({"provenance", {}, rows});
+}
+
+std::string repeatability(const std::optional<MeasurementBatch>& batch, double sigma) {
+  if (!batch) return "not measured";
+  const RepeatStatistics repeats = merge_repeats(*batch, sigma).statistics;
+  if (repeats.degrees_of_freedom < kFewestRepeats) return "not measured";
+  return fmt::format("{} mm, instrument included ({} measurements of {} poses)",
+                     rounded_up_mm(kRepeatability * repeats.sigma), repeats.measurements, repeats.groups);
+}
+
+std::string iso_table(const CompensatedModel& model, const PositionAccuracy& accuracy,
+                      const std::optional<MeasurementBatch>& batch) {
+  std::vector<HtmlRow> rows;
+  rows.push_back({{"positioning accuracy AP", rounded_up_mm(accuracy.at(PositionAccuracy::kShare)) + " mm",
+                   fmt::format("95 % of positions; between {} and {} mm, as few poses judged it and the instrument is "
+                               "known to 10 %",
+                               rounded_up_mm(accuracy.least()), rounded_up_mm(accuracy.most()))}});
+  rows.push_back({{"distance accuracy AD", "at most " + rounded_up_mm(accuracy.of_distances()) + " mm",
+                   "95 % of distances between two positions"}});
+  rows.push_back(
+      {{"repeatability RP", repeatability(batch, model.cell().tracker.sigma), "from repeats of a pose only"}});
+  if (const auto& held_out = model.parts().validation; held_out && held_out->orientation)
+    rows.push_back({{"orientation accuracy", fmt::format("{:.4f} deg", to_deg(held_out->orientation->compensated)),
+                     fmt::format("rms of {} poses held out, instrument included", held_out->orientation->poses)}});
+  return html_table({"iso", {"as ISO 9283 names it", "value", "of what"}, rows});
+}
+
+/// Whether a tolerance is held, and how sure that is.
+std::string held(const PositionAccuracy& accuracy, double tolerance) {
+  if (accuracy.most() <= tolerance) return "yes";
+  if (accuracy.at(PositionAccuracy::kShare) <= tolerance) return "yes, but narrowly";
+  return accuracy.least() <= tolerance ? "not shown" : "no";
+}
+
+std::string tolerance_table(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
+  std::vector<double> tolerances = {0.05e-3, 0.1e-3, 0.2e-3, 0.5e-3, 1e-3};
+  if (of_cell) tolerances.push_back(*of_cell);
+  std::sort(tolerances.begin(), tolerances.end());
+  tolerances.erase(std::unique(tolerances.begin(), tolerances.end()), tolerances.end());
+  std::vector<HtmlRow> rows;
+  for (const double tolerance : tolerances) {
+    const bool asked = of_cell && tolerance == *of_cell;
+    rows.push_back(
+        {{fmt::format("{:.4g} mm{}", to_mm(tolerance), asked ? " (the cell's)" : ""), held(accuracy, tolerance),
+          fmt::format("{:.1f} %", 100 * std::floor(1000 * accuracy.within(tolerance)) / 1000)},
+         asked ? "asked" : ""});
+  }
+  return html_table({"tolerances", {"may I ask for", "held at 95 %?", "positions inside"}, rows});
+}
+
+std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
+  if (!of_cell) return "";
+  const double promised = accuracy.at(PositionAccuracy::kShare);
+  return fmt::format("<p class=\"against\">The cell must hold {:.4g} mm: <b>{}</b> ({} mm at 95 %).</p>\n",
+                     to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised));
+}
+
+}  // namespace
+
+std::string rounded_up_mm(double length) {
+  const double mm = to_mm(length);
+  if (!(mm > 0)) return "0.0001";
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(mm))), 0, 4);
+  const double step = std::pow(10, -decimals);
+  return fmt::format("{:.{}f}", std::ceil(mm / step - 1e-9) * step, decimals);
+}
+
+std::string promise_sentence(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
+  if (!accuracy) return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
+  return fmt::format("Good to {} mm at 95 % in this volume; not known beyond; {}.",
+                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), check_by(model.provenance()));
+}
+
+std::string certificate(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy,
+                        const std::optional<MeasurementBatch>& batch) {
+  const std::string papers = papers_table(model, accuracy);
+  if (!accuracy) return papers;
+  const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
+  return tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) + "\n<h3>In numbers</h3>\n" +
+         iso_table(model, *accuracy, batch) + "\n<h3>Of what</h3>\n" + papers +
+         fmt::format(
+             "\n<p class=\"note\">Of the true position of the tool after correction by this model, the "
+             "instrument's noise taken out, at fresh poses of the domain; not ISO's five poses. Taken for good "
+             "for {} days, until a check (<code>trammel check</code>) tells how fast this robot changes. A "
+             "lasting error of up to {} mm an axis would not show, as nobody knows the instrument's sigma "
+             "better than to 10 %.</p>\n",
+             kFirstCheck, rounded_up_mm(accuracy->hidden()));
+}
+
+}  // namespace trammel

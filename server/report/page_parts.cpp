@@ -1,0 +1,23 @@
+#include "server/report/page_parts.h"
+
+#include <array>
+#include <ctime>
+
+#include "server/report/embedded.h"
+
+namespace trammel {
+
+std::string_view page_style() { return embedded::page_css; }
+std::string_view view3d_script() { return embedded::view3d_js; }
+
+std::string shown_day(std::int64_t unix_s) {
+  if (unix_s <= 0) return "–";
+  const std::time_t time = unix_s;
+  std::tm utc{};
+  ::gmtime_r(&time, &utc);
+  std::array<char, 16> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d", &utc);
+  return text.data();
+}
+
+}  // namespace trammel
