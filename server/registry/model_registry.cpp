@@ -129,6 +129,7 @@ void ModelRegistry::publish(ServedModelPtr model) {
 void ModelRegistry::announce(const std::string& cell, int version) {
   const MutexLock lock(mutex_);
   in_force_[cell] = version;
+  if (held_.contains({cell, version})) return;
   never_loaded_.insert(cell);
   changed_.notify_all();
 }

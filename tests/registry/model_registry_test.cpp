@@ -1,6 +1,7 @@
 #include "server/registry/model_registry.h"
 
 #include <gtest/gtest.h>
+#include <time.h>
 
 #include <atomic>
 #include <thread>
@@ -39,6 +40,23 @@ TEST(ModelRegistry, AReaderKeepsItsModelWhileAnotherIsPublished) {
   EXPECT_EQ(mine->version, 1);
   EXPECT_EQ(mine->model.provenance().training_poses, 1);
   EXPECT_EQ(registry.in_force("cell-7")->version, 2);
+}
+
+/// Processor time of this thread, s.
+double processor_time() {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
+TEST(ModelRegistry, AVersionThatIsInMemoryWhenItIsAnnouncedKeepsNobodyBusy) {
+  ModelRegistry registry;
+  registry.publish(served("cell-7", 1));
+  registry.announce("cell-7", 1);
+  const double before = processor_time();
+  registry.load_for({}, std::chrono::milliseconds(200));
+  EXPECT_LT(processor_time() - before, 0.1);
+  EXPECT_EQ(registry.in_force("cell-7")->version, 1);
 }
 
 TEST(ModelRegistry, EveryReaderSeesAWholeModelWhileTheyAreSwapped) {
