@@ -14,6 +14,7 @@
 #include "server/measurement/repeats.h"
 #include "server/trainer/pipeline/leftover.h"
 #include "server/trainer/pipeline/train.h"
+#include "tests/support/figure.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -72,7 +73,9 @@ void print_row(const char* data, const BiasProblem& problem, const char* kernel,
       "%-14s %-36s %6td poses: %ld of %d seeds within 0.2 nat of the best, %ld within 1; worst %.2f below %.2f; "
       "%.1f s a fit\n",
       data, kernel, problem.q.rows(), within(0.2), seeds, within(1.0), *best - *worst, *best, seconds);
-  std::fflush(stdout);
+  test::tell_figure(fmt::format("{}, {}, share of seeds within 1 nat of the best, %", data, kernel),
+                    100.0 * static_cast<double>(within(1.0)) / seeds);
+  test::tell_figure(fmt::format("{}, {}, processor s a fit", data, kernel), seconds);
 }
 
 int run(const std::string& folder, int seeds, int coupled) {

@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr Index kMediumPoints = 400;    // a step between the first searches and all points
 constexpr int kMostStarts = 6;          // each takes as long as twenty of a plain process
+constexpr std::size_t kRivals = 2;      // optima of the first searches that go on
 constexpr double kSmallestLog = -21.0;  // of σ_f, m: 1 nm, for an output that is zero
 
 CoupledData subset(const CoupledData& data, const std::vector<Index>& order, Index count) {
@@ -52,18 +53,19 @@ class CoupledSearch {
   std::optional<CoupledSearchResult> run(const CoupledHyperparameters* last) {
     if (last != nullptr) {
       result_.starts_at_best = 1;
-      result_.found = improved(*last, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0);
+      const Place from = unknown_curvature(*last, all(), shared_scales_);
+      result_.found = improved(from, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0).at;
       return result_;
     }
-    std::optional<CoupledHyperparameters> best = from_several_starts();
+    std::vector<Place> rivals = from_several_starts();
     if (result_.given_up) return result_;
-    if (!best) return std::nullopt;
-    const Index medium = std::min(all(), kMediumPoints);
-    if (medium > kStartPoints) best = improved(*best, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
-    if (all() > medium) best = improved(*best, all(), true, {.max_evaluations = 8, .tolerance = 0.3}, 0.7);
-    if (!shared_scales_) best = improved(*best, all(), false, {.max_evaluations = 10, .tolerance = 0.3}, 0.95);
+    if (rivals.empty()) return std::nullopt;
+    Place best = best_of(std::move(rivals));
+    if (all() > kMediumPoints) best = improved(best, all(), true, {.max_evaluations = 12, .tolerance = 0.1}, 0.75);
+    if (!shared_scales_)
+      best = improved(of_each_output(best), all(), false, {.max_evaluations = 14, .tolerance = 0.1}, 0.95);
     report(1.0);
-    result_.found = *best;
+    result_.found = best.at;
     return result_;
   }
 
@@ -91,38 +93,79 @@ class CoupledSearch {
     return likelihood(1, true).pack(start);
   }
 
-  BfgsResult improve(const CoupledLikelihood& function, const VectorXd& start, const BfgsOptions& limits) {
+  /// Where a search has come to, and what it knows of the curvature there.
+  struct Place {
+    CoupledHyperparameters at;
+    MatrixXd inverse_hessian;
+    Index points = 0;  // that it was found with
+    double value = HUGE_VAL;
+  };
+
+  Place unknown_curvature(const CoupledHyperparameters& at, Index points, bool shared) {
+    const Index size = likelihood(1, shared).pack(at).size();
+    return {at, MatrixXd::Identity(size, size) / (0.05 * static_cast<double>(points)), points};
+  }
+
+  BfgsResult improve(const CoupledLikelihood& function, const Place& from, const BfgsOptions& limits) {
     const Objective objective = [&](const VectorXd& x, ObjectiveValue* out) {
       return !result_.given_up && function.evaluate(x, out);
     };
-    const double curvature = 0.05 * static_cast<double>(function.size());
-    BfgsResult found = minimise(objective, start, MatrixXd::Identity(start.size(), start.size()) / curvature, limits);
+    const double grown = static_cast<double>(from.points) / static_cast<double>(function.size());
+    BfgsResult found = minimise(objective, function.pack(from.at), grown * from.inverse_hessian, limits);
     if (function.size() == all()) result_.evaluations += found.evaluations;
     return found;
   }
 
-  std::optional<CoupledHyperparameters> from_several_starts() {
+  // The best two that differ: on few points the second may stand before the first.
+  std::vector<Place> from_several_starts() {
     const CoupledLikelihood small = likelihood(std::min(all(), kStartPoints), true);
     const int starts = std::clamp(options_.starts, 1, kMostStarts);
     std::vector<BfgsResult> ends;
     for (int s = 0; s < starts && !result_.given_up; ++s) {
-      BfgsResult end = improve(small, random_start(), {.max_evaluations = 60, .tolerance = 0.02});
+      const Place start = unknown_curvature(small.unpack(random_start()), small.size(), true);
+      BfgsResult end = improve(small, start, {.max_evaluations = 60, .tolerance = 0.02});
       if (end.defined) ends.push_back(std::move(end));
       report(0.3 * (s + 1) / starts);
     }
-    if (ends.empty()) return std::nullopt;
     std::stable_sort(ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
-    for (const BfgsResult& end : ends) result_.starts_at_best += end.value < ends.front().value + kSameOptimum;
-    return small.unpack(ends.front().x);
+    std::vector<Place> best;
+    for (const BfgsResult& end : ends) {
+      result_.starts_at_best += end.value < ends.front().value + kSameOptimum;
+      if (best.size() < kRivals && (best.empty() || end.value > best.back().value + kSameOptimum))
+        best.push_back({small.unpack(end.x), end.inverse_hessian, small.size(), end.value});
+    }
+    return best;
   }
 
-  CoupledHyperparameters improved(const CoupledHyperparameters& from, Index count, bool shared,
-                                  const BfgsOptions& limits, double share_done) {
+  Place best_of(std::vector<Place> rivals) {
+    const Index medium = std::min(all(), kMediumPoints);
+    if (medium <= kStartPoints) return rivals.front();
+    for (Place& rival : rivals) rival = improved(rival, medium, true, {.max_evaluations = 25, .tolerance = 0.1}, 0.5);
+    return *std::min_element(rivals.begin(), rivals.end(),
+                             [](const Place& a, const Place& b) { return a.value < b.value; });
+  }
+
+  // The kernels' part of the curvature is shared out among the outputs.
+  static Place of_each_output(const Place& shared) {
+    const auto outputs = static_cast<Index>(shared.at.outputs.size());
+    const Index scales = shared.at.outputs.front().kernel.size();
+    const Index rest = shared.inverse_hessian.rows() - scales;
+    Place each = shared;
+    each.inverse_hessian = MatrixXd::Zero(outputs * scales + rest, outputs * scales + rest);
+    for (Index d = 0; d < outputs; ++d)
+      each.inverse_hessian.block(d * scales, d * scales, scales, scales) =
+          static_cast<double>(outputs) * shared.inverse_hessian.topLeftCorner(scales, scales);
+    each.inverse_hessian.bottomRightCorner(rest, rest) = shared.inverse_hessian.bottomRightCorner(rest, rest);
+    return each;
+  }
+
+  Place improved(const Place& from, Index count, bool shared, const BfgsOptions& limits, double share_done) {
     if (result_.given_up) return from;
     const CoupledLikelihood function = likelihood(count, shared);
-    const BfgsResult found = improve(function, function.pack(from), limits);
+    const BfgsResult found = improve(function, from, limits);
     report(share_done);
-    return found.defined ? function.unpack(found.x) : from;
+    if (!found.defined) return from;
+    return {function.unpack(found.x), found.inverse_hessian, count, found.value};
   }
 
   std::shared_ptr<const Kernel> kernel_;
