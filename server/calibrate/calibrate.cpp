@@ -21,11 +21,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kWeighed = 20;            // nat: so much more likely must the data be with the links' weights
-constexpr double kPerhapsStretched = 3;    // standard deviations of what a scale alone would explain: worth a trial
-constexpr double kStretched = 10;          // nat: so much more likely must the data be with scales of the sessions,
-constexpr double kStretchedOfSession = 3;  // and so much more for each of them
-constexpr double kZeroed = 10;             // the same with zero errors of the instruments
+constexpr double kWeighed = 20;             // nat: so much more likely must the data be with the links' weights
+constexpr double kStretched = 10;           // nat: so much more likely must the data be with scales of the sessions,
+constexpr double kStretchedOfSession = 3;   // and so much more for each of them
+constexpr double kPerhapsStretched = 0.25;  // of that price, by what scales alone would explain: worth a trial
+constexpr double kZeroed = 10;              // the same with zero errors of the instruments
 constexpr double kZeroedOfInstrument = 3;
 
 /// Base and tool of the nominal chain refined together, and taken over as the model's frames.
@@ -52,6 +52,11 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
   return {};
 }
 
+/// nat, that scales of the sessions must explain more.
+double price_of_scales(std::size_t sessions) {
+  return kStretched + kStretchedOfSession * static_cast<double>(sessions - 1);
+}
+
 /// Whether the residuals of a session grow with the distance from its middle. The parameters have taken a part of that,
 /// so it is only a reason to look.
 bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& located) {
@@ -73,10 +78,9 @@ bool perhaps_stretched(const CalibrationResult& found, const MeasurementBatch& l
     along[s] += r.position.col(at).dot(from_middle) / variance;
     square[s] += from_middle.squaredNorm() / variance;
   }
-  for (std::size_t s = 0; s < S; ++s) {
-    if (std::abs(along[s]) > kPerhapsStretched * std::sqrt(square[s])) return true;
-  }
-  return false;
+  double gain = 0;
+  for (std::size_t s = 0; s < S; ++s) gain += square[s] > 0 ? 0.5 * along[s] * along[s] / square[s] : 0;
+  return gain > kPerhapsStretched * price_of_scales(S);
 }
 
 /// identify(), and once more with a scale for each session where the data ask for it.
@@ -86,7 +90,7 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   CalibrationProblem with = problem;
   with.stretched = true;
   Result<CalibrationResult> stretched = identify(with, options);
-  const double price = kStretched + kStretchedOfSession * static_cast<double>(rigid->sessions.size() - 1);
+  const double price = price_of_scales(rigid->sessions.size());
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
 }
 
