@@ -72,18 +72,19 @@ class Choosing {
   Choosing(const Program& program, const CellTools& cell, const std::string& tool, const std::string& payload)
       : program_(program), cell_(cell), asked_(tool), payload_(payload) {}
 
-  Result<std::vector<ToolChoice>> choose(const std::vector<bool>& used) {
+  Result<std::vector<ToolChoice>> choose(const std::vector<ToolUse>& uses) {
     std::vector<ToolChoice> choices(program_.tools.size());
     bool any = false;
     for (std::size_t k = 0; k < choices.size(); ++k) {
-      if (!used[k]) continue;
-      choices[k] = choice(program_.tools[k]);
+      if (uses[k] == ToolUse::kNone) continue;
+      choices[k] = uses[k] == ToolUse::kJoints ? choice_of_the_cell(program_.tools[k]) : choice(program_.tools[k]);
       if (choices[k].why_not.empty()) choose_payload(program_.tools[k], choices[k]);
       any |= choices[k].why_not.empty();
     }
     // Where no tool is the cell's, the program is not of this cell.
     for (std::size_t k = 0; k < choices.size() && !any; ++k) {
-      if (used[k] && (program_.tools[k].X_FT || program_.tools[k].load)) refuse(program_.tools[k], choices[k].why_not);
+      if (uses[k] != ToolUse::kNone && (program_.tools[k].X_FT || program_.tools[k].load))
+        refuse(program_.tools[k], choices[k].why_not);
     }
     if (!refusals_.empty()) return tl::make_unexpected(together(std::move(refusals_)));
     return choices;
@@ -97,6 +98,19 @@ class Choosing {
       error.row = tool.line;
     }
     refusals_.push_back(std::move(error));
+  }
+
+  /// The tool that is asked for, or the cell's only one; else the one that the program means.
+  ToolChoice choice_of_the_cell(const ProgramTool& tool) {
+    const auto asked = cell_.tools.find(asked_);
+    const bool only = asked_.empty() && cell_.tools.size() == 1;
+    if (asked == cell_.tools.end() && !only) return choice(tool);
+    ToolChoice choice;
+    choice.tool = only ? cell_.tools.begin()->first : asked->first;
+    if (!tool.X_FT || !same_tool(tool, cell_.tools.at(choice.tool)))
+      choice.note =
+          fmt::format("motions of the axes with tool {}: where {} of the cell goes is told", called(tool), choice.tool);
+    return choice;
   }
 
   ToolChoice choice(const ProgramTool& tool) {
@@ -173,10 +187,10 @@ bool is_placeholder(const StatedLoad& load) {
   return load.mass <= 0 || (load.mass <= 1 && load.p_F.norm() <= 1e-3 + 1e-9);
 }
 
-Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
+Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<ToolUse>& uses,
                                              const CellTools& cell, const std::string& tool,
                                              const std::string& payload) {
-  return Choosing(program, cell, tool, payload).choose(used);
+  return Choosing(program, cell, tool, payload).choose(uses);
 }
 
 }  // namespace trammel::cam

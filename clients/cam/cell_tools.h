@@ -23,6 +23,13 @@ struct ToolChoice {
   std::string why_not;        ///< why targets of this tool cannot be corrected; empty: they can
 };
 
+/// What the targets of a tool are.
+enum class ToolUse {
+  kNone,
+  kJoints,  ///< axes alone, and it does not matter which tool the program has
+  kPoses
+};
+
 constexpr double kToolPositionTolerance = 1e-5;  // m
 constexpr double kToolRotationTolerance = 9e-5;  // rad, 0.005 deg; and what the program's digits leave open
 constexpr double kLoadMassTolerance = 0.02;      // of the mass
@@ -31,12 +38,12 @@ constexpr double kLoadCentreTolerance = 5e-3;    // m
 /// A load that programs state where they do not know it: at most 1 kg at most 1 mm from the flange.
 [[nodiscard]] bool is_placeholder(const StatedLoad& load);
 
-/// One choice a tool of the program; `used` says which of them targets need. `tool` and `payload` are what the user
+/// One choice a tool of the program, by what its targets are. `tool` and `payload` are what the user
 /// said, or empty. Refuses with both values and their difference: a tool that is not the cell's of that name, tools of
 /// which none is the cell's, a load that is not the cell's; where motions set a load that is not the cell's, only what
 /// they do with it cannot be corrected, as long as anything else can. A tool that is not in the files must be named as
 /// one of the cell's, or by the user.
-[[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<bool>& used,
+[[nodiscard]] Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<ToolUse>& uses,
                                                            const CellTools& cell, const std::string& tool,
                                                            const std::string& payload);
 

@@ -158,11 +158,29 @@ std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes
   return axes;
 }
 
+namespace {
+
+/// Readers count lines by LF, and comments end with it.
+Status check_line_ends(const Program& program) {
+  for (const SourceFile& file : program.files) {
+    if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos) continue;
+    return refused("its lines end in CR alone").in(file.name).next("save it with line ends LF or CR LF");
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
-                                       const std::string& tool, const std::string& payload) {
-  std::vector<bool> used(program.tools.size(), false);
-  for (const ProgramTarget& target : program.targets) used[target.tool] = true;
-  Result<std::vector<ToolChoice>> choices = choose_tools(program, used, cell, tool, payload);
+                                       const std::string& tool, const std::string& payload, BareTools bare) {
+  if (const Status lines = check_line_ends(program); !lines) return tl::make_unexpected(lines.error());
+  std::vector<ToolUse> uses(program.tools.size(), ToolUse::kNone);
+  for (const ProgramTarget& target : program.targets) {
+    const bool joints = bare == BareTools::kOfTheCell && is_joints(target.coordinates);
+    ToolUse& use = uses[target.tool];
+    if (use != ToolUse::kPoses) use = joints ? ToolUse::kJoints : ToolUse::kPoses;
+  }
+  Result<std::vector<ToolChoice>> choices = choose_tools(program, uses, cell, tool, payload);
   if (!choices) return tl::make_unexpected(choices.error());
   return Finding(program, arm, cell, std::move(*choices)).find();
 }

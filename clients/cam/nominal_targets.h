@@ -25,11 +25,18 @@ struct NominalTargets {
   std::vector<std::string> notes;
 };
 
+/// Where motions command axes, and no pose depends on the tool: which tool of the cell is it?
+enum class BareTools {
+  kAsInTheProgram,
+  kOfTheCell  ///< the one that is asked for, or the cell's only one: measuring programs leave it to the controller
+};
+
 /// In the order of the motions, since one motion may leave its configuration to the one before. Refuses what
-/// choose_tools() refuses.
+/// choose_tools() refuses, and files whose lines end in CR alone.
 [[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm,
                                                      const CellTools& cell, const std::string& tool,
-                                                     const std::string& payload);
+                                                     const std::string& payload,
+                                                     BareTools bare = BareTools::kAsInTheProgram);
 
 /// X_BT of a target; empty for joints that were not found.
 [[nodiscard]] std::optional<Pose> wanted_pose(const Program& program, const Chain& robot, const CellTools& cell,

@@ -55,7 +55,7 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
                                          const AskPredictions& ask, const std::string& tool,
                                          const std::string& payload) {
   const ArmOfProgram arm(robot);
-  const Result<NominalTargets> nominal = nominal_targets(program, arm, cell, tool, payload);
+  const Result<NominalTargets> nominal = nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell);
   if (!nominal) return tl::make_unexpected(nominal.error());
   PredictedProgram result;
   result.notes = nominal->notes;

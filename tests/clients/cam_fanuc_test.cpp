@@ -115,6 +115,15 @@ TEST(Fanuc, FMeansTheFrameAndToolThatAreSelected) {
   EXPECT_NE(why(none, "P[1]").find("no UTOOL_NUM is set before it"), std::string::npos) << why(none, "P[1]");
 }
 
+TEST(Fanuc, WhereAnotherFrameOrToolIsSelectedThanThePointHasTheControllerStops) {
+  const test::Corrected tool = ls(program("   2:  UTOOL_NUM=3 ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
+  EXPECT_NE(why(tool, "P[1]").find("UT : 2, and UTOOL_NUM is 3 there"), std::string::npos) << why(tool, "P[1]");
+  const test::Corrected frame = ls(program("   2:  UFRAME_NUM=2 ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
+  EXPECT_NE(why(frame, "P[1]").find("UF : 1, and UFRAME_NUM is 2 there"), std::string::npos) << why(frame, "P[1]");
+  const test::Corrected same = ls(program("   2:  UTOOL_NUM=2 ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
+  EXPECT_TRUE(row_of(same.program, "P[1]").corrected()) << why(same, "P[1]");
+}
+
 TEST(Fanuc, WhatAJumpBackChangesHoldsAtItsLabelToo) {
   for (const std::string& jump :
        std::vector<std::string>{"JMP LBL[1]", "IF DI[1]=ON,JMP LBL[1]", "IF (DI[1]=ON),JMP LBL[1]"}) {

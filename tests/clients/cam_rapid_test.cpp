@@ -51,6 +51,19 @@ TEST(Rapid, OnlyNumbersOfTargetsChangeAndWholeLinesAreInserted) {
             std::string::npos);
 }
 
+TEST(Rapid, WhatIsSetAtRunTimeIsNamedAlsoWhereOneOfItsNumbersIs) {
+  std::string data = target("p10", "0,0,400");
+  data.replace(data.find("CONST"), 5, "PERS");
+  const test::Corrected made = rapid(program(data, "    p10.trans.z:=reg1;\n" + move_l("p10")));
+  EXPECT_NE(why(made, "p10").find("p10 is set at run time (m.mod line"), std::string::npos) << why(made, "p10");
+}
+
+TEST(Rapid, AFileWhoseLinesEndInCrAloneIsRefused) {
+  std::string text = program(target("p10", "0,0,400"), move_l("p10"));
+  std::replace(text.begin(), text.end(), '\n', '\r');
+  EXPECT_NE(rapid(text).refusal.find("end in CR alone"), std::string::npos) << rapid(text).refusal;
+}
+
 TEST(Rapid, NumbersKeepTheWayTheyAreWritten) {
   const test::Corrected made = rapid(program(target("p10", ".5,+250.,4E+02"), move_l("p10")));
   EXPECT_NE(made.program.files[0].text.find("[[.623,+249.765,4.00346E+02]"), std::string::npos)

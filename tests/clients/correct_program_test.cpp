@@ -189,5 +189,25 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}), kWrongUsage);
 }
 
+TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodTheExitCodeSaysSo) {
+  const std::string path = folder_.write("m.mod", "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n");
+  EXPECT_EQ(correct({"--model", model(), path, "-o", file("out.mod")}), kNotAll);
+  EXPECT_EQ(correct({"--model", model(), path, "-o", file("out.mod"), "--allow-failed"}), 0);
+}
+
+TEST_F(CorrectProgram, MeasuringProgramsOfEveryControllerArePredictedAsTheyArePlanned) {
+  const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
+  ASSERT_EQ(run("plan", {"--cell", cell, "--count", "4", "-o", file("p.csv"), "--rapid", file("p.mod"), "--krl",
+                         file("p.src"), "--fanuc", file("p.ls"), "--urscript", file("p.script")}),
+            0);
+  for (const char* name : {"p.mod", "p.src", "p.ls", "p.script"}) {
+    EXPECT_EQ(run("predict", {"--model", model(), file(name), "-o", file("where.csv")}), 0) << name;
+    const CsvTable where = CsvTable::parse(text("where.csv"), "where.csv").value();
+    EXPECT_GE(where.size(), 4u) << name;
+    for (std::size_t row = 0; row < where.size(); ++row)
+      EXPECT_NE(where.field(row, where.require("status").value()), "refused") << name << " row " << row + 1;
+  }
+}
+
 }  // namespace
 }  // namespace trammel::cli

@@ -90,8 +90,12 @@ TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
 
 TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {
   pid_t status = 0;
-  for (const test::ThreadOf& thread : test::threads_of(daemon_.process().pid()))
-    if (thread.name == "status") status = thread.id;
+  // A thread has its name some moments after the daemon is ready.
+  for (const auto until = std::chrono::steady_clock::now() + kLimit;
+       status == 0 && std::chrono::steady_clock::now() < until;) {
+    for (const test::ThreadOf& thread : test::threads_of(daemon_.process().pid()))
+      if (thread.name == "status") status = thread.id;
+  }
   ASSERT_NE(status, 0);
   EXPECT_EQ(get("/healthz").code, 200);
   test::StoppedThread stopped(status);

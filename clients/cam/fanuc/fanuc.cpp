@@ -393,12 +393,11 @@ class File {
     return program_.tools.size() - 1;
   }
 
-  /// `UF : F` is the frame that is selected.
+  /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the controller stops.
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
-    if (number_text != "F") return frame_of(number_text);
-    if (is_number(selected)) return frame_of(selected);
-    ProgramFrame frame{"UFRAME[F]", Pose::Identity(),
-                       selected.empty() ? "UF : F, and no UFRAME_NUM is set before it" : "UF : F, " + selected};
+    const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
+    if (why.empty()) return frame_of(number_text == "F" ? selected : number_text);
+    ProgramFrame frame{fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why};
     for (std::size_t k = 0; k < program_.frames.size(); ++k) {
       if (program_.frames[k].name == frame.name && program_.frames[k].why_not == frame.why_not) return k;
     }
@@ -406,16 +405,28 @@ class File {
     return program_.frames.size() - 1;
   }
   std::size_t tool_of(const std::string& number_text, const std::string& selected) {
-    if (number_text != "F") return tool_of(number_text);
-    if (is_number(selected)) return tool_of(selected);
+    const std::string why = why_not_there("UT", "UTOOL_NUM", number_text, selected);
+    if (why.empty()) return tool_of(number_text == "F" ? selected : number_text);
     ProgramTool tool;
-    tool.name = "UTOOL[F]";
-    tool.why_not = selected.empty() ? "UT : F, and no UTOOL_NUM is set before it" : "UT : F, " + selected;
+    tool.name = fmt::format("UTOOL[{}]", number_text);
+    tool.why_not = why;
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       if (program_.tools[k].name == tool.name && program_.tools[k].why_not == tool.why_not) return k;
     }
     program_.tools.push_back(std::move(tool));
     return program_.tools.size() - 1;
+  }
+  /// Of a point with its own number, beside what is selected where a motion goes to it; empty: they agree.
+  static std::string why_not_there(const char* own, const char* word, const std::string& number_text,
+                                   const std::string& selected) {
+    if (number_text != "F") {
+      if (!is_number(number_text) || !is_number(selected) || number_text == selected) return "";
+      return fmt::format("the point has {} : {}, and {} is {} there: the controller stops", own, number_text, word,
+                         selected);
+    }
+    if (is_number(selected)) return "";
+    return selected.empty() ? fmt::format("{} : F, and no {} is set before it", own, word)
+                            : fmt::format("{} : F, {}", own, selected);
   }
 
   void leave(const Pieces& statement, const std::string& name, const std::string& why) {

@@ -515,6 +515,7 @@ class Parser {
   /// `.trans.x`, `{3}`, `{i,j}`.
   void suffixes(Expression& made, int depth) {
     for (int count = 0; count < kDeepest; ++count) {
+      made.end = last_end();
       Expression outer;
       outer.begin = made.begin;
       outer.line = made.line;

@@ -157,7 +157,9 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   fmt::print(stderr, "{}", shown_lines(told));
   if (const Status written = write_receipts(*corrected, arguments); !written)
     return tl::make_unexpected(written.error());
-  return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
+  const bool nothing = corrected->rows.empty();
+  if (nothing) fmt::print(stderr, "note: no motion in it is understood, so it is as it was\n");
+  return (left.empty() && !nothing) || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
 }  // namespace trammel::cli
