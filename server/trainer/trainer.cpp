@@ -91,6 +91,7 @@ Result<std::vector<std::string>> Trainer::take_up() {
   if (!unfinished) notices.push_back("the jobs cannot be read: " + sentence(unfinished.error()));
   std::vector<StoredJob> jobs;
   for (StoredJob& job : unfinished.value_or(std::vector<StoredJob>())) {
+    if (book_.find(job.id)) continue;  // accepted before the start, it waits already
     const auto wanted = can_take_up(job, notices);
     if (!wanted) {
       notices.push_back(sentence(wanted.error()));

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "server/base/units.h"
+#include "server/calibrate/identify/gauss_newton.h"
 #include "server/calibrate/identify/minimise.h"
 #include "server/calibrate/identify/own_noise.h"
 #include "server/measurement/gauges.h"
@@ -14,15 +15,15 @@ namespace trammel {
 
 namespace {
 
-constexpr int kMostReweightings = 12;  // three or four are enough; more only where outliers come and go
-constexpr double kIdentifiedShare =
-    0.5;  // posterior over prior standard deviation: the data say more than the prior did
+constexpr int kMostReweightings = 12;     // three or four are enough; more only where outliers come and go
+constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation: the data say more than the prior did
+constexpr double kFewFitted = 0.05;       // of the equations: who decided them changes no discrepancy by more
 
-/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1.
-double freedom_of(const Eigen::MatrixXd& information) {
+/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1, N the information of all
+/// measurements; of `part` of the measurements, with its information in place of the first N.
+double freedom_of(const Eigen::MatrixXd& part, const Eigen::MatrixXd& information) {
   const Eigen::Index P = information.rows();
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(P, P);
-  return static_cast<double>(P) - (information + identity).llt().solve(identity).trace();
+  return (information + Eigen::MatrixXd::Identity(P, P)).llt().solve(part).trace();
 }
 
 Information decomposed(const Eigen::MatrixXd& information) {
@@ -155,9 +156,28 @@ double freedom_of_sessions(const CalibrationProblem& problem) {
   return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
+/// How many parameters were fitted to either kind at the minimum under `weights`. Few parameters beside many equations,
+/// and several sessions, are shared out by number; else positions may have decided most of them, and are fitted much
+/// closer than orientations.
+Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights, bool robust,
+               const Minimum& at) {
+  double turns = 0, equations = 0;
+  for (const Measurement& m : problem.batch.measurements) {
+    turns += !m.gauge && m.R_WT ? 3 : 0;
+    equations += m.gauge ? 1 : m.R_WT ? 6 : 3;
+  }
+  const double all = freedom_of(at.information, at.information) + freedom_of_sessions(problem);
+  const double by_number = all * turns / equations;
+  if (turns == 0 || has_sessions(problem.batch) || all < kFewFitted * equations) return {all - by_number, by_number};
+  Weights turns_alone = weights;
+  turns_alone.discrepancy = std::numeric_limits<double>::infinity();
+  const double decided = freedom_of(expand(problem, s, turns_alone, robust, at.x).information, at.information);
+  return {all - decided, decided};
+}
+
 /// Gives each session the noise that it has beyond the others, and the residuals the sigmas that follow. False where
 /// that has changed.
-bool estimate_own_noise(Identified& now, double freedom, const MeasurementBatch& given, MeasurementBatch& batch,
+bool estimate_own_noise(Identified& now, const Freedom& freedom, const MeasurementBatch& given, MeasurementBatch& batch,
                         const Tracker& tracker) {
   std::vector<SessionSetting> sessions = now.sessions;
   set_own_noise(now.residuals, freedom, now.weights, batch, sessions);
@@ -179,14 +199,14 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
   now.minimum.converged = s.scale.size() == 0;
   now.minimum.message = "nothing to identify";
   for (int round = 0; round < kMostReweightings; ++round) {
-    double freedom = 0;
+    Freedom freedom;
     if (s.scale.size() > 0) {
       Result<Minimum> found = minimise(working, s, now.weights, options, now.minimum.x);
       if (!found) return tl::make_unexpected(found.error());
       now.minimum = std::move(*found);
       result.iterations += static_cast<int>(now.minimum.costs.size());
       result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(), now.minimum.costs.end());
-      freedom = freedom_of(now.minimum.information) + freedom_of_sessions(problem);
+      freedom = fitted(working, s, now.weights, is_robust(options, now.weights), now.minimum);
       take_over_sessions(problem.batch, now, working.batch, tracker);
     }
     now.residuals = residuals_of(problem.model, working.batch, s.values_at(now.minimum.x));

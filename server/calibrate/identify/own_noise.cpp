@@ -54,7 +54,7 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
 
 }  // namespace
 
-void set_own_noise(const Residuals& r, double freedom, const Weights& weights, const MeasurementBatch& batch,
+void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights, const MeasurementBatch& batch,
                    std::vector<SessionSetting>& sessions) {
   Squares positions(sessions.size()), rotations(sessions.size());
   Eigen::Index turned = 0;
@@ -71,10 +71,11 @@ void set_own_noise(const Residuals& r, double freedom, const Weights& weights, c
         std::max(0.0, std::pow(r.sigma_rotation(turned), 2) - own_turn) + std::pow(weights.discrepancy_rotation, 2);
     rotations.add(m.session, r.rotation.col(turned++).squaredNorm(), rest_turn);
   }
-  const double equations = 3.0 * static_cast<double>(r.position.cols() + turned);
-  const double share = std::max(0.1, 1 - freedom / equations);
-  const std::vector<double> beyond = beyond_others(positions, share);
-  const std::vector<double> turns_beyond = beyond_others(rotations, share);
+  const auto share_left = [](double fitted, Eigen::Index vectors) {
+    return std::max(0.1, 1 - fitted / (3.0 * static_cast<double>(std::max<Eigen::Index>(1, vectors))));
+  };
+  const std::vector<double> beyond = beyond_others(positions, share_left(freedom.positions, r.position.cols()));
+  const std::vector<double> turns_beyond = beyond_others(rotations, share_left(freedom.turns, turned));
   for (std::size_t s = 0; s < sessions.size(); ++s) {
     sessions[s].own_noise = std::sqrt(beyond[s]);
     sessions[s].own_noise_rotation = std::sqrt(turns_beyond[s]);

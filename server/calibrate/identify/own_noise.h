@@ -8,8 +8,8 @@ namespace trammel {
 
 /// Sets own_noise of each session. The median of its squared residuals, in units of what the rest of the sessions
 /// suggests, tells how noisy it is; bad poses do not matter to it. A session is as noisy as the others unless it is
-/// more so than chance would make it. `r` are the residuals of `batch`, to which `freedom` parameters were fitted.
-void set_own_noise(const Residuals& r, double freedom, const Weights& weights, const MeasurementBatch& batch,
+/// more so than chance would make it. `r` are the residuals of `batch`, to which so many parameters were fitted.
+void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& weights, const MeasurementBatch& batch,
                    std::vector<SessionSetting>& sessions);
 
 /// Whether measurements have nearly the same sigmas under both.

@@ -82,6 +82,9 @@ Squares turns_of(const Residuals& r) {
   return turns;
 }
 
+/// Of so many axes, the part that no parameter was fitted to.
+double share_left(double freedom, double axes) { return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0; }
+
 }  // namespace
 
 double position_sigma(const Measurement& m, const Cell& cell) { return m.sigma.value_or(cell.tracker.sigma); }
@@ -129,12 +132,12 @@ Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch
   return r;
 }
 
-Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects) {
+Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before, bool drop_suspects) {
   const Squares turns = turns_of(r);
-  const double all = 3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size()) + turns.axes;
-  const double share = std::max(0.0, 1 - freedom / all);
+  const double lengths = 3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size());
   const Squares trusted = lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
-  return {surplus(trusted, trusted.axes * share), surplus(turns, turns.axes * share), true};
+  return {surplus(trusted, trusted.axes * share_left(freedom.positions, lengths)),
+          surplus(turns, turns.axes * share_left(freedom.turns, turns.axes)), true};
 }
 
 bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker) {

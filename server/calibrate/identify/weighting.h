@@ -42,9 +42,16 @@ struct Residuals {
 [[nodiscard]] Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch,
                                      const Eigen::VectorXd& values);
 
-/// The discrepancies under which the residuals are as large as expected after `freedom` parameters were fitted to them.
+/// How many parameters were fitted to the residuals of either kind: what each kind decides, not the priors.
+struct Freedom {
+  double positions = 0;  ///< and gauges
+  double turns = 0;
+};
+
+/// The discrepancies under which the residuals are as large as expected after these parameters were fitted to them.
 /// `drop_suspects`: positions that are suspects under `before` do not count.
-[[nodiscard]] Weights estimated_weights(const Residuals& r, double freedom, const Weights& before, bool drop_suspects);
+[[nodiscard]] Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weights& before,
+                                        bool drop_suspects);
 /// Whether measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
