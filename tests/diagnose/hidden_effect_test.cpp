@@ -281,6 +281,17 @@ TEST(NumberOfAGeometry, IsGivenBesideTheOthersOfItsSourceWhereTheseAreWrongToo) 
   EXPECT_EQ(alone.findings[0].cause.parameter, "q2");
 }
 
+TEST(TheOnlyCauseOfARobot, IsNamedForCertainWhereThePosesHeldOutGainByIt) {
+  const hidden::HiddenCase hidden = hidden::hide({.kind = "base", .seed = 1001, .lambda = 120, .poses = 300});
+  const Diagnosis diagnosis = test::demand(test::diagnose_files(hidden, quick()));
+  ASSERT_EQ(diagnosis.findings.size(), 1U) << test::told(diagnosis);
+  const Finding& base = diagnosis.findings.front();
+  EXPECT_EQ(base.cause.cause, "base");
+  EXPECT_TRUE(base.could_also_be.empty()) << test::told(diagnosis);
+  EXPECT_NEAR(base.held_out_gain, diagnosis.held_out_before->rms - diagnosis.held_out_after->rms, 1e-9)
+      << "there is nothing else in the model";
+}
+
 TEST(Doubt, WhatOnlySomePosesRecordIsNotLookedForAndSaid) {
   hidden::HiddenCase hidden = hidden::hide({.kind = "thermal_growth", .seed = 2, .lambda = 300, .poses = 120});
   MeasurementBatch batch = test::demand(parse_batch_csv(hidden.batch_csv, "batch"));

@@ -68,6 +68,13 @@ TEST(Folds, PredictAHeldOutPoseFromTheOthersOnly) {
   EXPECT_GT((change.array().abs() > 1e-3).count(), 20);
 }
 
+TEST(Folds, WithoutAnyColumnLeaveTheDataAsTheyAre) {
+  const Calibrated calibrated(40);
+  const LinearProblem problem = calibrated.problem();
+  const Folds folds(problem, problem.nuisance());
+  EXPECT_EQ(folds.held_out_residual(problem.residual(), {}), problem.residual());
+}
+
 TEST(GearFamily, FindsTheOrderThatWasPlantedInTheRowsHoweverManyTeethMesh) {
   const Calibrated calibrated(120);
   const LinearProblem problem = calibrated.problem();

@@ -42,19 +42,22 @@ Folds::Folds(const LinearProblem& problem, MatrixXd columns) : columns_(std::mov
 
 MatrixXd Folds::information_without(std::size_t fold) const { return total_ - information_[fold]; }
 
-VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>& chosen) const {
+VectorXd Folds::held_out_residual(const VectorXd& data) const {
   std::vector<Index> all(static_cast<std::size_t>(columns_.cols()));
   std::iota(all.begin(), all.end(), Index{0});
-  const std::vector<Index>& places = chosen.empty() ? all : chosen;
+  return held_out_residual(data, all);
+}
+
+VectorXd Folds::held_out_residual(const VectorXd& data, const std::vector<Index>& chosen) const {
+  if (chosen.empty()) return data;
   const VectorXd right = columns_.transpose() * data;
   VectorXd left = data;
   for (std::size_t fold = 0; fold < held_.size(); ++fold) {
     const MatrixXd Z = columns_(held_[fold], Eigen::all);
     const VectorXd known = right - Z.transpose() * data(held_[fold]);
-    const MatrixXd information = information_without(fold);
-    const MatrixXd inverse = inverse_factor_of(chosen.empty() ? information : MatrixXd(information(places, places)));
-    const VectorXd numbers = inverse.transpose() * (inverse * VectorXd(known(places)));
-    left(held_[fold]) -= Z(Eigen::all, places) * numbers;
+    const MatrixXd inverse = inverse_factor_of(information_without(fold)(chosen, chosen));
+    const VectorXd numbers = inverse.transpose() * (inverse * VectorXd(known(chosen)));
+    left(held_[fold]) -= Z(Eigen::all, chosen) * numbers;
   }
   return left;
 }

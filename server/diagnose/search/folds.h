@@ -16,10 +16,11 @@ class Folds {
 
   [[nodiscard]] std::size_t count() const { return held_.size(); }
 
-  /// R: what is left of every row of `data` by a fit of the columns in `chosen` (empty: all) to the poses of the other
-  /// folds.
+  /// R: what is left of every row of `data` by a fit of all columns to the poses of the other folds.
+  [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data) const;
+  /// The same of the columns in `chosen` alone, which may be none.
   [[nodiscard]] Eigen::VectorXd held_out_residual(const Eigen::VectorXd& data,
-                                                  const std::vector<Eigen::Index>& chosen = {}) const;
+                                                  const std::vector<Eigen::Index>& chosen) const;
 
   /// Sum of squares of the held-out rows: without any family, and with the best one of those `admitted`, which every
   /// fold chooses by itself.
