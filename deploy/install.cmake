@@ -11,6 +11,10 @@ install(FILES ${PROJECT_BINARY_DIR}/shell/trammel DESTINATION ${CMAKE_INSTALL_DA
 install(FILES ${PROJECT_BINARY_DIR}/shell/_trammel DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT trammel)
 install(FILES ${PROJECT_BINARY_DIR}/shell/trammel.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT trammel)
 install(PROGRAMS deploy/supervise DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel COMPONENT trammeld)
+install(PROGRAMS deploy/security/keys DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/trammel COMPONENT trammeld)
+install(FILES deploy/security/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/trammeld RENAME security.md COMPONENT trammeld)
+install(FILES deploy/watching/alerts.yml deploy/watching/dashboard.json deploy/watching/prometheus.yml deploy/watching/README.md
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel/watching COMPONENT trammeld)
 install(FILES deploy/trammeld.service DESTINATION lib/systemd/system COMPONENT trammeld)
 
 # libtrammel: find_package(Trammel), Trammel::trammel.
