@@ -1,5 +1,6 @@
 // Reflectors on one flange, and whether 95 % intervals hold 95 %, on drawn arms of the second simulation.
-// `flange_benchmark [--only fourth|coverage|ur10|speed] [--seeds N] [--poses N]`.
+// `flange_benchmark [--only fourth|coverage|ur10|speed] [--seeds N] [--poses N] [--bias KERNEL]`; with --poses coverage
+// of that many poses alone.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -29,6 +30,8 @@ struct Options {
   std::string only;
   int seeds = 12;
   int poses = 200;
+  std::string bias = "auto";
+  bool poses_asked = false;
 };
 
 constexpr double kWave = 2.5e-4;    // rad: with it the physics leaves some tenths of a millimetre
@@ -158,13 +161,18 @@ void fourth(const Options& options) {
 
 // Each model: trained with few poses, asked at poses of the same ranges, tracker's noise left out.
 void coverage(const Options& options) {
-  for (const int poses : {20, 40, 60, 200}) {
+  for (const int poses : options.poses_asked ? std::vector<int>{options.poses} : std::vector<int>{20, 40, 60, 200}) {
     double inside = 0, least = 1;
     for (int seed = 1; seed <= options.seeds; ++seed) {
       const auto s = static_cast<std::uint64_t>(seed);
       const World world = drawn_world(s);
-      const CompensatedModel model = trained(world, with_reflectors(scattered(poses, s + 77), {0}), "auto", s + 2000);
-      const double share = fresh_errors(world, model, 0, s).inside;
+      const CompensatedModel model =
+          trained(world, with_reflectors(scattered(poses, s + 77), {0}), options.bias, s + 2000);
+      const Fresh fresh = fresh_errors(world, model, 0, s);
+      const double share = fresh.inside;
+      std::printf("%3d poses, seed %2d: %-12s %.4f mm, inside %5.1f %%, in domain %5.1f %%\n", poses, seed,
+                  model.parts().bias ? model.parts().bias->kernel.c_str() : "none", fresh.rms_mm, 100 * share,
+                  100 * fresh.in_domain);
       inside += 100 * share / options.seeds;
       least = std::min(least, share);
     }
@@ -236,7 +244,11 @@ int run(int argc, char** argv) {
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::strcmp(argv[i], "--only") == 0) options.only = argv[i + 1];
     if (std::strcmp(argv[i], "--seeds") == 0) options.seeds = std::stoi(argv[i + 1]);
-    if (std::strcmp(argv[i], "--poses") == 0) options.poses = std::stoi(argv[i + 1]);
+    if (std::strcmp(argv[i], "--bias") == 0) options.bias = argv[i + 1];
+    if (std::strcmp(argv[i], "--poses") == 0) {
+      options.poses = std::stoi(argv[i + 1]);
+      options.poses_asked = true;
+    }
   }
   const auto asked = [&](const char* name) { return options.only.empty() || options.only == name; };
   if (asked("fourth")) fourth(options);

@@ -58,6 +58,17 @@ TEST(LinkWeights, AreNotAddedWhereTheControllerCompensatesThem) {
   }
 }
 
+TEST(LinkWeights, BesideUnknownCompliancesAreFoundInFewStepsThoughOnlyTheirProductIsSeen) {
+  // The controller compensates the links' weights and the cell does not say so: only the priors tell the weights from
+  // the compliances, and the way to what they like best is bent.
+  const auto cell = test::cell_7();
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 1500, 1, false);
+  const CalibrationResult found =
+      test::demand(calibrate(cell, {"base", "geometry", "link_weights", "compliance_linear"}, batch, {}));
+  EXPECT_TRUE(found.converged);
+  EXPECT_LE(found.iterations, 30);
+}
+
 TEST(LinkWeights, EveryArmIsPredictedToTheNoiseWhateverItWeighs) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const HeavyArm arm = draw_heavy_arm({.seed = seed});

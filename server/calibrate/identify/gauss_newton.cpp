@@ -24,6 +24,8 @@ constexpr double kNoDamping = 1e-6;
 // that falls is how well the priors like it.
 constexpr double kIdleFall = 0.05;  // nat a step
 constexpr int kIdleSteps = 3;
+// A full step along such a valley leaves it, and the next ones come back, farther down.
+constexpr int kMostUphill = 5;  // steps
 
 /// The Gauss-Newton step from the point of `at`. Parameters at their bound that would leave it stay.
 Eigen::VectorXd bounded_step(const Expansion& at, const Eigen::VectorXd& x, const Eigen::VectorXd& lower) {
@@ -201,44 +203,68 @@ Minimum minimum_at(const Standing& standing, std::vector<double> costs) {
   return found;
 }
 
+/// A search downhill. A full step may lead uphill for a while; then it goes back to the best point, and is damped.
+struct Descent {
+  Standing now, best;
+  double damping = 0;
+  int idle = 0;    // steps in a row that gained nothing
+  int uphill = 0;  // undamped steps since the best point
+
+  explicit Descent(Standing start) : now(std::move(start)), best(now) {}
+  [[nodiscard]] bool is_higher() const {
+    return !std::isfinite(now.at.cost) || now.at.cost > best.at.cost * (1 + 1e-12) + kNoRise;
+  }
+  /// After a step to a higher point that was not the last one. False: nothing leads downhill.
+  bool go_on_or_back(bool settled) {
+    if (damping == 0 && !settled && std::isfinite(now.at.cost) && ++uphill < kMostUphill) return true;
+    now = best;
+    uphill = 0;
+    damping = std::max(10 * damping, kFirstDamping);
+    return damping <= kMostDamping;
+  }
+  void accept() {
+    if (!is_higher()) {
+      idle = best.at.cost - now.at.cost < kIdleFall ? idle + 1 : 0;
+      best = now;
+    }
+    uphill = 0;
+    damping = damping < kNoDamping ? 0 : damping / 10;
+  }
+};
+
 }  // namespace
 
 Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledParameters& s, const Weights& weights,
                               const CalibrateOptions& options, const Eigen::VectorXd& start) {
   const Eigen::VectorXd lower = s.lower();
   const bool robust = is_robust(options, weights);
-  Standing now{start.cwiseMax(lower), problem, std::vector<Similarity>(problem.batch.sessions.size()), {}};
-  now.at = expand(now.problem, s, weights, robust, now.x);
-  std::vector<double> costs = {now.at.cost};
-  double damping = 0;
-  int idle = 0;  // steps in a row that gained nothing
-  for (int k = 0; k < std::max(1, options.max_iterations); ++k) {
-    if (!std::isfinite(now.at.cost)) break;
-    const JointStep step = joint_step(now, lower, damping);
-    Standing next = now;
-    next.x += step.parameters;
-    move_sessions(next, step.motions);
-    next.at = expand(next.problem, s, weights, robust, next.x);
+  const auto expand_now = [&](Standing& here) { here.at = expand(here.problem, s, weights, robust, here.x); };
+  Standing first{start.cwiseMax(lower), problem, std::vector<Similarity>(problem.batch.sessions.size()), {}};
+  expand_now(first);
+  Descent search(std::move(first));
+  std::vector<double> costs = {search.now.at.cost};
+  for (int k = 0; k < std::max(1, options.max_iterations) && std::isfinite(search.best.at.cost); ++k) {
+    const JointStep step = joint_step(search.now, lower, search.damping);
     const bool settled =
-        damping == 0 && step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
-    const bool uphill = !std::isfinite(next.at.cost) || next.at.cost > now.at.cost * (1 + 1e-12) + kNoRise;
-    if (!uphill) idle = now.at.cost - next.at.cost < kIdleFall ? idle + 1 : 0;
-    if (uphill && !settled) {
-      damping = std::max(10 * damping, kFirstDamping);
-      if (damping > kMostDamping) break;
+        search.damping == 0 && step.in_standard_deviations < (weights.estimated ? kSettledStep : kFirstSettledStep);
+    search.now.x += step.parameters;
+    move_sessions(search.now, step.motions);
+    expand_now(search.now);
+    if (search.is_higher() && !(settled && search.uphill == 0)) {
+      if (!search.go_on_or_back(settled)) break;
       continue;
     }
-    if (!uphill) now = std::move(next);
-    costs.push_back(now.at.cost);
-    damping = damping < kNoDamping ? 0 : damping / 10;
-    if (!settled && idle < kIdleSteps) continue;
-    Minimum found = minimum_at(now, std::move(costs));
+    search.accept();
+    costs.push_back(search.best.at.cost);
+    if (!settled && search.idle < kIdleSteps) continue;
+    Minimum found = minimum_at(search.best, std::move(costs));
     found.converged = true;
     found.message = fmt::format("last step {:.1e} standard deviations", step.in_standard_deviations);
     return found;
   }
-  if (!std::isfinite(now.at.cost)) return refused("calibration of batch {}: the solver failed", problem.batch.id);
-  return minimum_at(now, std::move(costs));
+  if (!std::isfinite(search.best.at.cost))
+    return refused("calibration of batch {}: the solver failed", problem.batch.id);
+  return minimum_at(search.best, std::move(costs));
 }
 
 }  // namespace trammel
