@@ -9,6 +9,7 @@
 #include "server/compensate/domain.h"
 #include "server/trainer/pipeline/leftover.h"
 #include "tests/support/demand.h"
+#include "tests/support/heavy_arm.h"
 #include "tests/support/outside.h"
 #include "tests/support/virtual_robot.h"
 
@@ -48,6 +49,26 @@ CalibrationResult as_it_is(CalibrationResult found) {
   found.covariance.setZero();
   found.suspects.clear();
   return found;
+}
+
+TEST(LeftOut, WithoutABlockTellsWhatIdentificationFromTheRestFindsHoweverUncertainTheLinksWeightsAre) {
+  const test::HeavyArm arm = test::draw_heavy_arm({.seed = 3, .payloads = 0});
+  const MeasurementBatch batch = test::measured(arm, 200, 1);
+  const std::vector<std::string> sources = {"base", "geometry", "link_weights", "compliance_linear"};
+  const CalibrationResult all = test::demand(calibrate(arm.cell, sources, batch, {}));
+  std::vector<Eigen::Index> block(25);
+  std::iota(block.begin(), block.end(), Eigen::Index{50});
+  const auto without = LeftOut(all, batch).without(block);
+  ASSERT_TRUE(without);
+  MeasurementBatch fewer = batch;
+  fewer.measurements.erase(fewer.measurements.begin() + 50, fewer.measurements.begin() + 75);
+  const CalibrationResult rest = test::demand(calibrate(arm.cell, sources, fewer, {}));
+  const Matrix3 R_BW = rest.model.X_WB.linear().transpose();
+  for (const Eigen::Index i : block) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
+    const Vector3 left_B = R_BW * (m.p_W - rest.model.pose_W(m.context).translation());
+    EXPECT_LT((without->residual_B.row(i).transpose() - left_B).norm(), 4e-6) << "pose " << i;
+  }
 }
 
 TEST(Extrapolation, FarFromItsPosesAModelClaimsNoMoreThanItKnows) {

@@ -11,15 +11,20 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no part in it.
+/// J R with R Rᵀ the covariance, which may be singular or empty. Parameters that are exact have no part in it. Each is
+/// taken in its own standard deviation: beside hundreds of kg m a square root would lose angles and compliances.
 MatrixXd times_square_root(const MatrixXd& J, const MatrixXd& covariance) {
   std::vector<Index> open;
   for (Index k = 0; k < covariance.rows(); ++k) {
     if (covariance(k, k) > 0) open.push_back(k);
   }
   if (open.empty()) return MatrixXd(J.rows(), 0);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance(open, open));
-  return J(Eigen::all, open) * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const VectorXd stddev = covariance.diagonal()(open).cwiseSqrt();
+  const VectorXd inverse = stddev.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inverse.asDiagonal() * covariance(open, open) *
+                                                      inverse.asDiagonal());
+  return J(Eigen::all, open) * stddev.asDiagonal() * eigen.eigenvectors() *
+         eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 std::vector<const Measurement*> observations(const CalibrationResult& found, const MeasurementBatch& batch) {
