@@ -108,6 +108,8 @@ Status check_fit(const ModelParts& parts) {
   if (!parts.physics.values.allFinite() || !parts.covariance.allFinite()) {
     return refused("model: a parameter is not finite").of("parameters");
   }
+  if (!std::isfinite(parts.bias_spread) || parts.bias_spread < 1)
+    return refused("model: a bias_spread of {}, at least 1 is expected", parts.bias_spread).of("bias_spread");
   if (Status origin = check_origin(parts); !origin) return origin;
   if (parts.bias && parts.bias->q.cols() != n)
     return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);

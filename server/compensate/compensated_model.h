@@ -126,6 +126,8 @@ class CompensatedModel {
   [[nodiscard]] Matrix3 identified_since(const Eigen::MatrixXd& J_B) const;
   /// m²: variance of one axis that the physics leaves over at a pose.
   [[nodiscard]] double unlearned(const CalibratedPose& pose) const;
+  /// `covariance` of one measurement with the bias_spread as far as the bias is taken, the instrument's part as it is.
+  [[nodiscard]] Matrix3 spread(const Matrix3& covariance, double bias_weight) const;
   /// Adds what the bias says with the weight that stands in `prediction`; the covariance then, what was unsaid left
   /// out.
   [[nodiscard]] Matrix3 add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,

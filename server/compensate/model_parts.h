@@ -87,6 +87,7 @@ struct ModelParts {
   JointVector q_min, q_max;                ///< range of the training poses, rad
   JointVector extrapolation_slope;         ///< see Domain::growth(); empty in models from before it was learned
   double prior_share_limit = 0;            ///< a pose in domain has no larger prior share
+  double bias_spread = 1;  ///< times the standard deviation of what a pose misses, the instrument's aside
   std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
   ModelProvenance provenance;                                  ///< id and hash are filled in by make()
   Evaluation training;                                         ///< on its training poses

@@ -216,6 +216,13 @@ double CompensatedModel::unlearned(const CalibratedPose& pose) const {
   return metrology + parts().discrepancy * parts().discrepancy + pose.growth;
 }
 
+Matrix3 CompensatedModel::spread(const Matrix3& covariance, double bias_weight) const {
+  if (parts().bias_spread == 1) return covariance;
+  const Matrix3 instrument = std::pow(cell().tracker.sigma, 2) * Matrix3::Identity();
+  const double square = 1 + bias_weight * (std::pow(parts().bias_spread, 2) - 1);
+  return instrument + square * (covariance - instrument);
+}
+
 Matrix3 CompensatedModel::add_position_bias(const CalibratedPose& pose, const BiasPrediction& bias,
                                             ErrorPrediction* prediction) const {
   const double weight = prediction->bias_weight;
@@ -273,7 +280,7 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
     const double share = learned->position.prior_share;
     prediction.in_domain &= share <= parts().prior_share_limit;
     prediction.bias_weight = trained_with ? domain.bias_weight(context.q, share) : 0.0;
-    covariance = add_position_bias(pose, learned->position, &prediction) + unsaid;
+    covariance = spread(add_position_bias(pose, learned->position, &prediction), prediction.bias_weight) + unsaid;
     if (inside_->bias_has_parameters && prediction.bias_weight < 1) {
       // Near its poses the bias has learned this; part of it went into the weights, so its direction is not known.
       const Vector3 left_B = inside_->bias_physics.beyond_first_order(context, inside_->bias->parameter_weights());

@@ -216,6 +216,7 @@ void read_domain(const Json& content, ModelParts& parts) {
   parts.q_min = vector_from(content.at("q_min"));
   parts.q_max = vector_from(content.at("q_max"));
   parts.prior_share_limit = number_from(content, "prior_share_limit");
+  if (content.contains("bias_spread")) parts.bias_spread = number_from(content, "bias_spread");
   if (content.contains("extrapolation_slope")) {
     parts.extrapolation_slope = vector_from(content.at("extrapolation_slope"));
   }

@@ -198,6 +198,7 @@ void add_domain(const ModelParts& parts, Json& content) {
   content["q_min"] = matrix_json(parts.q_min);
   content["q_max"] = matrix_json(parts.q_max);
   content["prior_share_limit"] = parts.prior_share_limit;
+  if (parts.bias_spread != 1) content["bias_spread"] = parts.bias_spread;
   content["trained_with"] = parts.trained_with;
   if (parts.extrapolation_slope.size() > 0) content["extrapolation_slope"] = matrix_json(parts.extrapolation_slope);
   if (parts.temperature_mean) {

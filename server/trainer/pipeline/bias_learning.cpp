@@ -5,6 +5,7 @@
 
 #include "server/bias/choose_bias.h"
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/trainer/pipeline/bias_spread.h"
 #include "server/trainer/pipeline/extrapolation.h"
 #include "server/trainer/pipeline/given_up.h"
 #include "server/trainer/pipeline/leftover.h"
@@ -92,6 +93,7 @@ void forget_bias(CompensatedModel::Parts& parts) {
   parts.bias_origin.reset();
   parts.bias_contexts.clear();
   parts.prior_share_limit = 0;
+  parts.bias_spread = 1;
 }
 
 /// What does not fit the others is not learned: a smooth function would spread it over its neighbours.
@@ -164,8 +166,10 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   if (!learned) return tl::make_unexpected(learned.error());
   if (!learned->bias) return {};
   take_over(parts, *learned->bias, batch, left_out);
+  parts.bias_spread = bias_spread(learned->problem, *learned->bias, left_out, seed,
+                                  [&](double share) { return progress(0.6 + 0.2 * share); });
   options.kernel = without_flange(learned->bias->state().kernel);
-  options.progress = [&](double share) { return progress(0.6 + 0.4 * share); };
+  options.progress = [&](double share) { return progress(0.8 + 0.2 * share); };
   return add_rotation_bias(parts, batch, learned->problem, options);
 }
 
