@@ -33,6 +33,10 @@
   CAUSE(rail_scale)                   \
   CAUSE(rack_pitch)                   \
   CAUSE(rail_straightness)            \
+  CAUSE(early_reading)                \
+  CAUSE(hysteresis)                   \
+  CAUSE(thermal_zero)                 \
+  CAUSE(lagged_growth)                \
   CAUSE(instrument_scale)             \
   CAUSE(outlier)                      \
   CAUSE(drift)                        \

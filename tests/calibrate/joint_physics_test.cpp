@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <memory>
 #include <numbers>
 
 #include "server/base/units.h"
@@ -254,6 +256,126 @@ TEST(JointPhysics, TheInstrumentsBendAndTemperatureShowItsScaleDoesNot) {
   EXPECT_EQ((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(), 0);
   asked.served = false;
   EXPECT_GT((found.model.pose_W(asked).translation() - without.pose_W(asked).translation()).norm(), 1e-5);
+}
+
+/// An arm that comes to every pose from the one before it, and knows which it was.
+struct Visiting {
+  std::shared_ptr<std::vector<MeasuringPose>> poses = std::make_shared<std::vector<MeasuringPose>>();
+  HeavyArm arm;
+  explicit Visiting(std::uint64_t seed,
+                    const std::function<void(const MeasuringPose&, const MeasuringPose&, Moment&)>& act) {
+    arm = arm_with(seed, [act, visited = poses](const MeasuringPose& p, Moment& m) {
+      if (p.index > 0) act((*visited)[static_cast<std::size_t>(p.index) - 1], p, m);
+    });
+  }
+  [[nodiscard]] MeasurementBatch measured(int count, std::uint64_t seed) const {
+    hidden::Random random(seed);
+    *poses = hidden::draw_poses({.count = count, .loads = 2}, random);
+    return test::measured_at(arm, *poses, seed + 50);
+  }
+};
+
+TEST(JointPhysics, WhatIsMeasuredBeforeStandstillLacksAShareOfTheMove) {
+  Coverage coverage;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    // Each servo settles exponentially; the instrument begins 2 s after the controller says that it has arrived.
+    const auto left = [](Eigen::Index joint) { return std::exp(-2 / (0.19 + 0.02 * static_cast<double>(joint))); };
+    const Visiting visiting(seed, [&](const MeasuringPose& before, const MeasuringPose& p, Moment& m) {
+      for (Eigen::Index j = 0; j < hidden::kJoints; ++j) m.q(j) -= left(j) * (p.q(j) - before.q(j));
+    });
+    const MeasurementBatch batch = visiting.measured(400, seed);
+    const CalibrationResult early = test::demand(calibrate(visiting.arm.cell, with({"early_reading"}), batch, {}));
+    const CalibrationResult none = test::demand(calibrate(visiting.arm.cell, kM3, batch, {}));
+    const MeasurementBatch fresh = visiting.measured(400, 100 + seed);
+    EXPECT_LE(held_out_mm(early, fresh), 1.05 * kNoise_mm);
+    EXPECT_GE(held_out_mm(none, fresh), 2 * kNoise_mm);
+    for (Eigen::Index j = 0; j < hidden::kJoints; ++j) coverage.add(early, {{fmt::format("early{}", j + 1), left(j)}});
+  }
+  EXPECT_GE(coverage.share(), 0.88) << coverage.all;
+}
+
+TEST(JointPhysics, FrictionHoldsAJointBackTowardsWhereItCameFrom) {
+  // A bristle model: the held-back angle decays along the way, and remembers more than the last pose.
+  const double half_width = 8e-5;
+  const double way = 0.03;
+  double held = 0;
+  const Visiting visiting(2, [&](const MeasuringPose& before, const MeasuringPose& p, Moment& m) {
+    const double moved = p.q(2) - before.q(2);
+    const double full = std::copysign(half_width, moved);
+    held = full + (held - full) * std::exp(-std::abs(moved) / way);
+    m.q(2) -= held;
+  });
+  const MeasurementBatch batch = visiting.measured(400, 1);
+  const MeasurementBatch fresh = visiting.measured(400, 2);
+  const CalibrationResult found = expect_to_explain(visiting.arm, {"hysteresis:3"}, batch, fresh, 1.5);
+  Coverage coverage;
+  coverage.add(found, {{"hyst3", half_width}});
+  EXPECT_EQ(coverage.within, 1);
+}
+
+/// The temperature of a body that follows the thermometer, in steps of a second.
+std::vector<double> temperatures_of_a_body(const std::vector<MeasuringPose>& poses, double lag_s) {
+  std::vector<double> all = {poses.front().temperature_c};
+  double body = all.front();
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const double whole = poses[i].time_s - poses[i - 1].time_s;
+    const int steps = std::max(1, static_cast<int>(std::lround(whole)));
+    for (int k = 0; k < steps; ++k) {
+      const double share = (k + 0.5) / steps;
+      const double air = poses[i - 1].temperature_c + share * (poses[i].temperature_c - poses[i - 1].temperature_c);
+      body += (air - body) * whole / steps / lag_s;
+    }
+    all.push_back(body);
+  }
+  return all;
+}
+
+TEST(JointPhysics, AJointsZeroFollowsTheTemperatureWithALag) {
+  Coverage coverage;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const double lag_s = 1200 + 500 * static_cast<double>(seed);
+    const double rate = 1.2e-5;  // rad/K
+    std::vector<double> gearbox;
+    const HeavyArm arm = arm_with(seed, [&](const MeasuringPose& p, Moment& m) {
+      m.q(1) += rate * (gearbox[static_cast<std::size_t>(p.index)] - 20);
+    });
+    const auto measured = [&](std::uint64_t of) {
+      hidden::Random random(of);
+      const std::vector<MeasuringPose> poses = hidden::draw_poses({.count = 600, .loads = 2}, random);
+      gearbox = temperatures_of_a_body(poses, lag_s);
+      return test::measured_at(arm, poses, of + 50);
+    };
+    const MeasurementBatch batch = measured(seed);
+    const CalibrationResult found = expect_to_explain(arm, {"thermal_zero:2"}, batch, measured(100 + seed), 1.2);
+    coverage.add(found, {{"zero_rate2", rate}, {"heat_lag2", lag_s}});
+  }
+  EXPECT_GE(coverage.share(), 0.85) << coverage.all;
+}
+
+TEST(JointPhysics, LinksThatWarmUpLateGrowLate) {
+  const double growth = 1.1e-5;
+  const double lag_s = 2400;
+  std::vector<double> links;
+  const HeavyArm arm = arm_with(3, [&](const MeasuringPose& p, Moment& m) {
+    for (hidden::Link& link : m.arm.links) {
+      link.a *= 1 + growth * (links[static_cast<std::size_t>(p.index)] - 20);
+      link.d *= 1 + growth * (links[static_cast<std::size_t>(p.index)] - 20);
+    }
+  });
+  const auto measured = [&](std::uint64_t of) {
+    hidden::Random random(of);
+    const std::vector<MeasuringPose> poses = hidden::draw_poses({.count = 600, .loads = 2}, random);
+    links = temperatures_of_a_body(poses, lag_s);
+    return test::measured_at(arm, poses, of + 50);
+  };
+  const MeasurementBatch batch = measured(1);
+  const MeasurementBatch fresh = measured(2);
+  const CalibrationResult found = expect_to_explain(arm, {"lagged_growth"}, batch, fresh, 1.5);
+  const CalibrationResult at_once = test::demand(calibrate(arm.cell, with({"thermal_growth"}), batch, {}));
+  EXPECT_GE(held_out_mm(at_once, fresh), 1.1 * kNoise_mm);
+  Coverage coverage;
+  coverage.add(found, {{"growth", growth}, {"heat_lag", lag_s}});
+  EXPECT_EQ(coverage.within, 2);
 }
 
 }  // namespace

@@ -36,6 +36,8 @@ PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
   context.time = 5000;
   context.temperature = 26.5;
   context.velocity = JointVector::LinSpaced(cell.robot.size(), -0.5, 0.7);
+  context.before = JointVector::Constant(cell.robot.size(), 0.2);
+  for (const double lag : kHeatLags) context.lagged.push_back(22 + 3 * std::exp(-lag / 3000));
   context.index = 3;
   return context;
 }
@@ -222,13 +224,39 @@ TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
 /// What belongs to the measuring or to what nobody knows of a request.
 TEST(ErrorSources, NothingServedHasWhatBelongsToTheInstrument) {
   const auto cell = cell_7();
-  for (const char* spec : {"tracker_drift", "tracker_moved@2", "instrument_scale"}) {
+  for (const char* spec : {"tracker_drift", "tracker_moved@2", "instrument_scale", "early_reading"}) {
     PhysicalModel model = *make_physical_model(cell, {spec});
     model.values = plausible_values(model, 11);
     PoseContext context = some_pose(*cell, 12);
     context.served = true;
     EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
   }
+}
+
+TEST(ErrorSources, AnUnknownPoseBeforeHasNoEffect) {
+  const auto cell = cell_7();
+  for (const char* spec : {"hysteresis:2", "early_reading"}) {
+    PhysicalModel model = *make_physical_model(cell, {spec});
+    model.values = plausible_values(model, 11);
+    PoseContext context = some_pose(*cell, 12);
+    context.before.reset();
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+  }
+}
+
+TEST(ErrorSources, AGearboxFollowsTheTemperatureWithItsOwnLag) {
+  const auto cell = cell_7();
+  PhysicalModel model = *make_physical_model(cell, {"thermal_zero:1"});
+  PoseContext context = some_pose(*cell, 14);
+  const auto turned = [&](double lag) {
+    model.values << 1e-5, lag;
+    return rotation_log(model.pose_W(context).linear() * model.nominal_pose_W(context).linear().transpose()).z();
+  };
+  EXPECT_NEAR(turned(kHeatLags[4]), 1e-5 * (context.lagged[4] - 20), 1e-12);
+  EXPECT_NEAR(turned(1), 1e-5 * (context.lagged.front() - 20), 1e-12);
+  EXPECT_NEAR(turned(1e6), 1e-5 * (context.lagged.back() - 20), 1e-12);
+  context.lagged.clear();  // nobody knows what was before: the thermometer's
+  EXPECT_NEAR(turned(1000), 1e-5 * (*context.temperature - 20), 1e-12);
 }
 
 TEST(ErrorSources, AStepBeginsAtItsPose) {
