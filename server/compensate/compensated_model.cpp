@@ -20,6 +20,24 @@ Vector3 column_rms(const Eigen::MatrixXd& rows) {
   return (rows.colwise().squaredNorm() / static_cast<double>(rows.rows())).cwiseSqrt();
 }
 
+/// What came before that pose.
+Status check_history(const PoseContext& context, Eigen::Index joints, std::size_t row) {
+  if (context.before && context.before->size() != joints)
+    return refused("model: pose {} of the bias came from {} joints, not {}", row, context.before->size(), joints)
+        .of("before")
+        .beyond(context.before->size(), joints);
+  if (context.before && !context.before->allFinite())
+    return refused("model: pose {} of the bias came from joints that are not finite", row).of("before");
+  if (!context.lagged.empty() && context.lagged.size() != kHeatLags.size())
+    return refused("model: pose {} of the bias has {} lagged temperatures, not {}", row, context.lagged.size(),
+                   kHeatLags.size())
+        .of("lagged_c")
+        .beyond(context.lagged.size(), kHeatLags.size());
+  if (!std::all_of(context.lagged.begin(), context.lagged.end(), [](double t) { return std::isfinite(t); }))
+    return refused("model: pose {} of the bias has a lagged temperature that is not finite", row).of("lagged_c");
+  return {};
+}
+
 /// What an observation of the bias says of its pose, for `joints` joints; `row` counts from 1.
 Status check_context(const PoseContext& context, Eigen::Index joints, std::size_t row) {
   const auto not_finite = [](const std::optional<double>& value) { return value && !std::isfinite(*value); };
@@ -40,6 +58,7 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
         .beyond(context.velocity->size(), joints);
   if (context.velocity && !context.velocity->allFinite())
     return refused("model: pose {} of the bias has a velocity that is not finite", row).of("velocity");
+  if (const Status history = check_history(context, joints, row); !history) return history;
   if (not_finite(context.time))
     return refused("model: pose {} of the bias has a time that is not finite", row).of("time");
   if (not_finite(context.temperature))

@@ -33,6 +33,7 @@ PoseContext eventful(const CompensatedModel::Parts& parts, int k) {
   context.temperature = 50;
   context.velocity = JointVector::Ones(joints);
   context.direction.assign(static_cast<std::size_t>(joints), 1);
+  context.before = parts.q_min;
   context.index = kAfterEverything;
   return context;
 }

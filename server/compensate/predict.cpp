@@ -143,6 +143,16 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
   return moved(calibrated_pose_B(context), learned_motion(context, bias_weight));
 }
 
+namespace {
+
+/// As after a long move of every joint.
+PoseContext come_from_afar(PoseContext context) {
+  context.before = context.q - JointVector::Ones(context.q.size());
+  return context;
+}
+
+}  // namespace
+
 Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool temperature_unsaid,
                                                const Vector3& p_B) const {
   const PhysicalModel& physics = parts().physics;
@@ -156,6 +166,8 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
   for (const ErrorSourcePtr& source : physics.sources) {
     const ContextNeeds needs = source->needs();
     warm = warm || needs.temperature;
+    if (needs.before && !context.before && source->cause().lasting == causes::Lasting::kAlways)
+      add(come_from_afar(context));
     if (!needs.direction || !context.direction.empty()) continue;
     PoseContext approached = context;
     approached.direction.assign(static_cast<std::size_t>(context.q.size()), 0);

@@ -23,6 +23,8 @@ struct ContextNeeds {
   bool direction = false;  ///< of the source's joint, approached from both sides
   bool velocity = false;
   bool payload = false;  ///< something must hang on the flange
+  bool before = false;   ///< the pose that the robot came from
+  bool history = false;  ///< temperature and time of every pose
 };
 
 /// `gear_transmission:3@48.5+97`: a cause, its joint, and further numbers.

@@ -26,6 +26,18 @@
   CAUSE(link_weights)                 \
   CAUSE(balancer)                     \
   CAUSE(base_yielding)                \
+  CAUSE(joint_coupling)               \
+  CAUSE(cable_pull)                   \
+  CAUSE(axis_wobble)                  \
+  CAUSE(loaded_ripple)                \
+  CAUSE(rail_scale)                   \
+  CAUSE(rack_pitch)                   \
+  CAUSE(rail_straightness)            \
+  CAUSE(early_reading)                \
+  CAUSE(hysteresis)                   \
+  CAUSE(thermal_zero)                 \
+  CAUSE(lagged_growth)                \
+  CAUSE(instrument_scale)             \
   CAUSE(outlier)                      \
   CAUSE(drift)                        \
   CAUSE(unknown)

@@ -11,6 +11,7 @@
 
 #include "server/base/check.h"
 #include "server/measurement/gauges.h"
+#include "server/measurement/history.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/reading_doubt.h"
@@ -186,6 +187,7 @@ CheckedBatch CheckedBatch::in_order_of_time() const {
     is_held_out[i] = content_->is_held_out[order[i]];
   }
   fill_velocity(sorted);
+  fill_history(sorted);
   return {std::move(sorted), std::move(is_held_out), hash()};
 }
 
@@ -207,6 +209,7 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   if (const Status poses = check_poses(batch, cell, where); !poses) return with_reading(poses.error());
   if (const Status spread = check_spreads(batch, cell, where); !spread) return with_reading(spread.error());
   fill_velocity(batch);
+  fill_history(batch);
   std::vector<bool> is_held_out = hold_out(batch);
   return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));
 }

@@ -100,6 +100,25 @@ std::optional<double> mean_of(const Group& group, Field field) {
   return sum / count;
 }
 
+/// The mean, where each of the group has it.
+std::optional<JointVector> mean_before(const Group& group) {
+  JointVector sum = JointVector::Zero(group.front()->context.q.size());
+  for (const Measurement* m : group) {
+    if (!m->context.before) return std::nullopt;
+    sum += *m->context.before;
+  }
+  return sum / static_cast<double>(group.size());
+}
+
+std::vector<double> mean_lagged(const Group& group) {
+  std::vector<double> mean(kHeatLags.size());
+  for (const Measurement* m : group) {
+    if (m->context.lagged.size() != mean.size()) return {};
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += m->context.lagged[k] / static_cast<double>(group.size());
+  }
+  return mean;
+}
+
 Measurement average(const Group& group, double default_sigma) {
   Measurement mean = *group.front();
   if (group.size() == 1) return mean;
@@ -115,6 +134,8 @@ Measurement average(const Group& group, double default_sigma) {
   }
   mean.context.time = mean_of(group, [](const Measurement& m) { return m.context.time; });
   mean.context.temperature = mean_of(group, [](const Measurement& m) { return m.context.temperature; });
+  mean.context.before = mean_before(group);
+  mean.context.lagged = mean_lagged(group);
   return mean;
 }
 

@@ -26,10 +26,10 @@ struct MergedRepeats {
 /// tool, payload, approach direction, session and set; measurements with a velocity are never repeats. The average
 /// replaces the first measurement and keeps its pose id, row, index and extra fields: position weighted by 1/sigma²
 /// (`default_sigma`, m, one axis, where a row states none), orientation the rotation with the least squared angles,
-/// time and temperature the means of those recorded. If the batch has repeats, the sigma of each row becomes that of
-/// its (averaged) position, `sigma_factor` / sqrt(sum 1/sigma²). So `sigma_factor` also applies to poses measured once.
-/// A batch without repeats is returned unchanged. A change between repeats (a drift, a step) is averaged out: look for
-/// it in the original batch.
+/// time and temperature the means of those recorded, the pose before and the lagged temperatures those of all. If the
+/// batch has repeats, the sigma of each row becomes that of its (averaged) position, `sigma_factor` / sqrt(sum
+/// 1/sigma²). So `sigma_factor` also applies to poses measured once. A batch without repeats is returned unchanged. A
+/// change between repeats (a drift, a step) is averaged out: look for it in the original batch.
 [[nodiscard]] MergedRepeats merge_repeats(const MeasurementBatch& batch, double default_sigma);
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,10 @@
 
 namespace trammel {
 
+/// Time constants, s, of bodies that follow the temperature (first order): 2 minutes to 4 hours.
+inline constexpr std::array<double, 13> kHeatLags = {120,  180,  270,  405,  608,   911,  1367,
+                                                     2050, 3075, 4613, 6920, 10380, 15570};
+
 /// Everything recorded with one pose that may influence the tool pose.
 struct PoseContext {
   JointVector q;                        ///< as commanded, rad (m for a prismatic joint), size n
@@ -15,6 +20,8 @@ struct PoseContext {
   std::optional<double> temperature;    ///< degrees Celsius
   std::optional<JointVector> velocity;  ///< rad/s (m/s), size n; from neighbouring poses in time
   std::vector<int> direction;           ///< approach direction of each joint, -1, 0, +1; empty when not recorded
+  std::optional<JointVector> before;    ///< joints of the pose that the robot came from, size n; where that is known
+  std::vector<double> lagged;           ///< degrees Celsius, as bodies feel it that follow by kHeatLags; empty: unknown
   std::string tool;                     ///< id in the cell file
   std::string payload;                  ///< id in the cell file
   int index = 0;                        ///< position in its batch, for effects that begin at a pose

@@ -106,6 +106,8 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
     pose.direction = {1, 0, -1, 1, 1, 1};
     pose.velocity = JointVector::Constant(6, 0.1);
     pose.time = pose.temperature = 20;
+    pose.before = JointVector::Constant(6, 0.2);
+    pose.lagged.assign(kHeatLags.size(), 21);
     spoil(pose);
     const Result<CompensatedModel> made = CompensatedModel::make(std::move(parts));
     return refusal_of(made);
@@ -120,6 +122,12 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.time = kNan; }), Refusal("", {}, "time"));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.temperature = kNan; }), Refusal("", {}, "temperature"));
   EXPECT_EQ(refusal([](PoseContext& pose) { pose.index = -1; }), Refusal("", {}, "index").beyond(-1, 0));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.before = JointVector::Zero(7); }),
+            Refusal("", {}, "before").beyond(7, 6));
+  EXPECT_EQ(refusal([](PoseContext& pose) { (*pose.before)(5) = kNan; }), Refusal("", {}, "before"));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.lagged.pop_back(); }),
+            Refusal("", {}, "lagged_c").beyond(kHeatLags.size() - 1, kHeatLags.size()));
+  EXPECT_EQ(refusal([](PoseContext& pose) { pose.lagged[2] = kNan; }), Refusal("", {}, "lagged_c"));
 
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"]["poses"][3]["velocity"] = {{"rows", 3}, {"columns", 2}, {"values", {0, 0, 0, 0, 0, 0}}};
@@ -134,6 +142,18 @@ TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {
   const Result<CompensatedModel> huge = deserialize(file.dump(), "cell.model");
   ASSERT_FALSE(huge);
   EXPECT_EQ(refusal_of(huge), Refusal("cell.model"));
+}
+
+TEST_F(CoupledBias, WhatCameBeforeAPoseIsKeptInTheModelsFile) {
+  CompensatedModel::Parts parts = model_->parts();
+  EXPECT_FALSE(parts.bias_contexts[3].before) << "no source asks for it";
+  EXPECT_TRUE(parts.bias_contexts[3].lagged.empty());
+  parts.bias_contexts[3].before = JointVector::LinSpaced(6, -1, 1);
+  for (const double lag : kHeatLags) parts.bias_contexts[3].lagged.push_back(20 + 1 / lag);
+  const CompensatedModel model = test::demand(CompensatedModel::make(parts));
+  const CompensatedModel read = test::demand(deserialize(serialize(model), "cell.model"));
+  EXPECT_EQ(read.parts().bias_contexts[3].before, parts.bias_contexts[3].before);
+  EXPECT_EQ(read.parts().bias_contexts[3].lagged, parts.bias_contexts[3].lagged);
 }
 
 TEST_F(CoupledBias, WhatComplianceWouldHaveExplainedIsLearnedWithItsShape) {

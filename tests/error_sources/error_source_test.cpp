@@ -27,34 +27,71 @@ PoseContext some_pose(const Cell& cell, std::uint64_t seed) {
   std::uniform_real_distribution<double> angle(-1, 1);
   PoseContext context;
   context.q.resize(cell.robot.size());
-  for (int i = 0; i < cell.robot.size(); ++i) context.q(i) = angle(random);
+  for (int i = 0; i < cell.robot.size(); ++i) {
+    context.q(i) = angle(random) + (cell.robot.joint(i).type == JointType::kPrismatic ? 2 : 0);
+    context.direction.push_back(i % 2 == 0 ? 1 : -1);
+  }
   context.tool = "spindle";
   context.payload = "spindle";
   context.time = 5000;
   context.temperature = 26.5;
   context.velocity = JointVector::LinSpaced(cell.robot.size(), -0.5, 0.7);
-  context.direction = {1, -1, 1, -1, 1, -1};
+  context.before = JointVector::Constant(cell.robot.size(), 0.2);
+  for (const double lag : kHeatLags) context.lagged.push_back(22 + 3 * std::exp(-lag / 3000));
   context.index = 3;
   return context;
 }
 
-/// One of every form of every cause that is known, of the first joint that can have it; and some that say more.
-const std::vector<std::string>& every_spec() {
-  static const std::vector<std::string> kSpecs = [] {
-    const auto cell = cell_7();
-    std::vector<std::string> specs = {"gear_transmission:3@40.5+81", "joint_map:6@5", "link_bending:4"};
-    for (const CauseRecord* record : all_causes()) {
-      for (const causes::Form& form : record->forms) {
-        const bool of_joint = record->scope == causes::Scope::kJoint;
-        for (int joint = 1; joint <= (of_joint ? cell->robot.size() : 1); ++joint) {
-          const std::string spec = fmt::format("{}{}{}", form.spelling, of_joint ? fmt::format(":{}", joint) : "",
-                                               record->lasting == causes::Lasting::kFromAPose ? "@2" : "");
-          if (!make_error_source(spec, *cell)) continue;
-          specs.push_back(spec);
-          break;
-        }
+std::shared_ptr<const Cell> cell_on_a_rail() {
+  auto cell = std::make_shared<Cell>(*cell_7());
+  cell->robot = *read_robot(std::string(TRAMMEL_SOURCE_DIR) + "/models/abb_irb6640-205-275-on-rail.yaml");
+  cell->joint_ranges.clear();
+  return cell;
+}
+
+/// One of every form of every cause that `cell` can have, of the first joint that can have it; some causes want
+/// numbers.
+std::vector<std::string> specs_of(const Cell& cell) {
+  std::vector<std::string> specs;
+  for (const CauseRecord* record : all_causes()) {
+    for (const causes::Form& form : record->forms) {
+      const bool of_joint = record->scope == causes::Scope::kJoint;
+      const std::string at = record->lasting == causes::Lasting::kFromAPose ? "@2" : "";
+      for (int k = 0; k < (of_joint ? 2 * cell.robot.size() : 1); ++k) {
+        const int joint = k < 2 ? 2 : k < 4 ? 1 : k / 2 + 1;  // an upright axis feels no weight
+        const std::string which = of_joint ? fmt::format(":{}", joint) : "";
+        const std::string spec = fmt::format("{}{}{}", form.spelling, which, k % 2 == 1 ? "@40" : at);
+        if (!make_error_source(spec, cell)) continue;
+        specs.push_back(spec);
+        break;
       }
     }
+  }
+  return specs;
+}
+
+/// Of cell-7; and some that say more.
+const std::vector<std::string>& every_spec() {
+  static const std::vector<std::string> kSpecs = [] {
+    std::vector<std::string> specs = {"gear_transmission:3@40.5+81",
+                                      "joint_map:6@5",
+                                      "link_bending:4",
+                                      "joint_coupling:3@2",
+                                      "cable_pull:4@6",
+                                      "axis_wobble:4",
+                                      "axis_wobble:1",
+                                      "loaded_ripple:3@40.5+81"};
+    for (const std::string& spec : specs_of(*cell_7())) specs.push_back(spec);
+    return specs;
+  }();
+  return kSpecs;
+}
+
+/// Of a robot on a rail alone.
+const std::vector<std::string>& rail_specs() {
+  static const std::vector<std::string> kSpecs = [] {
+    std::vector<std::string> specs = specs_of(*cell_on_a_rail());
+    std::erase_if(specs, [](const std::string& spec) { return make_error_source(spec, *cell_7()).has_value(); });
     return specs;
   }();
   return kSpecs;
@@ -72,6 +109,26 @@ Eigen::VectorXd plausible_values(const PhysicalModel& model, std::uint64_t seed)
   return values;
 }
 
+void expect_exact_derivatives(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs) {
+  const PhysicalModel model = *make_physical_model(cell, specs);
+  const Eigen::VectorXd values = plausible_values(model, 5);
+  const PoseContext context = some_pose(*cell, 6);
+  Eigen::MatrixXd J;
+  model.pose_W(context, values, &J);
+  const std::vector<Parameter> parameters = model.parameters();
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const double step = 1e-3 * parameters[static_cast<std::size_t>(i)].prior_scale;
+    Eigen::VectorXd ahead = values;
+    Eigen::VectorXd behind = values;
+    ahead(i) += step;
+    behind(i) -= step;
+    const Vector6 change =
+        pose_difference(model.pose_W(context, ahead, nullptr), model.pose_W(context, behind, nullptr)) / (2 * step);
+    EXPECT_LT((J.col(i) - change).norm(), 1e-6 * (1 + change.norm()))
+        << specs.back() << " of " << specs.size() << ", " << parameters[static_cast<std::size_t>(i)].name;
+  }
+}
+
 TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
   const auto cell = cell_7();
   std::vector<std::vector<std::string>> lists;
@@ -83,25 +140,18 @@ TEST(ErrorSources, EveryJacobianFitsCentralDifferencesAloneAndTogether) {
     }
     lists.push_back(all);
   }
-  for (const auto& specs : lists) {
-    const PhysicalModel model = *make_physical_model(cell, specs);
-    const Eigen::VectorXd values = plausible_values(model, 5);
-    const PoseContext context = some_pose(*cell, 6);
-    Eigen::MatrixXd J;
-    model.pose_W(context, values, &J);
-    const std::vector<Parameter> parameters = model.parameters();
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      const double step = 1e-3 * parameters[static_cast<std::size_t>(i)].prior_scale;
-      Eigen::VectorXd ahead = values;
-      Eigen::VectorXd behind = values;
-      ahead(i) += step;
-      behind(i) -= step;
-      const Vector6 change =
-          pose_difference(model.pose_W(context, ahead, nullptr), model.pose_W(context, behind, nullptr)) / (2 * step);
-      EXPECT_LT((J.col(i) - change).norm(), 1e-6 * (1 + change.norm()))
-          << specs.back() << " of " << specs.size() << ", " << parameters[static_cast<std::size_t>(i)].name;
-    }
+  for (const auto& specs : lists) expect_exact_derivatives(cell, specs);
+}
+
+TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
+  const auto cell = cell_on_a_rail();
+  std::vector<std::string> all = {"compliance", "geometry", "base"};
+  for (const std::string& spec : rail_specs()) {
+    expect_exact_derivatives(cell, {spec});
+    all.push_back(spec);
   }
+  for (const char* beyond : {"axis_wobble:2", "axis_wobble:3", "instrument_scale"}) all.emplace_back(beyond);
+  expect_exact_derivatives(cell, all);
 }
 
 TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
@@ -138,34 +188,75 @@ TEST(ErrorSources, GeometryHasTheParametersOfTheSource) {
 
 TEST(ErrorSources, EveryKnownCauseIsTestedHere) {
   for (const std::string& cause : known_causes()) {
-    const std::vector<std::string>& tested = every_spec();
+    std::vector<std::string> tested = every_spec();
+    tested.insert(tested.end(), rail_specs().begin(), rail_specs().end());
     EXPECT_TRUE(std::any_of(tested.begin(), tested.end(), [&](const std::string& spec) {
       return spec.substr(0, spec.find_first_of(":@")) == cause;
     })) << cause;
   }
 }
 
-TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
-  const auto cell = cell_7();
-  for (const std::string& spec : every_spec()) {
-    const std::vector<std::string> list =
-        spec.starts_with("compliance") ? std::vector<std::string>{spec} : std::vector<std::string>{"compliance", spec};
-    PhysicalModel loaded = *make_physical_model(cell, list);
-    loaded.values = plausible_values(loaded, 9);
-    PhysicalModel without = loaded;
-    Eigen::Index first = 0;
-    for (const ErrorSourcePtr& source : loaded.sources) {
-      const auto count = static_cast<Eigen::Index>(source->parameters().size());
-      if (source->name() == spec) {
-        EXPECT_FALSE(source->explanation().empty()) << spec;
-        for (Eigen::Index k = 0; k < count; ++k)
-          without.values(first + k) = source->parameters()[static_cast<std::size_t>(k)].prior;
-      }
-      first += count;
+void expect_to_move_the_tool(const std::shared_ptr<const Cell>& cell, const std::string& spec) {
+  const std::vector<std::string> list =
+      spec.starts_with("compliance") ? std::vector<std::string>{spec} : std::vector<std::string>{"compliance", spec};
+  PhysicalModel loaded = *make_physical_model(cell, list);
+  loaded.values = plausible_values(loaded, 9);
+  PhysicalModel without = loaded;
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : loaded.sources) {
+    const auto count = static_cast<Eigen::Index>(source->parameters().size());
+    if (source->name() == spec) {
+      EXPECT_FALSE(source->explanation().empty()) << spec;
+      for (Eigen::Index k = 0; k < count; ++k)
+        without.values(first + k) = source->parameters()[static_cast<std::size_t>(k)].prior;
     }
-    const PoseContext context = some_pose(*cell, 10);
-    EXPECT_GT((loaded.pose_W(context).translation() - without.pose_W(context).translation()).norm(), 1e-6) << spec;
+    first += count;
   }
+  const PoseContext context = some_pose(*cell, 10);
+  EXPECT_GT((loaded.pose_W(context).translation() - without.pose_W(context).translation()).norm(), 1e-6) << spec;
+}
+
+TEST(ErrorSources, EveryCauseMovesTheToolAndExplainsItself) {
+  for (const std::string& spec : every_spec()) expect_to_move_the_tool(cell_7(), spec);
+  for (const std::string& spec : rail_specs()) expect_to_move_the_tool(cell_on_a_rail(), spec);
+}
+
+/// What belongs to the measuring or to what nobody knows of a request.
+TEST(ErrorSources, NothingServedHasWhatBelongsToTheInstrument) {
+  const auto cell = cell_7();
+  for (const char* spec : {"tracker_drift", "tracker_moved@2", "instrument_scale", "early_reading"}) {
+    PhysicalModel model = *make_physical_model(cell, {spec});
+    model.values = plausible_values(model, 11);
+    PoseContext context = some_pose(*cell, 12);
+    context.served = true;
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+  }
+}
+
+TEST(ErrorSources, AnUnknownPoseBeforeHasNoEffect) {
+  const auto cell = cell_7();
+  for (const char* spec : {"hysteresis:2", "early_reading"}) {
+    PhysicalModel model = *make_physical_model(cell, {spec});
+    model.values = plausible_values(model, 11);
+    PoseContext context = some_pose(*cell, 12);
+    context.before.reset();
+    EXPECT_LT(pose_difference(model.pose_W(context), model.nominal_pose_W(context)).norm(), 1e-12) << spec;
+  }
+}
+
+TEST(ErrorSources, AGearboxFollowsTheTemperatureWithItsOwnLag) {
+  const auto cell = cell_7();
+  PhysicalModel model = *make_physical_model(cell, {"thermal_zero:1"});
+  PoseContext context = some_pose(*cell, 14);
+  const auto turned = [&](double lag) {
+    model.values << 1e-5, lag;
+    return rotation_log(model.pose_W(context).linear() * model.nominal_pose_W(context).linear().transpose()).z();
+  };
+  EXPECT_NEAR(turned(kHeatLags[4]), 1e-5 * (context.lagged[4] - 20), 1e-12);
+  EXPECT_NEAR(turned(1), 1e-5 * (context.lagged.front() - 20), 1e-12);
+  EXPECT_NEAR(turned(1e6), 1e-5 * (context.lagged.back() - 20), 1e-12);
+  context.lagged.clear();  // nobody knows what was before: the thermometer's
+  EXPECT_NEAR(turned(1000), 1e-5 * (*context.temperature - 20), 1e-12);
 }
 
 TEST(ErrorSources, AStepBeginsAtItsPose) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
@@ -36,6 +37,23 @@ void draw_errors(hidden::Arm& arm, hidden::Random& random) {
   arm = hidden::changed(arm, errors);
 }
 
+MeasurementBatch with_noise(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses, hidden::Random& random) {
+  hidden::World world = arm.world;
+  world.poses = std::move(poses);
+  hidden::Frames frames = hidden::frames_at(world, world.poses, world.effects);
+  for (Eigen::Matrix4d& frame : frames) {
+    Eigen::Vector3d turn;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      frame(k, 3) += world.sigma_mm * hidden::normal(random);
+      turn(k) = world.sigma_rad * hidden::normal(random);
+    }
+    const Eigen::Matrix4d turned = hidden::motion(Eigen::Vector3d::Zero(), turn.z(), turn.y(), turn.x());
+    frame.block<3, 3>(0, 0) = (turned * frame).block<3, 3>(0, 0).eval();
+  }
+  return demand(check_against_cell(demand(parse_batch_csv(hidden::batch_text(world, frames), "heavy.csv")), *arm.cell))
+      .rows();
+}
+
 }  // namespace
 
 HeavyArm draw_heavy_arm(const HeavyArmSpec& spec) {
@@ -61,25 +79,18 @@ HeavyArm draw_heavy_arm(const HeavyArmSpec& spec) {
 
 MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed, int payload) {
   hidden::Random random(seed * 7919 + 3);
-  hidden::World world = arm.world;
   hidden::PosePlan plan;
   plan.count = poses;
   plan.constant_temperature = true;
-  plan.loads = payload < 0 ? static_cast<int>(world.loads.size()) : 1;
-  world.poses = hidden::draw_poses(plan, random);
-  for (hidden::MeasuringPose& pose : world.poses) pose.load = payload < 0 ? pose.load : payload;
-  hidden::Frames frames = hidden::frames_at(world, world.poses, {});
-  for (Eigen::Matrix4d& frame : frames) {
-    Eigen::Vector3d turn;
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      frame(k, 3) += world.sigma_mm * hidden::normal(random);
-      turn(k) = world.sigma_rad * hidden::normal(random);
-    }
-    const Eigen::Matrix4d turned = hidden::motion(Eigen::Vector3d::Zero(), turn.z(), turn.y(), turn.x());
-    frame.block<3, 3>(0, 0) = (turned * frame).block<3, 3>(0, 0).eval();
-  }
-  return demand(check_against_cell(demand(parse_batch_csv(hidden::batch_text(world, frames), "heavy.csv")), *arm.cell))
-      .rows();
+  plan.loads = payload < 0 ? static_cast<int>(arm.world.loads.size()) : 1;
+  std::vector<hidden::MeasuringPose> drawn = hidden::draw_poses(plan, random);
+  for (hidden::MeasuringPose& pose : drawn) pose.load = payload < 0 ? pose.load : payload;
+  return with_noise(arm, std::move(drawn), random);
+}
+
+MeasurementBatch measured_at(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses, std::uint64_t seed) {
+  hidden::Random random(seed);
+  return with_noise(arm, std::move(poses), random);
 }
 
 }  // namespace trammel::test

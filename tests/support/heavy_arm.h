@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
@@ -27,5 +28,9 @@ struct HeavyArm {
 
 /// `poses` poses as its tracker measures them, payloads in turns; `payload`: that one alone (from 0).
 [[nodiscard]] MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed, int payload = -1);
+
+/// The same at poses of the caller's. What `world.effects` hide acts in both.
+[[nodiscard]] MeasurementBatch measured_at(const HeavyArm& arm, std::vector<hidden::MeasuringPose> poses,
+                                           std::uint64_t seed);
 
 }  // namespace trammel::test

@@ -58,7 +58,7 @@ std::array<Matrix4d, kJoints + 1> frames_of(const Arm& arm, const Joints& q, con
   frames[0] = arm.base * deflection.tilt;
   for (std::size_t i = 0; i < kJoints; ++i) {
     const auto joint = static_cast<Eigen::Index>(i);
-    frames[i + 1] = frames[i] * link_frame(arm.links[i], q(joint) + deflection.joints(joint));
+    frames[i + 1] = frames[i] * arm.bearings[i] * link_frame(arm.links[i], q(joint) + deflection.joints(joint));
     if (deflection.bent) frames[i + 1] = frames[i + 1] * deflection.bends[i];
   }
   return frames;
@@ -159,7 +159,8 @@ Deflection settled(const Arm& arm, const Joints& q) {
     const Vector3d cog = origin(frames[kJoints]) + axes(frames[kJoints]) * arm.load.cog_mm;
     for (std::size_t i = 0; deflection.bent && i < kJoints; ++i) {
       if (arm.flex[i] == 0) continue;
-      const Matrix4d straight = frames[i] * link_frame(arm.links[i], q(static_cast<Eigen::Index>(i)) + next(i));
+      const Matrix4d straight =
+          frames[i] * arm.bearings[i] * link_frame(arm.links[i], q(static_cast<Eigen::Index>(i)) + next(i));
       const Matrix4d bend = bend_of(arm.flex[i], frames[i], straight, cog, force);
       moved = std::max(moved, (bend - deflection.bends[i]).block<3, 3>(0, 0).cwiseAbs().maxCoeff());
       deflection.bends[i] = bend;

@@ -34,11 +34,19 @@ struct Spring {
   double phase = 0;      ///< rad, between the pins at joint angle 0
 };
 
+/// A frame for each joint, none of which moves anything.
+[[nodiscard]] inline std::array<Eigen::Matrix4d, kJoints> still() {
+  std::array<Eigen::Matrix4d, kJoints> frames;
+  frames.fill(Eigen::Matrix4d::Identity());
+  return frames;
+}
+
 /// Everything that decides where the tool stands.
 struct Arm {
   std::array<Link, kJoints> links;
-  Eigen::Matrix4d base = Eigen::Matrix4d::Identity();  ///< world from base
-  Eigen::Matrix4d tool = Eigen::Matrix4d::Identity();  ///< flange from tool
+  Eigen::Matrix4d base = Eigen::Matrix4d::Identity();       ///< world from base
+  Eigen::Matrix4d tool = Eigen::Matrix4d::Identity();       ///< flange from tool
+  std::array<Eigen::Matrix4d, kJoints> bearings = still();  ///< how each axis stands in its bearing
   Load load;
   Joints give = Joints::Zero();            ///< rad/Nmm, of each gearbox
   std::array<Load, kJoints> weights = {};  ///< of the links, in the frame that follows each

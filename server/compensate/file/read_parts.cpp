@@ -82,6 +82,10 @@ PoseContext context_from(const Json& json) {
   if (json.contains("direction")) {
     for (const Json& one : list_from(json.at("direction"))) context.direction.push_back(whole_from<int>(one));
   }
+  if (json.contains("before")) context.before = vector_from(json.at("before"));
+  if (json.contains("lagged_c")) {
+    for (const Json& one : list_from(json.at("lagged_c"))) context.lagged.push_back(number_from(one));
+  }
   return context;
 }
 

@@ -69,6 +69,8 @@ Json json_of(const PoseContext& context) {
   if (context.temperature) json["temperature_c"] = *context.temperature;
   if (context.velocity) json["velocity"] = matrix_json(*context.velocity);
   if (!context.direction.empty()) json["direction"] = context.direction;
+  if (context.before) json["before"] = matrix_json(*context.before);
+  if (!context.lagged.empty()) json["lagged_c"] = context.lagged;
   return json;
 }
 

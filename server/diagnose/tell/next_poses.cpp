@@ -174,6 +174,7 @@ class Measuring {
       m.context = like.context;
       m.context.q = q.row(i).transpose();
       m.context.velocity.reset();
+      m.context.before.reset();
       for (int& direction : m.context.direction) direction = random_() % 2 == 0 ? 1 : -1;
       m.context.index = static_cast<int>(done.size() + static_cast<std::size_t>(i));
       const Pose X_WT = found_.before.model.pose_W(m.context);

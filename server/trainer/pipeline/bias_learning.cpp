@@ -127,6 +127,17 @@ Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBa
   return Learned{std::move(problem), std::move(*fitted)};
 }
 
+/// What came before a pose is long, and few sources ask for it.
+PoseContext without_what_nobody_asks(PoseContext context, const PhysicalModel& physics) {
+  const auto asked = [&](bool ContextNeeds::*need) {
+    return std::any_of(physics.sources.begin(), physics.sources.end(),
+                       [need](const ErrorSourcePtr& source) { return source->needs().*need; });
+  };
+  if (!asked(&ContextNeeds::before)) context.before.reset();
+  if (!asked(&ContextNeeds::history)) context.lagged.clear();
+  return context;
+}
+
 /// The bias of the positions, and the domain in which it is known.
 void take_over(CompensatedModel::Parts& parts, const BiasModel& bias, const MeasurementBatch& batch,
                const LeftOut& left_out) {
@@ -134,7 +145,8 @@ void take_over(CompensatedModel::Parts& parts, const BiasModel& bias, const Meas
   parts.bias->features.clear();
   if (bias.has_blocks()) parts.extrapolation_slope = extrapolation_slope(left_out, parts.physics.cell->robot, bias);
   if (bias.needs_features()) {
-    for (const Measurement& m : batch.measurements) parts.bias_contexts.push_back(m.context);
+    for (const Measurement& m : batch.measurements)
+      parts.bias_contexts.push_back(without_what_nobody_asks(m.context, parts.physics));
   }
   parts.prior_share_limit = domain_limit(bias);
 }
