@@ -68,7 +68,7 @@ MeasurementBatch measured(const HeavyArm& arm, int poses, std::uint64_t seed, in
   plan.loads = payload < 0 ? static_cast<int>(world.loads.size()) : 1;
   world.poses = hidden::draw_poses(plan, random);
   for (hidden::MeasuringPose& pose : world.poses) pose.load = payload < 0 ? pose.load : payload;
-  hidden::Frames frames = hidden::frames_at(world, world.poses, {});
+  hidden::Frames frames = hidden::frames_at(world, world.poses, world.effects);
   for (Eigen::Matrix4d& frame : frames) {
     Eigen::Vector3d turn;
     for (Eigen::Index k = 0; k < 3; ++k) {

@@ -9,6 +9,7 @@
 #include "server/calibrate/identify/own_noise.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
+#include "server/numerics/product.h"
 
 namespace trammel {
 
@@ -22,7 +23,8 @@ constexpr double kIdentifiedShare =
 double freedom_of(const Eigen::MatrixXd& information) {
   const Eigen::Index P = information.rows();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(P, P);
-  return static_cast<double>(P) - (information + identity).llt().solve(identity).trace();
+  const auto inverse_root = inverse_factor(information + identity);
+  return static_cast<double>(P) - (inverse_root ? inverse_root->squaredNorm() : 0);
 }
 
 Information decomposed(const Eigen::MatrixXd& information) {
