@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/bias/bias_checks.h"
+#include "server/bias/kernels/joint_map_block.h"
 #include "server/bias/outputs/bias_outputs.h"
 
 namespace trammel {
@@ -61,6 +62,18 @@ Status check_described(const SpelledBias& bias, const BiasState& state) {
   });
 }
 
+/// The bias whose maps are as the state has them.
+SpelledBias as_stored(SpelledBias bias, const BiasState& state) {
+  if (bias.blocks.empty()) return bias;
+  const auto harmonics = harmonics_in(state.block_hyperparameters, state.features.front().by_joint.cols());
+  return harmonics ? with_harmonics(std::move(bias), *harmonics, *harmonics) : bias;
+}
+
+/// The bias whose maps are as the observations can tell.
+SpelledBias for_observations(SpelledBias bias, Index count) {
+  return with_harmonics(std::move(bias), harmonics_for(count), harmonics_for(count));
+}
+
 BiasOutputsPtr conditioned(const SpelledBias& bias, const OutputData& data, const CoupledHyperparameters& at,
                            VarianceForm form) {
   if (bias.flange) return condition_flange(bias.kernel, data, at);
@@ -108,9 +121,10 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
     silent.offset = VectorXd::Zero(kCoordinates);
     return std::make_shared<Fitted>(std::move(silent), false, false, make_silent_outputs(state.residual_B));
   }
-  const auto bias = spelled_bias(state.kernel);
+  auto bias = spelled_bias(state.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
   if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
+  bias = as_stored(*std::move(bias), state);
   if (const Status fine = check_hyperparameters(state, *bias); !fine) return tl::make_unexpected(fine.error());
   const CoupledHyperparameters at = hyperparameters_of(state);
   const OutputData data = data_of(state);
@@ -141,12 +155,13 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
     return tl::make_unexpected(fine.error());
   BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kCoordinates), {}};
   if (options.kernel == kNone) return restore(state);
-  const auto bias = spelled_bias(options.kernel);
+  auto bias = spelled_bias(options.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
   if (options.starts < 1)
     return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
   if (bias->needs_features()) state.features = problem.features;
   if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
+  bias = last != nullptr ? as_stored(*std::move(bias), *last) : for_observations(*std::move(bias), problem.q.rows());
 
   state.offset = problem.residual_B.colwise().mean().transpose();
   const OutputData data = data_of(state);

@@ -1,6 +1,10 @@
+#include "server/error_sources/joint_map.h"
+
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 
-#include "server/error_sources/joint_error.h"
+#include "server/error_sources/error_source.h"
 #include "server/error_sources/parameter.h"
 #include "server/error_sources/shipped_causes.h"
 
@@ -8,59 +12,130 @@ namespace trammel {
 
 namespace {
 
-constexpr int kDefaultHarmonics = 48;
+constexpr double kMicro = 1e-6;
 constexpr int kMaxHarmonics = 500;
-constexpr double kAmplitude = 3e-4;  // rad, prior of the first harmonic
-constexpr double kKnee = 6;          // harmonic at which the prior begins to fall
+constexpr std::size_t kNumbersOfSpectrum = 4;
+constexpr double kMostAmplitude = 1e6;  // urad
+constexpr double kMostKnee = 1e4;
+constexpr double kMostPower = 8;
 
-/// An error of one joint's angle that depends on that angle alone: a Fourier series with period one turn. The prior
-/// falls with the square of the harmonic beyond the knee, as a twice-smooth random function's does; the constant is the
-/// joint's zero.
-class JointMap final : public JointError {
+/// Sine and cosine of h q for h = 1, 2, ..., each the one before, turned by q.
+class Harmonics {
  public:
-  JointMap(const SourceSpec& spec, int harmonics) : JointError(spec.text, spec.joint, series(spec.joint, harmonics)) {}
+  explicit Harmonics(double q) : sine_of_q_(std::sin(q)), cosine_of_q_(std::cos(q)) {}
+  void next() {
+    const double turned = cosine * cosine_of_q_ - sine * sine_of_q_;
+    sine = sine * cosine_of_q_ + cosine * sine_of_q_;
+    cosine = turned;
+  }
+  double sine = 0, cosine = 1;
+
+ private:
+  double sine_of_q_, cosine_of_q_;
+};
+
+/// An error of one joint's angle that depends on that angle alone: a Fourier series with period one turn. The constant
+/// is the joint's zero.
+class JointMap final : public ErrorSource {
+ public:
+  JointMap(const SourceSpec& spec, const MapSpectrum& spectrum) : name_(spec.text), joint_(spec.joint) {
+    for (int h = 1; h <= spectrum.harmonics; ++h) {
+      parameters_.push_back(angle_parameter(fmt::format("map{}_sin{}", joint_ + 1, h), spectrum.stddev(h)));
+      parameters_.push_back(angle_parameter(fmt::format("map{}_cos{}", joint_ + 1, h), spectrum.stddev(h)));
+    }
+  }
   const CauseRecord& cause() const override { return causes::joint_map(); }
+  std::string name() const override { return name_; }
+  const std::vector<Parameter>& parameters() const override { return parameters_; }
+  int joint() const override { return joint_; }
   std::string explanation() const override {
-    return fmt::format("joint {} is off by a function of its own angle", joint() + 1);
+    return fmt::format("joint {} is off by a function of its own angle", joint_ + 1);
+  }
+
+  void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
+             StateJacobian* jacobian, int first_column) const override {
+    Harmonics harmonic(context.q(joint_));
+    double off = 0;
+    for (int k = 0; k < static_cast<int>(parameters_.size()); k += 2) {
+      harmonic.next();
+      off += harmonic.sine * values(k) + harmonic.cosine * values(k + 1);
+      if (jacobian == nullptr) continue;
+      jacobian->add_to_joint(joint_, first_column + k, harmonic.sine);
+      jacobian->add_to_joint(joint_, first_column + k + 1, harmonic.cosine);
+    }
+    state.add_to_joint(joint_, off);
   }
 
  private:
-  static std::vector<Parameter> series(int joint, int harmonics) {
-    std::vector<Parameter> all;
-    for (int h = 1; h <= harmonics; ++h) {
-      const double prior = kAmplitude / (1 + std::pow(h / kKnee, 2));
-      all.push_back(angle_parameter(fmt::format("map{}_sin{}", joint + 1, h), prior));
-      all.push_back(angle_parameter(fmt::format("map{}_cos{}", joint + 1, h), prior));
-    }
-    return all;
-  }
-
-  std::vector<Term> terms(const PoseContext& context) const override {
-    const double q = context.q(joint());
-    const int harmonics = static_cast<int>(parameters().size()) / 2;
-    std::vector<Term> all;
-    all.reserve(parameters().size());
-    for (int h = 1; h <= harmonics; ++h) {
-      all.push_back({joint(), 2 * h - 2, std::sin(h * q)});
-      all.push_back({joint(), 2 * h - 1, std::cos(h * q)});
-    }
-    return all;
-  }
+  std::string name_;
+  int joint_;
+  std::vector<Parameter> parameters_;
 };
+
+/// Empty where the numbers are none.
+std::optional<MapSpectrum> spectrum_of(const std::vector<double>& numbers) {
+  MapSpectrum spectrum;
+  if (numbers.empty()) return spectrum;
+  if (numbers[0] != std::floor(numbers[0]) || numbers[0] > kMaxHarmonics) return std::nullopt;
+  spectrum.harmonics = static_cast<int>(numbers[0]);
+  if (numbers.size() == 1) return spectrum;
+  if (numbers.size() != kNumbersOfSpectrum || numbers[1] > kMostAmplitude || numbers[2] > kMostKnee ||
+      numbers[3] > kMostPower)
+    return std::nullopt;
+  spectrum.amplitude = kMicro * numbers[1];
+  spectrum.knee = numbers[2];
+  spectrum.power = numbers[3];
+  return spectrum;
+}
 
 Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   if (cell.robot.joint(spec.joint).type != JointType::kRevolute) {
     return refused("error source '{}': joint {} does not turn", spec.text, spec.joint + 1);
   }
-  const double harmonics = spec.at.empty() ? kDefaultHarmonics : spec.at[0];
-  if (spec.at.size() > 1 || harmonics != std::floor(harmonics) || harmonics > kMaxHarmonics) {
-    return failure(ErrorCode::kUsage, "error source '{}': expected @harmonics, a whole number up to {}", spec.text,
-                   kMaxHarmonics);
+  const std::optional<MapSpectrum> spectrum = spectrum_of(spec.at);
+  if (!spectrum) {
+    return failure(ErrorCode::kUsage,
+                   "error source '{}': expected @harmonics, a whole number up to {}, or "
+                   "@harmonics+amplitude+knee+power, in urad up to {:g}, up to {:g} and up to {:g}",
+                   spec.text, kMaxHarmonics, kMostAmplitude, kMostKnee, kMostPower);
   }
-  return std::make_shared<JointMap>(spec, static_cast<int>(harmonics));
+  return std::make_shared<JointMap>(spec, *spectrum);
+}
+
+/// With four significant digits and no exponent, whose sign would end the number.
+std::string in_digits(double value) {
+  return fmt::format("{:.{}f}", value, std::clamp(3 - static_cast<int>(std::floor(std::log10(value))), 0, 12));
+}
+
+/// Whether it spells a map of a joint.
+bool is_map(const std::string& spelling) {
+  return spelling.starts_with(fmt::format("{}:", causes::joint_map().spelling));
 }
 
 }  // namespace
+
+double MapSpectrum::stddev(int harmonic) const {
+  return amplitude / std::pow(1 + std::pow(harmonic / knee, 2), power / 2);
+}
+
+std::string spelled_map(int joint, const MapSpectrum& spectrum) {
+  return fmt::format("{}:{}@{}+{}+{}+{}", causes::joint_map().spelling, joint + 1, spectrum.harmonics,
+                     in_digits(spectrum.amplitude / kMicro), in_digits(spectrum.knee), in_digits(spectrum.power));
+}
+
+std::optional<int> joint_of_open_map(const std::string& spelling) {
+  if (!is_map(spelling)) return std::nullopt;
+  const char* const end = spelling.data() + spelling.size();
+  int joint = 0;
+  const auto [read, error] = std::from_chars(spelling.data() + spelling.find(':') + 1, end, joint);
+  return error == std::errc() && read == end ? std::optional(joint - 1) : std::nullopt;
+}
+
+std::string without_learned_spectrum(const std::string& spelling) {
+  const std::size_t at = spelling.find('@');
+  const bool learned = is_map(spelling) && at != std::string::npos && spelling.find('+', at) != std::string::npos;
+  return learned ? spelling.substr(0, at) : spelling;
+}
 
 const CauseRecord& causes::joint_map() {
   static const CauseRecord record = {

@@ -8,6 +8,7 @@
 
 #include "server/base/near_miss.h"
 #include "server/error_sources/instruments.h"
+#include "server/error_sources/joint_map.h"
 
 namespace trammel {
 
@@ -142,7 +143,8 @@ bool are_forms_of_one(const std::string& source, const std::string& other) {
 std::string as_listed(const std::string& source, const std::vector<std::string>& list) {
   const auto listed = std::find_if(list.begin(), list.end(), [&](const std::string& spec) {
     const CauseRecord* record = find_cause(spec);
-    return record != nullptr && spec == record->spelling && are_forms_of_one(source, spec);
+    if (record != nullptr && spec == record->spelling && are_forms_of_one(source, spec)) return true;
+    return spec == without_learned_spectrum(source);
   });
   return listed == list.end() ? source : *listed;
 }

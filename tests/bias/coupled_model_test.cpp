@@ -3,7 +3,9 @@
 #include <numbers>
 
 #include "server/bias/bias_model.h"
+#include "server/bias/kernels/joint_map_block.h"
 #include "tests/bias/coupled_arm.h"
+#include "tests/support/demand.h"
 #include "tests/support/refusal.h"
 
 namespace trammel {
@@ -146,6 +148,40 @@ TEST(CoupledModel, GrowsAsIfConditionedAnewAndRefitsFromWhereItWas) {
   ASSERT_TRUE(refitted.has_value()) << refitted.error().message;
   EXPECT_LE(refitted->report().evaluations, 15);
   EXPECT_GE(refitted->report().log_likelihood.sum(), grown->report().log_likelihood.sum() - 0.1);
+}
+
+// Hyperparameters of a joint were two: amplitude and knee.
+TEST(CoupledModel, AStateFromBeforeThePowerWasLearnedPredictsAsOneWithPowerTwoAndFortyEightHarmonics) {
+  const Index joints = fitted().state().features.front().by_joint.cols();
+  const BiasState state = fitted().state();
+  ASSERT_EQ(state.block_hyperparameters.size(), 3 * joints + 1);
+  BiasState before = state, now = state;
+  before.block_hyperparameters.resize(2 * joints);
+  for (Index j = 0; j < joints; ++j) {
+    before.block_hyperparameters.segment<2>(2 * j) = state.block_hyperparameters.segment<2>(3 * j);
+    now.block_hyperparameters[3 * j + 2] = std::log(2.0);
+  }
+  now.block_hyperparameters[3 * joints] = std::log(48.0);
+  const BiasModel of_before = test::demand(BiasModel::restore(before));
+  const BiasModel of_now = test::demand(BiasModel::restore(now));
+  const BiasProblem targets = gear_problem(40, 98);
+  const auto said_before = of_before.predict_all(targets.q, targets.features);
+  const auto said_now = of_now.predict_all(targets.q, targets.features);
+  for (std::size_t i = 0; i < said_before.size(); ++i) {
+    EXPECT_LT((said_before[i].mean_B - said_now[i].mean_B).norm(), 1e-12);
+    EXPECT_LT((said_before[i].stddev_B - said_now[i].stddev_B).norm(), 1e-12);
+  }
+  EXPECT_EQ(of_before.refit({})->state().block_hyperparameters.size(), 2 * joints) << "it stays what it is";
+  now.block_hyperparameters[3 * joints] = std::log(1e6);
+  EXPECT_FALSE(BiasModel::restore(now)) << "nobody has a million harmonics";
+}
+
+TEST(CoupledModel, MoreObservationsTellMoreHarmonics) {
+  EXPECT_EQ(harmonics_for(100), 48);
+  EXPECT_EQ(harmonics_for(1200), 75);
+  EXPECT_EQ(harmonics_for(4000), 112);
+  const Index last = fitted().state().block_hyperparameters.size() - 1;
+  EXPECT_DOUBLE_EQ(fitted().state().block_hyperparameters[last], std::log(48.0)) << "no search moves it";
 }
 
 TEST(CoupledModel, RefusesWhatItCannotLearnFrom) {

@@ -417,8 +417,8 @@ double plain_error(const MapTask& task) {
 }
 
 std::optional<CoupledSearchResult> coupled_search(const MapTask& task, bool shared_scales = true) {
-  return search_coupled(make_kernel("se"), task.blocks, task.data, VectorXd::Constant(3, task.noise), shared_scales,
-                        starting(2));
+  return search_coupled(make_kernel("se"), {task.blocks, task.data}, {task.blocks, task.data},
+                        VectorXd::Constant(3, task.noise), shared_scales, starting(2));
 }
 
 TEST(CoupledSearch, LearnsGearErrorsThatAPlainProcessCannot) {
@@ -492,8 +492,8 @@ TEST(CoupledSearch, StopsWhenTold) {
   const MapTask task;
   SearchOptions options;
   options.progress = [](double) { return false; };
-  const auto found =
-      search_coupled(make_kernel("se"), task.blocks, task.data, VectorXd::Constant(3, task.noise), true, options);
+  const auto found = search_coupled(make_kernel("se"), {task.blocks, task.data}, {task.blocks, task.data},
+                                    VectorXd::Constant(3, task.noise), true, options);
   ASSERT_TRUE(found.has_value());
   EXPECT_TRUE(found->given_up);
 }

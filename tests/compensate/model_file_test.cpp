@@ -312,7 +312,7 @@ TEST(ModelFile, WhatCannotBeAModelIsRefusedThoughItsHashFits) {
               for (int joint = 1; joint <= 6; ++joint)
                 c["error_sources"].push_back(fmt::format("joint_map:{}@500", joint));
             }),
-            Refusal("cell.model", {}, "error_sources").beyond(2000, 1000).text("joint_map:2@500"));
+            Refusal("cell.model", {}, "error_sources").beyond(2000, 1300).text("joint_map:2@500"));
   EXPECT_EQ(refused_with([](json& c) { c["cell_yaml"] = "[[["; }), Refusal("cell.model"));
   EXPECT_EQ(refused_with([](json& c) { c["robot_yaml"] = repeated("[", 100'000); }),
             Refusal("cell.model (robot)").of(ErrorCode::kTooLarge).beyond(21, 20));

@@ -8,6 +8,7 @@
 
 #include "server/base/units.h"
 #include "server/error_sources/catalogue.h"
+#include "server/error_sources/joint_map.h"
 #include "server/error_sources/physical_model.h"
 #include "server/error_sources/spelling.h"
 #include "tests/support/refusal.h"
@@ -73,14 +74,10 @@ std::vector<std::string> specs_of(const Cell& cell) {
 /// Of cell-7; and some that say more.
 const std::vector<std::string>& every_spec() {
   static const std::vector<std::string> kSpecs = [] {
-    std::vector<std::string> specs = {"gear_transmission:3@40.5+81",
-                                      "joint_map:6@5",
-                                      "link_bending:4",
-                                      "joint_coupling:3@2",
-                                      "cable_pull:4@6",
-                                      "axis_wobble:4",
-                                      "axis_wobble:1",
-                                      "loaded_ripple:3@40.5+81"};
+    std::vector<std::string> specs = {
+        "gear_transmission:3@40.5+81", "joint_map:6@5",  "joint_map:5@3+150+2+1", "link_bending:4",
+        "joint_coupling:3@2",          "cable_pull:4@6", "axis_wobble:4",         "axis_wobble:1",
+        "loaded_ripple:3@40.5+81"};
     for (const std::string& spec : specs_of(*cell_7())) specs.push_back(spec);
     return specs;
   }();
@@ -337,13 +334,42 @@ TEST(ErrorSources, AStarStandsForEveryJointThatCanHaveTheSource) {
   EXPECT_FALSE(make_physical_model(cell_7(), {"joint_map:*", "joint_map:2"}));
 }
 
+TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
+  const auto cell = cell_7();
+  EXPECT_EQ(spelled_map(1, {.harmonics = 110, .amplitude = 312.54e-6, .knee = 1.84, .power = 1.02}),
+            "joint_map:2@110+312.5+1.840+1.020");
+  // An exponent would be read as another number.
+  for (const double size : {1e-9, 3e-4, 0.9}) {
+    const MapSpectrum spectrum{.harmonics = 9, .amplitude = size, .knee = 3, .power = 1.5};
+    const ErrorSourcePtr map = *make_error_source(spelled_map(0, spectrum), *cell);
+    ASSERT_EQ(map->parameters().size(), 18U);
+    for (int h = 1; h <= 9; ++h)
+      EXPECT_NEAR(map->parameters()[2 * static_cast<std::size_t>(h) - 1].prior_scale,
+                  size * std::pow(1 + h * h / 9.0, -0.75), 1e-3 * size);
+  }
+  // What a model of before means by it.
+  const ErrorSourcePtr before = *make_error_source("joint_map:3", *cell);
+  ASSERT_EQ(before->parameters().size(), 96U);
+  EXPECT_EQ(before->parameters()[95].prior_scale, 3e-4 / 65);
+}
+
+TEST(ErrorSources, AMapIsOpenWhereNothingIsToldOfItsSpectrum) {
+  EXPECT_EQ(joint_of_open_map("joint_map:2"), 1);
+  for (const char* told : {"joint_map:2@48", "joint_map:2@48+300+6+2", "joint_map:x", "joint_map", "backlash:2"})
+    EXPECT_FALSE(joint_of_open_map(told)) << told;
+  EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:2"}), "joint_map:2");
+  EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:3"}), "joint_map:2@110+300+6+2");
+  EXPECT_EQ(as_listed("joint_map:2@110", {"base", "joint_map:2"}), "joint_map:2@110");
+}
+
 TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const auto cell = cell_7();
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
   EXPECT_EQ(refusal_of(unknown), Refusal("", {}, "error_sources").of(ErrorCode::kUsage).text("gremlins"));
   for (const char* spec : {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
-                           "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5"}) {
+                           "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5",
+                           "joint_map:2@9+300", "joint_map:2@9+300+6+9", "joint_map:2@9+2e6+6+2"}) {
     EXPECT_FALSE(make_error_source(spec, *cell)) << spec;
   }
 }

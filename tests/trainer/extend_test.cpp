@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "server/trainer/pipeline/lasting_sources.h"
@@ -170,6 +171,29 @@ TEST_F(Extend, BeginsWithWhatTheModelInForceWasTrainedWith) {
   another.source_text += "\n";
   EXPECT_EQ(sources_in_force(model, carrying, checked(another)),
             (std::vector<std::string>{"base", "gear_transmission:3@2", "compliance"}));
+}
+
+TEST_F(Extend, AMapWhoseSpectrumWasLearnedIsTheOneThatTheCellFileNames) {
+  TrainOptions options;
+  options.level = "base,compliance,joint_map:2";
+  const CompensatedModel model = test::demand(train(cell_, batch_, options));
+  const auto& sources = model.parts().physics.sources;
+  const auto map = std::find_if(sources.begin(), sources.end(),
+                                [](const auto& one) { return one->name().starts_with("joint_map:2@"); });
+  ASSERT_NE(map, sources.end());
+  EXPECT_NE((*map)->name().find('+'), std::string::npos);
+  const CompensatedModel read = test::demand(deserialize(serialize(model), "memory"));
+  EXPECT_EQ(read.parts().physics.values, model.parts().physics.values);
+  EXPECT_EQ(read.parts().physics.sources[1]->name(), sources[1]->name());
+  Cell listing = *cell_;
+  for (const char* spelling : {"joint_map:2", "joint_map:*"}) {
+    listing.model.error_sources = {"base", spelling, "compliance"};
+    EXPECT_EQ(level_with_additions(listing, model), std::nullopt) << spelling;
+    const std::vector<std::string> in_force = sources_in_force(model, listing, checked(batch_));
+    EXPECT_EQ(std::count(in_force.begin(), in_force.end(), "joint_map:2"), 1) << spelling;
+  }
+  listing.model.error_sources = {"base", "compliance"};
+  EXPECT_EQ(level_with_additions(listing, model), "base,compliance," + (*map)->name());
 }
 
 TEST(LastingSources, AreThoseThatBelongToTheRobotAndNotToTheBatch) {

@@ -29,19 +29,19 @@ CoupledData subset(const CoupledData& data, const std::vector<Index>& order, Ind
 // One search in progress.
 class CoupledSearch {
  public:
-  CoupledSearch(std::shared_ptr<const Kernel> kernel, const LinearBlocks& blocks, const CoupledData& data,
+  CoupledSearch(std::shared_ptr<const Kernel> kernel, const CoupledTask& task, const CoupledTask& coarse,
                 const VectorXd& metrology_stddev, bool shared_scales, const SearchOptions& options)
       : kernel_(std::move(kernel)),
-        blocks_(blocks),
-        data_(data),
+        task_(task),
+        coarse_(coarse),
         shared_scales_(shared_scales),
         options_(options),
         random_(options.seed),
-        box_(kernel_->search_box(data.q)),
-        order_(shuffled_rows(data.q.rows(), &random_)) {
+        box_(kernel_->search_box(task.data.q)),
+        order_(shuffled_rows(task.data.q.rows(), &random_)) {
     prior_.noise_stddev = metrology_stddev;
     prior_.parameter_centre = 0.5 * (box_.low + box_.high);
-    prior_.signal_centre = (data.y.colwise().squaredNorm() / static_cast<double>(data.q.rows()))
+    prior_.signal_centre = (task.data.y.colwise().squaredNorm() / static_cast<double>(task.data.q.rows()))
                                .array()
                                .sqrt()
                                .log()
@@ -53,6 +53,7 @@ class CoupledSearch {
   std::optional<CoupledSearchResult> run(const CoupledHyperparameters* last) {
     if (last != nullptr) {
       result_.starts_at_best = 1;
+      last_stage_ = true;
       const Place from = unknown_curvature(*last, all(), shared_scales_);
       result_.found = improved(from, all(), shared_scales_, {.max_evaluations = 10, .tolerance = 0.3}, 1.0).at;
       return result_;
@@ -62,6 +63,7 @@ class CoupledSearch {
     if (rivals.empty()) return std::nullopt;
     Place best = best_of(std::move(rivals));
     if (all() > kMediumPoints) best = improved(best, all(), true, {.max_evaluations = 12, .tolerance = 0.1}, 0.75);
+    last_stage_ = true;
     if (!shared_scales_)
       best = improved(of_each_output(best), all(), false, {.max_evaluations = 14, .tolerance = 0.1}, 0.95);
     report(1.0);
@@ -70,7 +72,7 @@ class CoupledSearch {
   }
 
  private:
-  Index all() const { return data_.q.rows(); }
+  Index all() const { return task_.data.q.rows(); }
 
   void report(double share) {
     if (options_.progress && !options_.progress(share)) result_.given_up = true;
@@ -78,18 +80,19 @@ class CoupledSearch {
 
   CoupledLikelihood likelihood(Index count, bool shared) {
     prior_.shared_scales = shared;
-    return {kernel_, blocks_, subset(data_, order_, count), prior_};
+    const CoupledTask& task = last_stage_ ? task_ : coarse_;
+    return {kernel_, task.blocks, subset(task.data, order_, count), prior_};
   }
 
   VectorXd random_start() {
-    const Index outputs = data_.y.cols();
+    const Index outputs = task_.data.y.cols();
     CoupledHyperparameters start;
     VectorXd scales(box_.low.size());
     for (Index k = 0; k < scales.size(); ++k) scales[k] = random_.uniform(box_.low[k], box_.high[k]);
     const double signal = random_.uniform(-3.0, 1.0);
     for (Index d = 0; d < outputs; ++d)
       start.outputs.push_back({scales, prior_.signal_centre[d] + signal, std::log(1.5 * prior_.noise_stddev[d])});
-    start.blocks = blocks_.start();
+    start.blocks = task_.blocks.start();
     return likelihood(1, true).pack(start);
   }
 
@@ -169,8 +172,9 @@ class CoupledSearch {
   }
 
   std::shared_ptr<const Kernel> kernel_;
-  const LinearBlocks& blocks_;
-  const CoupledData& data_;
+  const CoupledTask& task_;
+  const CoupledTask& coarse_;
+  bool last_stage_ = false;
   bool shared_scales_;
   const SearchOptions& options_;
   SeededRandom random_;
@@ -182,11 +186,11 @@ class CoupledSearch {
 
 }  // namespace
 
-std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel,
-                                                  const LinearBlocks& blocks, const CoupledData& data,
-                                                  const VectorXd& metrology_stddev, bool shared_scales,
-                                                  const SearchOptions& options, const CoupledHyperparameters* last) {
-  return CoupledSearch(kernel, blocks, data, metrology_stddev, shared_scales, options).run(last);
+std::optional<CoupledSearchResult> search_coupled(const std::shared_ptr<const Kernel>& kernel, const CoupledTask& task,
+                                                  const CoupledTask& coarse, const VectorXd& metrology_stddev,
+                                                  bool shared_scales, const SearchOptions& options,
+                                                  const CoupledHyperparameters* last) {
+  return CoupledSearch(kernel, task, coarse, metrology_stddev, shared_scales, options).run(last);
 }
 
 }  // namespace trammel

@@ -4,6 +4,7 @@
 
 #include "server/base/check.h"
 #include "server/bias/coupled/coupled_posterior.h"
+#include "server/bias/kernels/joint_map_block.h"
 #include "server/bias/outputs/bias_outputs.h"
 
 namespace trammel {
@@ -28,6 +29,14 @@ std::vector<MatrixXd> columns_of(const LinearBlocks& blocks, const MatrixXd& q,
 }
 
 LinearBlocks blocks_of(const SpelledBias& bias, const OutputData& data) { return {bias.blocks, data.features.front()}; }
+
+/// The same with the harmonics that few points tell of; empty where there are no more.
+std::optional<LinearBlocks> coarse_blocks(const SpelledBias& bias, const LinearBlocks& blocks, const OutputData& data) {
+  const Index joints = data.features.front().by_joint.cols();
+  const auto harmonics = bias.has("joint_map") ? harmonics_in(blocks.start(), joints) : std::nullopt;
+  if (!harmonics || *harmonics <= harmonics_for(0)) return std::nullopt;
+  return blocks_of(with_harmonics(bias, harmonics_for(0), *harmonics), data);
+}
 
 CoupledData coupled(const LinearBlocks& blocks, const OutputData& data) {
   return {data.q, data.y, data.noise_shape, columns_of(blocks, data.q, data.features, 0, data.q.rows(), data.y.cols())};
@@ -126,7 +135,11 @@ std::optional<CoupledSearchResult> search_coupled_outputs(const SpelledBias& bia
                                                           const SearchOptions& options,
                                                           const CoupledHyperparameters* last) {
   const LinearBlocks blocks = blocks_of(bias, data);
-  return search_coupled(bias.kernel, blocks, coupled(blocks, data), metrology_stddev, false, options, last);
+  const CoupledData all = coupled(blocks, data);
+  const std::optional<LinearBlocks> fewer = coarse_blocks(bias, blocks, data);
+  if (!fewer) return search_coupled(bias.kernel, {blocks, all}, {blocks, all}, metrology_stddev, false, options, last);
+  return search_coupled(bias.kernel, {blocks, all}, {*fewer, coupled(*fewer, data)}, metrology_stddev, false, options,
+                        last);
 }
 
 }  // namespace trammel

@@ -6,6 +6,7 @@
 
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/measurement/sessions.h"
+#include "server/numerics/product.h"
 
 namespace trammel {
 
@@ -15,6 +16,8 @@ constexpr double kSettledStep = 0.05;       // standard deviations: a smaller st
 constexpr double kFirstSettledStep = 1;     // the same as long as residuals only serve to find the discrepancy
 constexpr double kNoRise = 1e-6;            // of the cost, which has thousands of terms: rounding
 constexpr Eigen::Index kPosesAtATime = 64;  // whose Jacobians are multiplied together: they stay in the cache
+
+constexpr Eigen::Index kManyParameters = 300;  // from here on the product takes most of the time
 
 constexpr double kFirstDamping = 1e-3;  // of the diagonal, once a full step leads uphill
 constexpr double kMostDamping = 1e9;
@@ -76,7 +79,11 @@ class Normals {
     const auto J = jacobians_.leftCols(filled_);
     const auto r = residuals_.head(filled_);
     at_.gradient.noalias() += J * r;
-    at_.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
+    if (J.rows() < kManyParameters) {
+      at_.information.selfadjointView<Eigen::Lower>().rankUpdate(J);
+    } else {
+      at_.information += gram(J.transpose());
+    }
     if (moves()) {
       const auto D = motions_.leftCols(filled_);
       SessionBlock& block = at_.sessions[static_cast<std::size_t>(session_)];

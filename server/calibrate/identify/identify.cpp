@@ -10,6 +10,7 @@
 #include "server/calibrate/identify/own_noise.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
+#include "server/numerics/product.h"
 
 namespace trammel {
 
@@ -19,11 +20,21 @@ constexpr int kMostReweightings = 12;     // three or four are enough; more only
 constexpr double kIdentifiedShare = 0.5;  // of the prior's standard deviation: the data say more than the prior did
 constexpr double kFewFitted = 0.05;       // of the equations: who decided them changes no discrepancy by more
 
-/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1, N the information of all
-/// measurements; of `part` of the measurements, with its information in place of the first N.
-double freedom_of(const Eigen::MatrixXd& part, const Eigen::MatrixXd& information) {
+/// (N + 1)^-1 = Lᵀ L, N the information: L, lower triangular.
+Eigen::MatrixXd root_of_posterior(const Eigen::MatrixXd& information) {
   const Eigen::Index P = information.rows();
-  return (information + Eigen::MatrixXd::Identity(P, P)).llt().solve(part).trace();
+  return inverse_factor(information + Eigen::MatrixXd::Identity(P, P)).value_or(Eigen::MatrixXd::Identity(P, P));
+}
+
+/// How many parameters the data, not the priors, decide: the trace of N (N + 1)^-1.
+double freedom_of(const Eigen::MatrixXd& information) {
+  return static_cast<double>(information.rows()) - root_of_posterior(information).squaredNorm();
+}
+
+/// How many of them measurements with the information `part` of it decide.
+double freedom_of(const Eigen::MatrixXd& part, const Eigen::MatrixXd& information) {
+  const Eigen::MatrixXd root = root_of_posterior(information);
+  return (root * part).cwiseProduct(root).sum();
 }
 
 Information decomposed(const Eigen::MatrixXd& information) {
@@ -166,7 +177,7 @@ Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, con
     turns += !m.gauge && m.R_WT ? 3 : 0;
     equations += m.gauge ? 1 : m.R_WT ? 6 : 3;
   }
-  const double all = freedom_of(at.information, at.information) + freedom_of_sessions(problem);
+  const double all = freedom_of(at.information) + freedom_of_sessions(problem);
   const double by_number = all * turns / equations;
   if (turns == 0 || has_sessions(problem.batch) || all < kFewFitted * equations) return {all - by_number, by_number};
   Weights turns_alone = weights;

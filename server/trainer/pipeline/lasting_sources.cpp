@@ -16,15 +16,16 @@ std::vector<std::string> lasting_sources(const std::vector<std::string>& sources
 }
 
 std::vector<std::string> sources_in_force(const CompensatedModel& model, const Cell& cell, const CheckedBatch& batch) {
+  const std::vector<std::string> listed = spelled_out(cell.model.error_sources, cell);
   std::vector<std::string> sources;
   for (const ErrorSourcePtr& source : model.parts().physics.sources) {
-    sources.push_back(as_listed(source->name(), cell.model.error_sources));
+    sources.push_back(as_listed(source->name(), listed));
   }
   return model.provenance().batch_hash == batch.hash() ? sources : lasting_sources(sources);
 }
 
 std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force) {
-  std::vector<std::string> level = cell.model.error_sources;
+  std::vector<std::string> level = spelled_out(cell.model.error_sources, cell);
   const auto listed = [&](const std::string& name) {
     return std::find(level.begin(), level.end(), as_listed(name, level)) != level.end();
   };

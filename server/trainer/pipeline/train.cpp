@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/calibrate/batch_check.h"
+#include "server/calibrate/calibrate_with_maps.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/orientation_check.h"
@@ -168,7 +169,7 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
   if (!sources) return tl::make_unexpected(sources.error());
   const Identify identify = [&](const std::vector<std::string>& names) {
     return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
-                         : calibrate(cell, names, split.train, {.held = {}, .weigh_links = true});
+                         : calibrate_with_maps(cell, names, split.train, {.held = {}, .weigh_links = true});
   };
   auto found = identify_sessions(identify, *sources, split.train, [&](double share) -> Status {
     if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
