@@ -70,6 +70,11 @@ Coverage coverage_of(const CalibrationResult& result, const PhysicalModel& truth
   return coverage;
 }
 
+MeasurementBatch positions_alone(MeasurementBatch batch) {
+  for (Measurement& m : batch.measurements) m.R_WT.reset();
+  return batch;
+}
+
 void uncertainties_and_validation(int seeds) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);
@@ -150,6 +155,25 @@ void link_weights(int seeds) {
               1.05 * 0.013 * std::sqrt(3.0), longest);
 }
 
+/// As many positions as 1000 poses with three reflectors have: the controller compensates the links' weights, or not.
+void weights_of_many_positions() {
+  double longest = 0;
+  const auto ask = [&](const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch) {
+    const double begin = cpu_seconds();
+    const CalibrationResult found = test::demand(
+        calibrate(cell, {"base", "geometry", "compliance"}, positions_alone(batch), {.held = {}, .weigh_links = true}));
+    longest = std::max(longest, cpu_seconds() - begin);
+    std::printf("  %zu positions, %d iterations: %.2f s\n", batch.measurements.size(), found.iterations,
+                cpu_seconds() - begin);
+  };
+  ask(test::cell_7(), test::measured(test::chapter_5_robot(test::cell_7()), 3000, 5));
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const test::HeavyArm arm = test::draw_heavy_arm({.seed = seed, .payloads = static_cast<int>(seed % 3)});
+    ask(arm.cell, test::measured(arm, 3000, 1));
+  }
+  std::printf("3000 positions, masses never told, longest: %.2f s\n", longest);
+}
+
 /// Draw wires to three anchors, 200 distances, beside the Cramér-Rao bound and 200 positions of the same sigma.
 void draw_wires(int seeds) {
   constexpr double kSigma = 0.05;  // mm
@@ -178,6 +202,11 @@ void draw_wires(int seeds) {
 }  // namespace trammel
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string(argv[1]) == "weights") {
+    trammel::weights_of_many_positions();
+    return 0;
+  }
+  trammel::weights_of_many_positions();
   trammel::uncertainties_and_validation(argc > 1 ? std::atoi(argv[1]) : 100);
   trammel::robot_like_the_measured_one();
   trammel::speed_beside_scipy();

@@ -154,8 +154,6 @@ std::optional<Minimum> full_steps(const CalibrationProblem& problem, const Scale
       now.message = fmt::format("last step {:.1e} standard deviations", in_standard_deviations);
     }
   }
-  // The last step is short, but not beside numbers of which only a product is seen: there the derivatives change.
-  if (weights.estimated) now.information = expand(problem, s, weights, is_robust(options, weights), now.x).information;
   return now;
 }
 

@@ -27,7 +27,7 @@ struct Expansion {
 /// Where minimising ended.
 struct Minimum {
   Eigen::VectorXd x;
-  Eigen::MatrixXd information;  ///< of an Expansion about x; before the discrepancy is known a short step before it
+  Eigen::MatrixXd information;  ///< of an Expansion about x, or about a negligible step before it
   std::vector<double> costs;    ///< step by step
   bool converged = false;
   std::string message;

@@ -227,6 +227,10 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
     now.weights = estimated_weights(now.residuals, freedom, before, is_robust(options, before));
     if (same_noise && are_settled(now.weights, before, tracker)) break;
   }
+  // The last step is short, but not beside numbers of which only a product is seen: there the derivatives change.
+  if (now.sessions.empty() && s.scale.size() > 0)
+    now.minimum.information =
+        expand(problem, s, now.weights, is_robust(options, now.weights), now.minimum.x).information;
   return now;
 }
 
