@@ -145,9 +145,10 @@ Pose CompensatedModel::pose_B(const PoseContext& asked, double bias_weight) cons
 
 namespace {
 
-/// As after a long move of every joint.
-PoseContext come_from_afar(PoseContext context) {
-  context.before = context.q - JointVector::Ones(context.q.size());
+/// As after a long move of that joint.
+PoseContext come_from_afar(PoseContext context, int joint) {
+  context.before = context.q;
+  (*context.before)(joint) -= 1;
   return context;
 }
 
@@ -166,8 +167,7 @@ Matrix3 CompensatedModel::covariance_of_unsaid(const PoseContext& context, bool 
   for (const ErrorSourcePtr& source : physics.sources) {
     const ContextNeeds needs = source->needs();
     warm = warm || needs.temperature;
-    if (needs.before && !context.before && source->cause().lasting == causes::Lasting::kAlways)
-      add(come_from_afar(context));
+    if (needs.before && !context.before && source->joint() >= 0) add(come_from_afar(context, source->joint()));
     if (!needs.direction || !context.direction.empty()) continue;
     PoseContext approached = context;
     approached.direction.assign(static_cast<std::size_t>(context.q.size()), 0);
