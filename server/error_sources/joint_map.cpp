@@ -15,9 +15,11 @@ namespace {
 constexpr double kMicro = 1e-6;
 constexpr int kMaxHarmonics = 500;
 constexpr std::size_t kNumbersOfSpectrum = 4;
+constexpr double kLeast = 1e-6;         // of amplitude and power
 constexpr double kMostAmplitude = 1e6;  // urad
+constexpr double kLeastKnee = 0.01;     // with the most power a standard deviation is still a number above 0
 constexpr double kMostKnee = 1e4;
-constexpr double kMostPower = 8;
+constexpr double kMostPower = 50;
 
 /// Sine and cosine of h q for h = 1, 2, ..., each the one before, turned by q.
 class Harmonics {
@@ -79,8 +81,8 @@ std::optional<MapSpectrum> spectrum_of(const std::vector<double>& numbers) {
   if (numbers[0] != std::floor(numbers[0]) || numbers[0] > kMaxHarmonics) return std::nullopt;
   spectrum.harmonics = static_cast<int>(numbers[0]);
   if (numbers.size() == 1) return spectrum;
-  if (numbers.size() != kNumbersOfSpectrum || numbers[1] > kMostAmplitude || numbers[2] > kMostKnee ||
-      numbers[3] > kMostPower)
+  if (numbers.size() != kNumbersOfSpectrum || numbers[1] > kMostAmplitude || numbers[2] < kLeastKnee ||
+      numbers[2] > kMostKnee || numbers[3] > kMostPower)
     return std::nullopt;
   spectrum.amplitude = kMicro * numbers[1];
   spectrum.knee = numbers[2];
@@ -96,8 +98,8 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   if (!spectrum) {
     return failure(ErrorCode::kUsage,
                    "error source '{}': expected @harmonics, a whole number up to {}, or "
-                   "@harmonics+amplitude+knee+power, in urad up to {:g}, up to {:g} and up to {:g}",
-                   spec.text, kMaxHarmonics, kMostAmplitude, kMostKnee, kMostPower);
+                   "@harmonics+amplitude+knee+power, in urad up to {:g}, {:g} to {:g} and up to {:g}",
+                   spec.text, kMaxHarmonics, kMostAmplitude, kLeastKnee, kMostKnee, kMostPower);
   }
   return std::make_shared<JointMap>(spec, *spectrum);
 }
@@ -120,7 +122,9 @@ double MapSpectrum::stddev(int harmonic) const {
 
 std::string spelled_map(int joint, const MapSpectrum& spectrum) {
   return fmt::format("{}:{}@{}+{}+{}+{}", causes::joint_map().spelling, joint + 1, spectrum.harmonics,
-                     in_digits(spectrum.amplitude / kMicro), in_digits(spectrum.knee), in_digits(spectrum.power));
+                     in_digits(std::clamp(spectrum.amplitude / kMicro, kLeast, kMostAmplitude)),
+                     in_digits(std::clamp(spectrum.knee, kLeastKnee, kMostKnee)),
+                     in_digits(std::clamp(spectrum.power, kLeast, kMostPower)));
 }
 
 std::optional<int> joint_of_open_map(const std::string& spelling) {

@@ -184,7 +184,7 @@ TEST(Maps, TheEvidenceIsThatOfTheWholeCovarianceOfTheMeasurements) {
   ASSERT_TRUE(evidence(one, &at_one));
   ASSERT_TRUE(evidence(other, &at_other));
   const double expected = minus_log(other) + prior(other) - minus_log(one) - prior(one);
-  EXPECT_NEAR(at_other.value - at_one.value, expected, 1e-3 * std::abs(expected) + 1e-3);
+  EXPECT_NEAR(at_other.value - at_one.value, expected, 1e-6 * std::abs(expected) + 1e-4);
 }
 
 }  // namespace

@@ -347,6 +347,13 @@ TEST(ErrorSources, AMapIsSpelledWithItsSpectrumAndReadAgain) {
       EXPECT_NEAR(map->parameters()[2 * static_cast<std::size_t>(h) - 1].prior_scale,
                   size * std::pow(1 + h * h / 9.0, -0.75), 1e-3 * size);
   }
+  // Whatever is learned can be read.
+  for (const double wild : {1e-30, 1e30}) {
+    const MapSpectrum spectrum{.harmonics = 500, .amplitude = wild, .knee = 1 / wild, .power = wild};
+    const Result<ErrorSourcePtr> map = make_error_source(spelled_map(0, spectrum), *cell);
+    ASSERT_TRUE(map) << spelled_map(0, spectrum);
+    EXPECT_GT((*map)->parameters().back().prior_scale, 0);
+  }
   // What a model of before means by it.
   const ErrorSourcePtr before = *make_error_source("joint_map:3", *cell);
   ASSERT_EQ(before->parameters().size(), 96U);
@@ -367,9 +374,10 @@ TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {
   const Result<ErrorSourcePtr> unknown = make_error_source("gremlins", *cell);
   ASSERT_FALSE(unknown);
   EXPECT_EQ(refusal_of(unknown), Refusal("", {}, "error_sources").of(ErrorCode::kUsage).text("gremlins"));
-  for (const char* spec : {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
-                           "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5",
-                           "joint_map:2@9+300", "joint_map:2@9+300+6+9", "joint_map:2@9+2e6+6+2"}) {
+  for (const char* spec :
+       {"geometry:3", "backlash", "backlash:7", "backlash:x", "tracker_moved", "tracker_moved@1.5",
+        "gear_transmission:3@-4", "gear_transmission:3@", "base@3", "joint_map:2@4.5", "joint_map:2@9+300",
+        "joint_map:2@9+300+6+51", "joint_map:2@9+300+0.001+2", "joint_map:2@9+2e6+6+2"}) {
     EXPECT_FALSE(make_error_source(spec, *cell)) << spec;
   }
 }
