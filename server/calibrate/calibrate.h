@@ -19,7 +19,7 @@ namespace trammel {
 
 /// Calibrates `cell` with the sources that `specs` name. Of a cause with several forms the one is kept under which the
 /// data are most likely; all forms have the same number of parameters. With `weigh_links`, `compliance` of a robot
-/// without told link masses has the source `link_weights` beside it where that is 20 nat more likely.
+/// without told link masses has the source `self_weight` beside it where that is 20 nat more likely.
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);

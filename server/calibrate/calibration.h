@@ -27,7 +27,7 @@ struct CalibrationProblem {
 struct CalibrateOptions {
   int max_iterations = 100;
   std::vector<bool> held;    ///< a flag for each parameter that stays as it is; empty: none
-  bool weigh_links = false;  ///< `compliance` may add `link_weights` where no link mass is told and the data ask for it
+  bool weigh_links = false;  ///< `compliance` may add `self_weight` where no link mass is told and the data ask for it
   bool robust = true;        ///< Huber loss beyond what 1 in 1000 good poses exceeds: a bad pose has little influence
 };
 

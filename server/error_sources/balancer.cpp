@@ -70,7 +70,7 @@ const CauseRecord& causes::balancer() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kLoad, 3},
       .forms = {{"balancer", make}},
-      .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}, {.cause = "link_weights"}},
+      .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}, {.cause = "self_weight"}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by = "more poses over this joint's range",
       .action = "have the balancer's pressure or spring checked, or compensate it",

@@ -75,7 +75,7 @@ const CauseRecord& causes::joint_coupling() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kJoints, 6},
       .forms = {{"joint_coupling", make}},
-      .rivals = {{.cause = "joint_map"}, {.cause = "compliance"}, {.cause = "link_weights"}, {.cause = "cable_pull"}},
+      .rivals = {{.cause = "joint_map"}, {.cause = "compliance"}, {.cause = "self_weight"}, {.cause = "cable_pull"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = "poses over the range of both joints, at all angles between them",
       .action = "compensate it; have belt or parallelogram adjusted where it grows",

@@ -233,7 +233,7 @@ const CauseRecord& causes::rail_straightness() {
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kJoints, 10},
       .forms = {{"rail_straightness", make_straightness}},
-      .rivals = {{.cause = "rail_scale"}, {.cause = "base_yielding"}, {.cause = "geometry"}},
+      .rivals = {{.cause = "rail_scale"}, {.cause = "base_compliance"}, {.cause = "geometry"}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by = "poses along the whole rail, with the arm in different postures",
       .action = "have the rail aligned, or compensate it",

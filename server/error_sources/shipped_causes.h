@@ -23,12 +23,12 @@
   CAUSE(joint_slip)                   \
   CAUSE(gear_transmission)            \
   CAUSE(joint_map)                    \
-  CAUSE(link_weights)                 \
+  CAUSE(self_weight)                  \
   CAUSE(balancer)                     \
-  CAUSE(base_yielding)                \
+  CAUSE(base_compliance)              \
   CAUSE(joint_coupling)               \
   CAUSE(cable_pull)                   \
-  CAUSE(axis_wobble)                  \
+  CAUSE(axis_runout)                  \
   CAUSE(loaded_ripple)                \
   CAUSE(rail_scale)                   \
   CAUSE(rack_pitch)                   \

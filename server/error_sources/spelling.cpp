@@ -1,6 +1,7 @@
 #include "server/error_sources/spelling.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <set>
@@ -20,7 +21,19 @@ using causes::Scope;
 
 constexpr double kMostPoses = 1e6;  // in a batch, for steps
 
+/// Names of causes in models and cell files from before 2026-11-23.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kFormerNames = {
+    {{"link_weights", "self_weight"}, {"base_yielding", "base_compliance"}}};
+
 std::string cause_in(const std::string& spec) { return spec.substr(0, spec.find_first_of(":@")); }
+
+std::string as_named_today(const std::string& spec) {
+  const std::string name = cause_in(spec);
+  for (const auto& [former, now] : kFormerNames) {
+    if (name == former) return std::string(now) + spec.substr(name.size());
+  }
+  return spec;
+}
 
 template <typename Number>
 bool parse_number(const std::string& text, Number& value) {
@@ -91,7 +104,8 @@ std::vector<std::string> alternatives(const std::string& spec, const Cell& cell)
   return spellings;
 }
 
-Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell) {
+Result<ErrorSourcePtr> make_error_source(const std::string& given, const Cell& cell) {
+  const std::string spec = as_named_today(given);
   if (is_of_instruments(spec)) return make_instrument_source(spec, cell);
   const CauseRecord* known = find_cause(spec);
   if (known == nullptr || known->forms.empty()) {

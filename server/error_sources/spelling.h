@@ -15,7 +15,7 @@ namespace trammel {
 
 /// The source that `spec` names for this cell, in its usual form: a cause, `:joint` (1-based) where it concerns one,
 /// and `@numbers` joined by `+` where more must be said (`gear_transmission:3@48+97`, `tracker_moved@120`). Refuses an
-/// unknown name, joint or number.
+/// unknown name, joint or number. A former name is read as the present one.
 [[nodiscard]] Result<ErrorSourcePtr> make_error_source(const std::string& spec, const Cell& cell);
 
 /// `joint_map:*` as one spec for each joint that can have it; all other specs as they are.

@@ -139,7 +139,7 @@ void refit_beside_maps() {
 }
 
 /// Arms whose links weigh, without a data sheet.
-void link_weights(int seeds) {
+void self_weight(int seeds) {
   double worst = 0;
   double longest = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -211,6 +211,6 @@ int main(int argc, char** argv) {
   trammel::robot_like_the_measured_one();
   trammel::speed_beside_scipy();
   trammel::refit_beside_maps();
-  trammel::link_weights(20);
+  trammel::self_weight(20);
   trammel::draw_wires(20);
 }

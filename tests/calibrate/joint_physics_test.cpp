@@ -184,7 +184,7 @@ TEST(JointPhysics, AnAxisThatWobblesIsNoAngleError) {
     });
     const MeasurementBatch batch = test::measured(arm, 600, static_cast<std::uint64_t>(joint));
     const MeasurementBatch fresh = test::measured(arm, 400, 2);
-    const CalibrationResult found = expect_to_explain(arm, {fmt::format("axis_wobble:{}", joint)}, batch, fresh, 1.5);
+    const CalibrationResult found = expect_to_explain(arm, {fmt::format("axis_runout:{}", joint)}, batch, fresh, 1.5);
     const CalibrationResult map =
         test::demand(calibrate(arm.cell, with({fmt::format("joint_map:{}", joint)}), batch, {}));
     EXPECT_GE(held_out_mm(map, fresh), 1.15 * kNoise_mm) << joint;

@@ -301,7 +301,7 @@ TEST_F(CommandLine, TrainFindsTheLoadThatComplianceActsOnWhereNoMassIsTold) {
   const Finished said = must({"train", "--cell", unloaded, "--batch", batch, "--level", "M3", "--bias", "none", "-o",
                               file("m3.model"), "--json", file("m3.json")});
   EXPECT_NE(said.out.find("the robot file tells no link masses"), std::string::npos) << said.out;
-  EXPECT_NE(said.out.find("found from the poses (link_weights)"), std::string::npos) << said.out;
+  EXPECT_NE(said.out.find("found from the poses (self_weight)"), std::string::npos) << said.out;
   const json told = json::parse(test::read_file(file("m3.json")));
   EXPECT_EQ(told["notes"].size(), 1U);
   const json fresh = json::parse(

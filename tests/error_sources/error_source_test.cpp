@@ -76,7 +76,7 @@ const std::vector<std::string>& every_spec() {
   static const std::vector<std::string> kSpecs = [] {
     std::vector<std::string> specs = {
         "gear_transmission:3@40.5+81", "joint_map:6@5",  "joint_map:5@3+150+2+1", "link_bending:4",
-        "joint_coupling:3@2",          "cable_pull:4@6", "axis_wobble:4",         "axis_wobble:1",
+        "joint_coupling:3@2",          "cable_pull:4@6", "axis_runout:4",         "axis_runout:1",
         "loaded_ripple:3@40.5+81"};
     for (const std::string& spec : specs_of(*cell_7())) specs.push_back(spec);
     return specs;
@@ -147,7 +147,7 @@ TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
     expect_exact_derivatives(cell, {spec});
     all.push_back(spec);
   }
-  for (const char* beyond : {"axis_wobble:2", "axis_wobble:3", "instrument_scale"}) all.emplace_back(beyond);
+  for (const char* beyond : {"axis_runout:2", "axis_runout:3", "instrument_scale"}) all.emplace_back(beyond);
   expect_exact_derivatives(cell, all);
 }
 
@@ -367,6 +367,11 @@ TEST(ErrorSources, AMapIsOpenWhereNothingIsToldOfItsSpectrum) {
   EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:2"}), "joint_map:2");
   EXPECT_EQ(as_listed("joint_map:2@110+300+6+2", {"base", "joint_map:3"}), "joint_map:2@110+300+6+2");
   EXPECT_EQ(as_listed("joint_map:2@110", {"base", "joint_map:2"}), "joint_map:2@110");
+}
+
+TEST(ErrorSources, FormerNamesAreReadAsThePresentOnes) {
+  EXPECT_EQ((*make_error_source("link_weights", *cell_7()))->name(), "self_weight");
+  EXPECT_EQ((*make_error_source("base_yielding", *cell_7()))->name(), "base_compliance");
 }
 
 TEST(ErrorSources, UnknownNamesAreRefusedWithTheKnownOnes) {

@@ -54,7 +54,7 @@ CalibrationResult as_it_is(CalibrationResult found) {
 TEST(LeftOut, WithoutABlockTellsWhatIdentificationFromTheRestFindsHoweverUncertainTheLinksWeightsAre) {
   const test::HeavyArm arm = test::draw_heavy_arm({.seed = 3, .payloads = 0});
   const MeasurementBatch batch = test::measured(arm, 200, 1);
-  const std::vector<std::string> sources = {"base", "geometry", "link_weights", "compliance_linear"};
+  const std::vector<std::string> sources = {"base", "geometry", "self_weight", "compliance_linear"};
   const CalibrationResult all = test::demand(calibrate(arm.cell, sources, batch, {}));
   std::vector<Eigen::Index> block(25);
   std::iota(block.begin(), block.end(), Eigen::Index{50});

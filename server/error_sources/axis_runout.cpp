@@ -38,7 +38,7 @@ class AxisWobble final : public ErrorSource {
         parameters_.push_back(length_parameter(fmt::format("axial_{}{}_{}", wave, joint_ + 1, h), kAxial / h));
     }
   }
-  const CauseRecord& cause() const override { return causes::axis_wobble(); }
+  const CauseRecord& cause() const override { return causes::axis_runout(); }
   std::string name() const override { return name_; }
   int joint() const override { return joint_; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
@@ -81,9 +81,9 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
 
 }  // namespace
 
-const CauseRecord& causes::axis_wobble() {
+const CauseRecord& causes::axis_runout() {
   static const CauseRecord record = {
-      .spelling = "axis_wobble",
+      .spelling = "axis_runout",
       .plain_name = "run-out and tilt of an axis",
       .plain_name_of_joint = "run-out and tilt of axis {}",
       .scope = Scope::kJoint,
@@ -91,7 +91,7 @@ const CauseRecord& causes::axis_wobble() {
       .needs = {},
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kJoints, 9},
-      .forms = {{"axis_wobble", make}},
+      .forms = {{"axis_runout", make}},
       .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}, {.cause = "geometry"}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by =

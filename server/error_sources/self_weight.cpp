@@ -41,8 +41,8 @@ class LinkWeights final : public ErrorSource {
       }
     }
   }
-  const CauseRecord& cause() const override { return causes::link_weights(); }
-  std::string name() const override { return "link_weights"; }
+  const CauseRecord& cause() const override { return causes::self_weight(); }
+  std::string name() const override { return "self_weight"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override {
     return "the links' own weights load the gearboxes, by what the poses show of them";
@@ -69,9 +69,9 @@ Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) { return std::m
 
 }  // namespace
 
-const CauseRecord& causes::link_weights() {
+const CauseRecord& causes::self_weight() {
   static const CauseRecord record = {
-      .spelling = "link_weights",
+      .spelling = "self_weight",
       .plain_name = "link weights",
       .plain_name_of_joint = "",
       .scope = Scope::kArm,
@@ -79,7 +79,7 @@ const CauseRecord& causes::link_weights() {
       .needs = {},
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kLoad, 2},
-      .forms = {{"link_weights", make}},
+      .forms = {{"self_weight", make}},
       .rivals = {{.cause = "compliance"}, {.cause = "encoder_eccentricity"}, {.cause = "payload"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = remedies::kOtherLoad.text,
@@ -90,10 +90,9 @@ const CauseRecord& causes::link_weights() {
           AddedByData{
               .beside = "compliance",
               .is_known = [](const Cell& cell) { return cell.robot.has_link_masses(); },
-              .note =
-                  "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance "
-                  "acts on link weights that were found from the poses (link_weights); without them it would act on "
-                  "the payload alone"},
+              .note = "the robot file tells no link masses, and these poses show the links' weight: gearbox compliance "
+                      "acts on link weights that were found from the poses (self_weight); without them it would act on "
+                      "the payload alone"},
   };
   return record;
 }

@@ -41,7 +41,7 @@ TEST(LinkWeights, ComplianceFindsTheWeightsThatNoDataSheetTold) {
     const HeavyArm arm = draw_heavy_arm({.seed = 3, .payloads = payloads});
     const MeasurementBatch fresh = test::measured(arm, 500, 2);
     const CalibrationResult found = calibrated(arm, kM3, 600);
-    EXPECT_TRUE(has(found, "link_weights")) << payloads << " payloads";
+    EXPECT_TRUE(has(found, "self_weight")) << payloads << " payloads";
     EXPECT_LE(held_out_mm(found, fresh), 1.05 * kNoise_mm) << payloads << " payloads";
     EXPECT_GE(held_out_mm(calibrated(arm, kM3, 600, false), fresh), 2 * kNoise_mm) << payloads << " payloads";
   }
@@ -51,10 +51,10 @@ TEST(LinkWeights, AreNotAddedWhereTheControllerCompensatesThem) {
   const auto cell = test::cell_7();
   const CalibrationResult found = test::demand(
       calibrate(cell, kM3, test::measured(test::chapter_5_robot(cell), 200, 1), {.held = {}, .weigh_links = true}));
-  EXPECT_FALSE(has(found, "link_weights"));
+  EXPECT_FALSE(has(found, "self_weight"));
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const HeavyArm light = draw_heavy_arm({.seed = seed, .links_weigh = false});
-    EXPECT_FALSE(has(calibrated(light, kM3, 200), "link_weights")) << "seed " << seed;
+    EXPECT_FALSE(has(calibrated(light, kM3, 200), "self_weight")) << "seed " << seed;
   }
 }
 
@@ -64,7 +64,7 @@ TEST(LinkWeights, BesideUnknownCompliancesAreFoundInFewStepsThoughOnlyTheirProdu
   const auto cell = test::cell_7();
   const MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 1500, 1, false);
   const CalibrationResult found =
-      test::demand(calibrate(cell, {"base", "geometry", "link_weights", "compliance_linear"}, batch, {}));
+      test::demand(calibrate(cell, {"base", "geometry", "self_weight", "compliance_linear"}, batch, {}));
   EXPECT_TRUE(found.converged);
   EXPECT_LE(found.iterations, 30);
 }
@@ -92,10 +92,10 @@ TEST(LinkWeights, WithTwoKnownPayloadsTheSagOfAThirdIsKnown) {
 TEST(LinkWeights, ABalancerAndASoftFootAreTakenForWhatTheyAre) {
   const HeavyArm arm = draw_heavy_arm({.seed = 7, .balancer = true, .soft_foot = true});
   const MeasurementBatch fresh = test::measured(arm, 500, 2);
-  const std::vector<std::string> all = {"base",         "geometry",   "compliance",
-                                        "link_weights", "balancer:2", "base_yielding"};
+  const std::vector<std::string> all = {"base",        "geometry",   "compliance",
+                                        "self_weight", "balancer:2", "base_compliance"};
   EXPECT_LE(held_out_mm(calibrated(arm, all, 600), fresh), 1.05 * kNoise_mm);
-  for (const char* without : {"balancer:2", "base_yielding"}) {
+  for (const char* without : {"balancer:2", "base_compliance"}) {
     std::vector<std::string> fewer = all;
     std::erase(fewer, without);
     EXPECT_GE(held_out_mm(calibrated(arm, fewer, 600), fresh), 1.1 * kNoise_mm) << without;

@@ -25,8 +25,8 @@ class BaseYielding final : public ErrorSource {
           {k == 0 ? "wx0" : "wy0", "kg m", 1, expected.moment(k, turning_), expected.spread(turning_)});
     }
   }
-  const CauseRecord& cause() const override { return causes::base_yielding(); }
-  std::string name() const override { return "base_yielding"; }
+  const CauseRecord& cause() const override { return causes::base_compliance(); }
+  std::string name() const override { return "base_compliance"; }
   const std::vector<Parameter>& parameters() const override { return parameters_; }
   std::string explanation() const override { return "the base tilts under the moment of arm and payload"; }
 
@@ -64,9 +64,9 @@ Result<ErrorSourcePtr> make(const SourceSpec&, const Cell& cell) { return std::m
 
 }  // namespace
 
-const CauseRecord& causes::base_yielding() {
+const CauseRecord& causes::base_compliance() {
   static const CauseRecord record = {
-      .spelling = "base_yielding",
+      .spelling = "base_compliance",
       .plain_name = "yielding of the base",
       .plain_name_of_joint = "",
       .scope = Scope::kArm,
@@ -74,7 +74,7 @@ const CauseRecord& causes::base_yielding() {
       .needs = {},
       .search = SearchFamily::kNone,
       .acts = {ActsOn::kLoadedArm, 4},
-      .forms = {{"base_yielding", make}},
+      .forms = {{"base_compliance", make}},
       .rivals = {{.cause = "compliance"}, {.cause = "base"}, {.cause = "link_bending"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = "poses all around the base, and a second known payload or a run without any",
