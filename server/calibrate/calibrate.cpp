@@ -28,17 +28,32 @@ constexpr double kPerhapsStretched = 0.25;  // of that price, by what scales alo
 constexpr double kZeroed = 10;              // the same with zero errors of the instruments
 constexpr double kZeroedOfInstrument = 3;
 
-/// Base and tool of the nominal chain refined together, and taken over as the model's frames.
+/// The first value of the model's `base`; -1: it has none.
+Eigen::Index place_of_base(const PhysicalModel& model) {
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    if (source->cause().part == causes::Part::kBase) return first;
+    first += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  return -1;
+}
+
+/// Unknown frames by the nominal chain, refined together and taken over as the model's. Beside an unknown tool a base
+/// that is known and to be identified is free, too: the instrument may stand elsewhere.
 Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
   if (Status located = locate_unknown_frames(model, batch); !located) return located;
+  const bool base_known = model.cell->X_WB.has_value();
+  const bool tool_unknown = has_unknown_tool(*model.cell);
   std::vector<std::string> free;
-  if (!model.cell->X_WB) free.emplace_back(cause_correcting(causes::Part::kBase).spelling);
-  if (has_unknown_tool(*model.cell)) free.emplace_back(cause_correcting(causes::Part::kTool).spelling);
+  if (!base_known || (tool_unknown && place_of_base(model) >= 0))
+    free.emplace_back(cause_correcting(causes::Part::kBase).spelling);
+  if (tool_unknown) free.emplace_back(cause_correcting(causes::Part::kTool).spelling);
   if (free.empty()) return {};
   Result<PhysicalModel> frames = make_physical_model(model.cell, free);
   if (!frames) return tl::make_unexpected(frames.error());
   frames->X_WB = model.X_WB;
   frames->tools = model.tools;
+  if (base_known) localise_base(*frames, batch);
   const Result<CalibrationResult> refined = identify({*frames, positions_of(batch)}, options);
   if (!refined) return tl::make_unexpected(refined.error());
   for (auto& [tool, X_FT] : model.tools) {
@@ -47,7 +62,7 @@ Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const Ca
     anywhere.tool = tool;
     const ArmState arm = refined->model.state(anywhere);
     X_FT = arm.X_FT;
-    model.X_WB = arm.X_WB;
+    if (!base_known) model.X_WB = arm.X_WB;
   }
   return {};
 }
@@ -92,16 +107,6 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
   Result<CalibrationResult> stretched = identify(with, options);
   const double price = price_of_scales(rigid->sessions.size());
   return stretched && stretched->log_likelihood > rigid->log_likelihood + price ? stretched : rigid;
-}
-
-/// The first value of the model's `base`; -1: it has none.
-Eigen::Index place_of_base(const PhysicalModel& model) {
-  Eigen::Index first = 0;
-  for (const ErrorSourcePtr& source : model.sources) {
-    if (source->cause().part == causes::Part::kBase) return first;
-    first += static_cast<Eigen::Index>(source->parameters().size());
-  }
-  return -1;
 }
 
 /// Anchors by the nominal arm; where known ones tell where the base is, base and anchors by all gauges together. Their

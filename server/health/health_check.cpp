@@ -397,6 +397,13 @@ void Examination::tell_verdict() {
   } else if (*check_.would_have_seen > options_.tolerance) {
     check_.sentence = fmt::format("these poses could hide {} of {:.3f} mm, the tolerance is {:.3f} mm",
                                   in_words(check_.smallest.front().cause), to_mm(*check_.would_have_seen), tolerance);
+  } else if (!check_.suspects.empty()) {
+    check_.sentence = fmt::format(
+        "pose {} fits neither the model nor the other poses, which are as the model has them: it was measured wrongly, "
+        "or "
+        "something changed that shows only there; measure it again",
+        fmt::join(check_.suspects, ", "));
+    return;
   } else {
     check_.verdict = HealthVerdict::kHealthy;
     check_.sentence = fmt::format(

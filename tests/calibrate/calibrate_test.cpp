@@ -155,6 +155,29 @@ TEST(Calibrate, EstimatesWhatTheModelCannotExplain) {
   EXPECT_LT(complete->discrepancy, 4e-6);
 }
 
+TEST(Calibrate, FindsAToolThatNobodyKnowsThoughTheTrackerStandsCentimetresFromWhereTheCellSays) {
+  Cell unknown = *cell_7();
+  unknown.tools.at("spindle").reset();
+  const auto cell = std::make_shared<const Cell>(unknown);
+  const VirtualRobot robot = chapter_5_robot(cell_7());
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const auto draw = [&] { return Vector3(normal(random), normal(random), normal(random)); };
+    const Pose moved = make_pose(rotation_exp(0.03 * draw()), 0.04 * draw());
+    for (const bool oriented : {true, false}) {
+      MeasurementBatch batch = measured(robot, 100, seed, oriented);
+      for (Measurement& m : batch.measurements) {
+        m.p_W = moved * m.p_W;
+        if (m.R_WT) m.R_WT = (moved.linear() * *m.R_WT).eval();
+      }
+      const Result<CalibrationResult> found = calibrate(cell, {"base", "geometry", "compliance", "tool"}, batch, {});
+      ASSERT_TRUE(found) << "seed " << seed << ": " << sentence(found.error());
+      EXPECT_LT(to_mm(found->rms), 0.03) << "seed " << seed;
+    }
+  }
+}
+
 TEST(Calibrate, FewPosesTellHowFarPositionsAreOffThatAreFittedCloserThanOrientations) {
   // The model's own error is in the positions alone, which then decide little and the orientations much; or the other
   // way round. By number, half of the parameters would be fitted to either.

@@ -10,6 +10,12 @@
 
 namespace trammel {
 
+namespace {
+
+constexpr double kClearlyBetter = 0.5;  // of the misfit
+
+}  // namespace
+
 bool has_unknown_tool(const Cell& cell) {
   return std::any_of(cell.tools.begin(), cell.tools.end(), [](const auto& tool) { return !tool.second; });
 }
@@ -89,6 +95,36 @@ Result<BaseAndTool> locate_both(const ToolPoses& poses) {
   return found;
 }
 
+/// m: what is left of the positions where the base is moved to fit them, with the tool there.
+double misfit(const ToolPoses& poses, const Pose& X_FT) {
+  const Eigen::Matrix3Xd p_W = poses.p_W();
+  Eigen::Matrix3Xd p_B(3, p_W.cols());
+  for (std::size_t i = 0; i < poses.X_BF.size(); ++i)
+    p_B.col(static_cast<Eigen::Index>(i)) = poses.X_BF[i] * X_FT.translation();
+  const Result<Pose> X_WB = fit_transform(p_W, p_B);
+  if (!X_WB) return 0;
+  double square = 0;
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i) square += (p_W.col(i) - *X_WB * p_B.col(i)).squaredNorm();
+  return std::sqrt(square / static_cast<double>(p_W.cols()));
+}
+
+/// The tool from a base that the cell knows, and that is to be identified: the instrument may stand elsewhere by more
+/// than a tool that is found there can make up for. Then both are found at once, of which the tool is taken.
+Status locate_tool_near(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
+  const Status located = locate_tool_at(poses, X_FT, model);
+  const Result<BaseAndTool> both = locate_both(poses);
+  if (both && (!located || misfit(poses, both->X_FT) < kClearlyBetter * misfit(poses, X_FT))) {
+    X_FT = both->X_FT;
+    return {};
+  }
+  return located;
+}
+
+bool has_base(const PhysicalModel& model) {
+  return std::any_of(model.sources.begin(), model.sources.end(),
+                     [](const ErrorSourcePtr& source) { return source->cause().part == causes::Part::kBase; });
+}
+
 }  // namespace
 
 Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch) {
@@ -100,7 +136,8 @@ Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch
     if (known) {
       if (const Status located = locate_base(poses, *known, model); !located) return located;
     } else if (base_known) {
-      if (const Status located = locate_tool_at(poses, model.tools[tool], model); !located) return located;
+      const auto locate = has_base(model) ? locate_tool_near : locate_tool_at;
+      if (const Status located = locate(poses, model.tools[tool], model); !located) return located;
     } else {
       const Result<BaseAndTool> found = locate_both(poses);
       if (!found) return tl::make_unexpected(found.error());
