@@ -253,7 +253,7 @@ TEST_F(CoupledBias, AMapOfJoint2IsUsedWhereJoint2WasMeasuredThoughJoint1IsFarOut
   parts.bias->q = parts.bias->q(rows, Eigen::all).eval();
   parts.bias->residual_B = parts.bias->residual_B(rows, Eigen::all).eval();
   parts.bias->sigma = parts.bias->sigma(rows).eval();
-  parts.bias->block_hyperparameters.segment<2>(2) << std::log(3e-4), std::log(6.0);
+  parts.bias->block_hyperparameters.segment<3>(3) << std::log(3e-4), std::log(6.0), std::log(2.0);
   parts.bias_contexts = contexts;
   parts.rotation_bias.reset();
   parts.q_max(0) = 0;

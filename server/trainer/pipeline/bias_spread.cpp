@@ -12,9 +12,11 @@ using Eigen::Index;
 
 constexpr Index kMostObservations = 200;  // of more the hyperparameters are known well enough
 constexpr Index kFolds = 5;
-constexpr int kStarts = 5;        // of each search: the poses that are left are much like all
-constexpr double kLargest = 100;  // f²: beyond it the bias is wrong, not uncertain
-constexpr int kBisections = 50;
+constexpr int kStarts = 5;            // of each search: the poses that are left are much like all
+constexpr double kPriorSpread = 0.3;  // of log f: what is usual of kernels that fit
+constexpr double kLargestLog = 2.3;   // f 10: beyond it the bias is wrong, not uncertain
+constexpr int kThirds = 40;           // of that interval that the search narrows down
+constexpr double kNothing = 1e-4;     // of log f
 
 /// Of the poses left out: squares of what is missed, and what is said of them. All m², sums of three coordinates.
 struct Missed {
@@ -58,21 +60,29 @@ bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_p
   return true;
 }
 
-/// f² under which the squares are as large as expected, from 1 on.
-double square_of_spread(const Missed& missed) {
-  const auto beyond = [&](double factor) {
-    double sum = 0;
-    for (std::size_t k = 0; k < missed.square.size(); ++k)
-      sum += missed.square[k] / (factor * missed.uncertain[k] + missed.instrument[k]) - 1;
-    return sum > 0;
-  };
-  if (missed.square.empty() || !beyond(1)) return 1;
-  double low = 1, high = kLargest;
-  for (int k = 0; k < kBisections; ++k) {
-    const double middle = std::sqrt(low * high);
-    (beyond(middle) ? low : high) = middle;
+/// -2 log of the likelihood of f and of its prior, but for what does not depend on it.
+double misfit(const Missed& missed, double log_f) {
+  double sum = std::pow(log_f / kPriorSpread, 2);
+  for (std::size_t k = 0; k < missed.square.size(); ++k) {
+    const double expected = std::exp(2 * log_f) * missed.uncertain[k] + missed.instrument[k];
+    sum += 3 * (std::log(expected) + missed.square[k] / expected);
   }
-  return low;
+  return sum;
+}
+
+/// The likeliest f from 1 on. Where what is uncertain is small beside the instrument's noise, hundreds of poses say
+/// little of it, and it stays near 1.
+double likeliest_spread(const Missed& missed) {
+  double low = 0, high = kLargestLog;
+  for (int k = 0; k < kThirds; ++k) {
+    const double first = low + (high - low) / 3, second = high - (high - low) / 3;
+    if (misfit(missed, first) <= misfit(missed, second)) {
+      high = second;
+    } else {
+      low = first;
+    }
+  }
+  return low < kNothing ? 1 : std::exp(low);
 }
 
 }  // namespace
@@ -90,7 +100,7 @@ double bias_spread(const BiasProblem& problem, const BiasModel& bias, const Left
     if (!add_fold(problem, options, spelled_bias(bias.state().kernel)->has("parameters"), left_out, fold, missed))
       return 1;
   }
-  return std::sqrt(square_of_spread(missed));
+  return likeliest_spread(missed);
 }
 
 }  // namespace trammel
