@@ -45,8 +45,7 @@ class RackPitch final : public ErrorSource {
       const double pitch = from_mm(spec.at[k]);
       const double spread = 0.25 * pitch * pitch / travel;  // a quarter of what this travel resolves
       parameters_.push_back({"pitch" + which, "mm", to_mm(1), pitch, spread, pitch / 2, true});
-      for (const char* wave : {"rack_sin", "rack_cos"})
-        parameters_.push_back(length_parameter(wave + which, kPrior_mm));
+      for (const char* wave : {"rack_sin", "rack_cos"}) parameters_.push_back(length_parameter(wave + which, kPriorMm));
     }
   }
   const CauseRecord& cause() const override { return causes::rack_pitch(); }
@@ -73,7 +72,7 @@ class RackPitch final : public ErrorSource {
   }
 
  private:
-  static constexpr double kPrior_mm = 0.03;
+  static constexpr double kPriorMm = 0.03;
   std::string name_;
   int joint_;
   std::vector<Parameter> parameters_;
@@ -90,7 +89,7 @@ class RailStraightness final : public ErrorSource {
     middle_ = std::isfinite(joint.lower) ? joint.lower + half_ : 0;
     for (const char* axis : {"straight_x", "straight_y"}) {
       for (int k = 2; k <= kDegrees; ++k)
-        parameters_.push_back(length_parameter(fmt::format("{}{}_{}", axis, joint_ + 1, k), kStraight_mm / (k - 1)));
+        parameters_.push_back(length_parameter(fmt::format("{}{}_{}", axis, joint_ + 1, k), kStraightMm / (k - 1)));
     }
     for (int k = 1; k < kDegrees; ++k)
       parameters_.push_back(angle_parameter(fmt::format("roll{}_{}", joint_ + 1, k), kRoll / k));
@@ -119,7 +118,7 @@ class RailStraightness final : public ErrorSource {
 
  private:
   static constexpr int kDegrees = 8;
-  static constexpr double kStraight_mm = 0.3;
+  static constexpr double kStraightMm = 0.3;
   static constexpr double kRoll = 1e-4;  // rad
 
   struct Polynomial {
