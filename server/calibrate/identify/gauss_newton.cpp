@@ -25,7 +25,8 @@ constexpr double kNoDamping = 1e-6;
 
 // Of numbers of which the poses show the product alone, damped steps follow a bent valley for a hundred steps, and all
 // that falls is how well the priors like it.
-constexpr double kIdleFall = 0.05;  // nat a step
+constexpr double kIdleFall = 0.05;        // nat a step
+constexpr double kFirstIdleShare = 1e-3;  // of the cost, as long as residuals only serve to find the discrepancy
 constexpr int kIdleSteps = 3;
 // A full step along such a valley leaves it, and the next ones come back, farther down.
 constexpr int kMostUphill = 5;  // steps
@@ -229,9 +230,9 @@ struct Descent {
     damping = std::max(10 * damping, kFirstDamping);
     return damping <= kMostDamping;
   }
-  void accept() {
+  void accept(double idle_fall) {
     if (!is_higher()) {
-      idle = best.at.cost - now.at.cost < kIdleFall ? idle + 1 : 0;
+      idle = best.at.cost - now.at.cost < idle_fall ? idle + 1 : 0;
       best = now;
     }
     uphill = 0;
@@ -261,7 +262,7 @@ Result<Minimum> session_steps(const CalibrationProblem& problem, const ScaledPar
       if (!search.go_on_or_back(settled)) break;
       continue;
     }
-    search.accept();
+    search.accept(weights.estimated ? kIdleFall : std::max(kIdleFall, kFirstIdleShare * search.best.at.cost));
     costs.push_back(search.best.at.cost);
     if (!settled && search.idle < kIdleSteps) continue;
     Minimum found = minimum_at(search.best, std::move(costs));
