@@ -27,6 +27,15 @@ std::vector<test::ThreadOf> named(pid_t process, const std::string& name, std::s
   return threads;
 }
 
+/// Whether every thread but the first has a name of its own before long: until then it has that of the process.
+bool all_are_named(pid_t process) {
+  const auto deadline = std::chrono::steady_clock::now() + kLimit;
+  while (named(process, "trammeld").size() > 1) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+  }
+  return true;
+}
+
 /// Whether a client gets an answer.
 bool answers(const test::Daemon& daemon) {
   const auto status =
@@ -89,6 +98,7 @@ TEST(WatchdogTest, RequestsThatNobodyTakesEndTheDaemonAndTheirKindIsNamed) {
   test::Daemon daemon;
   daemon.start();
   std::vector<std::unique_ptr<test::StoppedThread>> stopped;
+  ASSERT_TRUE(all_are_named(daemon.process().pid()));
   for (const test::ThreadOf& thread : named(daemon.process().pid(), "requests", 8)) {
     stopped.push_back(std::make_unique<test::StoppedThread>(thread.id));
     ASSERT_TRUE(stopped.back()->is_stopped());
