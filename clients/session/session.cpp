@@ -531,6 +531,14 @@ Result<std::string> Session::export_model(const std::string& cell, int version) 
   return std::move(reply->text());
 }
 
+Result<std::string> Session::replay(const std::string& cell, int version) {
+  wire::ReadModelsRequest request;
+  request.version(version);
+  auto reply = participant_->read(cell, {}, wire::READ_REPLAY, std::move(request));
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
+}
+
 Result<int> Session::import_model(const std::string& cell, const std::string& text, const ChangeOptions& change) {
   if (const Status fits = check_text("the model", text); !fits) return tl::make_unexpected(fits.error());
   wire::ManageModelsRequest request;

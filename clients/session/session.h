@@ -103,6 +103,9 @@ class Session {
   /// Returns the version now in force.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const ChangeOptions& change = {});
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeOptions& change = {});
+  /// The poses that a cell was lately asked for, by its model in force and by `version` beside it (0: none), as
+  /// `trammel replay --json` prints it. Of the server that answers.
+  [[nodiscard]] Result<std::string> replay(const std::string& cell, int version);
   /// The model file's text. version 0 = in force.
   [[nodiscard]] Result<std::string> export_model(const std::string& cell, int version);
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text,

@@ -16,16 +16,20 @@
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
+#include "server/measurement/warmth.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kWeighed = 20;             // nat: so much more likely must the data be with the links' weights
-constexpr double kStretched = 10;           // nat: so much more likely must the data be with scales of the sessions,
-constexpr double kStretchedOfSession = 3;   // and so much more for each of them
-constexpr double kPerhapsStretched = 0.25;  // of that price, by what scales alone would explain: worth a trial
-constexpr double kZeroed = 10;              // the same with zero errors of the instruments
+constexpr double kWeighed = 20;               // nat: so much more likely must the data be with a cause that they add
+constexpr double kInsteadOfScales = 3;        // the same where it makes scales of the sessions superfluous
+constexpr double kOfMetal = 0.2;              // of the prior scale: 4 um per m and K
+constexpr std::size_t kSessionsOfWarmth = 3;  // of two, another scale of the instrument does the same
+constexpr double kStretched = 10;             // nat: so much more likely must the data be with scales of the sessions,
+constexpr double kStretchedOfSession = 3;     // and so much more for each of them
+constexpr double kPerhapsStretched = 0.25;    // of that price, by what scales alone would explain: worth a trial
+constexpr double kZeroed = 10;                // the same with zero errors of the instruments
 constexpr double kZeroedOfInstrument = 3;
 
 /// The first value of the model's `base`; -1: it has none.
@@ -267,31 +271,57 @@ std::vector<std::vector<std::string>> with_added(const CalibrationResult& withou
   return candidates;
 }
 
-/// The cause that the data may add: what shows it is asked for in any form, and the cell does not say it. Null if there
-/// is none.
-const CauseRecord* may_be_added(const Cell& cell, const std::vector<std::string>& specs) {
+/// The causes that the data may add: what shows them is asked for in any form, and the cell does not say them.
+std::vector<const CauseRecord*> may_be_added(const Cell& cell, const std::vector<std::string>& specs,
+                                             const MeasurementBatch& batch) {
   const auto has = [&](std::string_view cause) { return std::find(specs.begin(), specs.end(), cause) != specs.end(); };
+  const bool shows_days = batch.sessions.size() >= kSessionsOfWarmth && shows_warmth(batch);
+  std::vector<const CauseRecord*> records;
   for (const CauseRecord* record : all_causes()) {
     const auto& added = record->added_by_data;
-    if (added && has(added->beside) && !has(record->spelling) && !added->is_known(cell)) return record;
+    if (!added || !has(added->beside) || has(record->spelling) || added->is_known(cell)) continue;
+    if (!record->needs.temperature || shows_days) records.push_back(record);
   }
-  return nullptr;
+  return records;
 }
 
 }  // namespace
 
 namespace {
 
-/// With the links' weights where the data ask for them.
+/// Whether what goes with the temperature is as large as arms of metal have it, and of their sign: less is wear that
+/// went with the seasons, or an instrument.
+bool is_of_metal(const CalibrationResult& with, const CauseRecord& added) {
+  if (!added.needs.temperature) return true;
+  Eigen::Index first = 0;
+  for (const ErrorSourcePtr& source : with.model.sources) {
+    const Parameter& growth = source->parameters().front();
+    if (&source->cause() == &added) return with.model.values(first) > kOfMetal * growth.prior_scale;
+    first += static_cast<Eigen::Index>(source->parameters().size());
+  }
+  return false;
+}
+
+/// Whether the data ask for what was added. Where it stands for what scales of the sessions explain otherwise it needs
+/// no more than to be likelier, the scales at their price.
+bool is_worth_adding(const CalibrationResult& without, const CalibrationResult& with) {
+  if (!are_stretched(without.sessions) || are_stretched(with.sessions))
+    return with.log_evidence > without.log_evidence + kWeighed;
+  const double price = price_of_scales(without.sessions.size());
+  return with.log_likelihood > without.log_likelihood - price + kInsteadOfScales;
+}
+
+/// With the links' weights, and their growth, where the data ask for them.
 Result<CalibrationResult> calibrate_weighed(const std::shared_ptr<const Cell>& cell,
                                             const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                             const CalibrateOptions& options) {
-  Result<CalibrationResult> without = most_likely(cell, combinations(specs, *cell), batch, options);
-  const CauseRecord* added = options.weigh_links ? may_be_added(*cell, specs) : nullptr;
-  if (!without || added == nullptr) return without;
-  Result<CalibrationResult> with = most_likely(cell, with_added(*without, *added), batch, options);
-  const bool asked_for = with && with->log_evidence > without->log_evidence + kWeighed;
-  return asked_for ? with : without;
+  Result<CalibrationResult> best = most_likely(cell, combinations(specs, *cell), batch, options);
+  if (!best || !options.weigh_links) return best;
+  for (const CauseRecord* added : may_be_added(*cell, specs, batch)) {
+    Result<CalibrationResult> with = most_likely(cell, with_added(*best, *added), batch, options);
+    if (with && is_of_metal(*with, *added) && is_worth_adding(*best, *with)) best = std::move(with);
+  }
+  return best;
 }
 
 /// With zero errors of the instruments, the other sources as they were found.

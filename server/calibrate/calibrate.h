@@ -18,8 +18,10 @@ namespace trammel {
 [[nodiscard]] Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options);
 
 /// Calibrates `cell` with the sources that `specs` name. Of a cause with several forms the one is kept under which the
-/// data are most likely; all forms have the same number of parameters. With `weigh_links`, `compliance` of a robot
-/// without told link masses has the source `self_weight` beside it where that is 20 nat more likely.
+/// data are most likely; all forms have the same number of parameters. With `weigh_links` the data may
+/// add causes: `self_weight` beside `compliance` of a robot without told link masses, and `thermal_growth` beside
+/// `geometry` of three sessions and more at different temperatures, where that is 20 nat more likely, or makes scales
+/// of the sessions superfluous.
 [[nodiscard]] Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell,
                                                   const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                                   const CalibrateOptions& options);

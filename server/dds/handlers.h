@@ -86,6 +86,8 @@ class Handlers {
   [[nodiscard]] Result<wire::ReadModelsReply> models_of(const std::string& cell) const;
   /// The text of the model file of `version`; version 0 is the one in force.
   [[nodiscard]] Result<wire::ReadModelsReply> exported(const std::string& cell, int version) const;
+  /// What was lately asked of the cell, by the model in force and by `version` beside it; 0: alone.
+  [[nodiscard]] Result<wire::ReadModelsReply> replayed(const std::string& cell, int version) const;
   [[nodiscard]] Result<wire::ReadModelsReply> batch_of(const std::string& cell, const std::string& id) const;
   [[nodiscard]] Result<wire::ReadModelsReply> jobs_of(const std::string& cell) const;
   [[nodiscard]] Result<wire::ReadModelsReply> audit_of(const std::string& cell, std::int64_t since,

@@ -8,6 +8,7 @@
 #include "server/dds/handlers.h"
 #include "server/report/cell_health.h"
 #include "server/report/fleet_json.h"
+#include "server/report/work_json.h"
 #include "server/store/audit_json.h"
 
 namespace trammel {
@@ -71,7 +72,7 @@ Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
                       request.what() == wire::READ_HEALTH;
   if (request.what() == wire::READ_JOB) return job_of(request.job());
   if (request.what() == wire::READ_FLEET) return fleet();
-  if (request.what() > wire::READ_AUDIT) return unsupported<ReadModelsReply>("what");
+  if (request.what() > wire::READ_REPLAY) return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
     if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   }
@@ -101,6 +102,8 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
       return audit_of(cell, request.since_unix_s(), request.most());
     case wire::READ_HEALTH:
       return health_of(cell, request.since_unix_s(), request.most());
+    case wire::READ_REPLAY:
+      return replayed(cell, request.version());
     default:
       return unsupported<ReadModelsReply>("what");
   }
@@ -145,6 +148,21 @@ Result<ReadModelsReply> Handlers::exported(const std::string& cell, int asked) c
   reply.text(serialize(*model));
   const Status fits = check_fits(fmt::format("cell {} version {}", cell, version), reply.text().size());
   if (!fits) return tl::make_unexpected(fits.error());
+  return reply;
+}
+
+Result<ReadModelsReply> Handlers::replayed(const std::string& cell, int version) const {
+  const auto in_force = registry_.in_force(cell);
+  if (!in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
+  const auto other = version == 0 || version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                                  : store_.model(cell, version);
+  if (!other) return tl::make_unexpected(other.error());
+  const WorkVersions versions{cell, in_force->version, version};
+  const WorkAsked work =
+      work_asked(in_force->model, version == 0 ? nullptr : &*other, trainer_.recent_poses().of(cell));
+  ReadModelsReply reply;
+  reply.version(in_force->version);
+  reply.text(work_json(work, versions, in_force->model.cell().robot).dump());
   return reply;
 }
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "server/error_sources/error_source.h"
 #include "server/error_sources/shipped_causes.h"
 
@@ -62,6 +64,15 @@ const CauseRecord& causes::thermal_growth() {
       .action = "warm the robot up before work, or record its temperature with every job",
       .figures = {{"growth", "um/m/K", "growth of every link"}},
       .goes_with_time = true,
+      .added_by_data =
+          AddedByData{.beside = "geometry",
+                      .is_known =
+                          [](const Cell& cell) {
+                            const auto& sources = cell.model.error_sources;
+                            return std::find(sources.begin(), sources.end(), "thermal_growth") != sources.end();
+                          },
+                      .note = "the arm was longer in warmer sessions: its links grow with the recorded temperature "
+                              "(thermal_growth), which the cell file does not list"},
   };
   return record;
 }

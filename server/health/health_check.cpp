@@ -456,7 +456,7 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
         .in("batch " + batch.id());
   }
   const std::vector<PoseContext> contexts = health::contexts_of(model, known);
-  const CauseEffects effects(model.parts().physics, contexts);
+  const CauseEffects effects(model.parts().physics, contexts, model.parts().temperature_mean);
   const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed), options.new_tool);
   Result<CheckRows> rows = health::check_rows(model, known, effects);
   if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);

@@ -49,8 +49,8 @@ bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
 
 constexpr double kWarmer = 2;  // K between poses, from which on temperature shows
 
-bool warms(const std::vector<PoseContext>& poses) {
-  std::optional<double> low, high;
+bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
+  std::optional<double> low = learned_at, high = learned_at;
   for (const PoseContext& c : poses) {
     if (!c.temperature) return false;
     low = std::min(low.value_or(*c.temperature), *c.temperature);
@@ -60,12 +60,14 @@ bool warms(const std::vector<PoseContext>& poses) {
 }
 
 /// What these poses would have to record; empty where the cause shows.
-std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses) {
+std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses,
+                    std::optional<double> learned_at) {
   const ContextNeeds& needs = record.needs;
   if (needs.payload && !carries(cell, poses)) return "a payload";
   if (needs.direction && joint >= 0 && !(approached(poses, joint, 1) && approached(poses, joint, -1)))
     return "approaching the poses from both sides of this joint";
-  if (needs.temperature && !warms(poses)) return "temperatures that differ between the poses";
+  if (needs.temperature && !warms(poses, learned_at))
+    return "temperatures that differ between the poses, or from those of the training";
   if (needs.velocity || needs.time) return "a continuous path with times";
   return "";
 }
@@ -101,14 +103,15 @@ bool same_cause(const SingleCause& one, const SingleCause& other) {
   return one.record == other.record && one.joint == other.joint && one.parameter == other.parameter;
 }
 
-CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses) : model_(std::move(model)) {
+CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at)
+    : model_(std::move(model)), learned_at_(learned_at) {
   const Chain& robot = model_.cell->robot;
   for (const CauseRecord* record : all_causes()) {
     if (!may_have_changed(*record)) continue;
     const bool of_joint = record->scope == Scope::kJoint;
     for (int joint = of_joint ? 0 : -1; joint < (of_joint ? robot.size() : 0); ++joint) {
       if (record->of_turning_joint && robot.joint(joint).type != JointType::kRevolute) continue;
-      const std::string lacks = lacking(*record, joint, *model_.cell, poses);
+      const std::string lacks = lacking(*record, joint, *model_.cell, poses, learned_at);
       if (lacks.empty()) {
         add(*record, joint);
       } else {
@@ -153,6 +156,7 @@ void CauseEffects::ask(SingleCause cause, const std::string& source, const std::
   Entry entry{std::move(cause), {}};
   for (const Index k : numbers) {
     entry.columns.push_back(size());
+    if (entry.cause.record->needs.temperature) warm_.push_back(size());
     numbers_.push_back({source, k});
   }
   causes_.push_back(std::move(entry));
@@ -188,15 +192,27 @@ void CauseEffects::find_places() {
   }
 }
 
-PoseEffects CauseEffects::at(const PoseContext& context) const {
+Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, Pose* X_WT) const {
   Eigen::MatrixXd jacobian;
-  const Pose X_WT = model_.pose_W(context, model_.values, &jacobian);
+  *X_WT = model_.pose_W(context, model_.values, &jacobian);
+  return jacobian(Eigen::all, place_);
+}
+
+PoseEffects CauseEffects::at(const PoseContext& context) const {
+  Pose X_WT = Pose::Identity();
+  Eigen::MatrixXd jacobian = jacobian_at(context, &X_WT);
+  if (learned_at_ && !warm_.empty()) {
+    PoseContext learned = context;
+    learned.temperature = learned_at_;
+    Pose unused = Pose::Identity();
+    jacobian(Eigen::all, warm_) -= jacobian_at(learned, &unused)(Eigen::all, warm_);
+  }
   const Matrix3 R_BW = model_.X_WB.linear().transpose();
   const Vector3 p_B = model_.X_WB.inverse() * X_WT.translation();
   PoseEffects effects;
   effects.by_cause.resize(6, size());
-  effects.by_cause.topRows<3>() = R_BW * jacobian(Eigen::seqN(0, 3), place_);
-  effects.by_cause.bottomRows<3>() = R_BW * jacobian(Eigen::seqN(3, 3), place_);
+  effects.by_cause.topRows<3>() = R_BW * jacobian.topRows<3>();
+  effects.by_cause.bottomRows<3>() = R_BW * jacobian.bottomRows<3>();
   effects.by_cause *= scale_.asDiagonal();
   effects.by_base << Matrix3::Identity(), -skew(p_B), Matrix3::Zero(), Matrix3::Identity();
   return effects;

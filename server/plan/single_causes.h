@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,8 +42,10 @@ class CauseEffects {
     SingleCause cause;
     std::vector<Eigen::Index> columns;  ///< of PoseEffects::by_cause; one for any function: that of the joint's zero
   };
-  /// The causes that `poses` could show by what was recorded with them: others are listed as not asked.
-  CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses);
+  /// The causes that `poses` could show by what was recorded with them: others are listed as not asked. `learned_at`,
+  /// degrees Celsius: where the model knows the arm's lengths; heat shows by the difference. Empty: by differences
+  /// between the poses alone.
+  CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at = {});
 
   [[nodiscard]] const std::vector<Entry>& causes() const { return causes_; }
   [[nodiscard]] const std::vector<CauseNotAsked>& not_asked() const { return not_asked_; }
@@ -65,14 +68,17 @@ class CauseEffects {
   /// The source of that cause in the model, which gets it where it has none; null where the cell cannot have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
+  [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context, Pose* X_WT) const;
 
   PhysicalModel model_;
+  std::optional<double> learned_at_;
   std::vector<Entry> causes_;
   std::vector<CauseNotAsked> not_asked_;
   std::vector<Number> numbers_;      // of each column
   std::vector<Eigen::Index> place_;  // of each column among the model's parameters
   Eigen::VectorXd scale_;            // likewise
   std::vector<Eigen::Index> tool_;
+  std::vector<Eigen::Index> warm_;  // columns of what goes with the temperature
 };
 
 }  // namespace trammel

@@ -396,7 +396,8 @@ std::size_t BadRequests::readings() {
     });
   };
   expect("an unknown kind", wire::RESULT_INVALID_ARGUMENT, static_cast<wire::ReadKind>(12));
-  expect("what is not built yet", wire::RESULT_UNSUPPORTED, wire::READ_REPLAY);
+  expect("the work by an unknown version", wire::RESULT_NOT_FOUND, wire::READ_REPLAY,
+         [](Request& r) { r.version(99); });
   expect("an unknown version", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(99); });
   expect("version -1", wire::RESULT_NOT_FOUND, wire::READ_MODEL, [](Request& r) { r.version(-1); });
   expect("an unknown batch", wire::RESULT_NOT_FOUND, wire::READ_BATCH, [](Request& r) { r.batch_id("nobody"); });

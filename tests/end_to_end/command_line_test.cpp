@@ -777,6 +777,22 @@ TEST_F(CommandLineWithService, AnActivatedImportSaysItsFiguresAndTheServiceKeeps
   EXPECT_NE(trail.dump().find("a trial; "), std::string::npos) << "the figures stand in the trail, too";
 }
 
+TEST_F(CommandLineWithService, WhatCameFromCamIsReplayedWithACandidateBeforeAnybodyActivatesIt) {
+  must_answer({"submit", "--cell", "cell-7", "--batch", measure("first", 60, 1), "--watch"});
+  const int version = imported(train(measure("other", 30, 3), "M1"));
+  must({"plan", "--cell", cell_, "--count", "40", "--seed", "8", "-o", file("work.csv")});
+  must_answer({"predict", "--model", "cell-7", "--joints", file("work.csv"), "-o", file("predicted.csv")});
+  const std::string candidate = fmt::format("cell-7@{}", version);
+  const json asked = json::parse(must_answer({"replay", "--model", candidate, "--json", "-"}).out);
+  EXPECT_GE(asked.at("poses"), 16) << "the last ones of a request stand for it";
+  EXPECT_EQ(asked.at("in_force").at("version"), 1);
+  EXPECT_GT(asked.at("difference").at("max_mm").get<double>(), asked.at("difference").at("rms_mm").get<double>());
+  const std::string text = must_answer({"replay", "--model", candidate, "--next-poses", file("next.csv")}).out;
+  EXPECT_NE(text.find("their corrections differ by"), std::string::npos) << text;
+  must({"plan", "--cell", cell_, "--from", file("next.csv"), "-o", file("next-plan.csv")});
+  EXPECT_EQ(ask({"replay", "--model", "cell-7@99"}).exit_code, kRefusedData);
+}
+
 TEST_F(CommandLineWithService, ABatchIsDiagnosedThereAndWhatItNamesPutInForce) {
   must({"plan", "--cell", cell_, "--count", "150", "-o", file("plan.csv")});
   must({"simulate", "--cell", cell_, "--truth", oscillating_truth(folder_), "--plan", file("plan.csv"), "-o",

@@ -35,6 +35,13 @@ VirtualRobot with_zero_off(VirtualRobot robot, int joint, double rad) {
   return robot;
 }
 
+VirtualRobot in_warmth(VirtualRobot robot, double temperature, double growth) {
+  const Eigen::Index first = add_source(robot.truth, demand(make_error_source("thermal_growth", *robot.truth.cell)));
+  robot.truth.values(first) = growth;
+  robot.course = {.seconds_per_pose = 20, .temperature_start = temperature, .temperature_end = temperature};
+  return robot;
+}
+
 MeasurementBatch measured(const VirtualRobot& robot, int poses, std::uint64_t seed, bool orientation) {
   const Eigen::MatrixXd q = demand(plan_poses(*robot.truth.cell, {poses, seed}));
   SimulateOptions options;

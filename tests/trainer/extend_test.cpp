@@ -188,12 +188,12 @@ TEST_F(Extend, AMapWhoseSpectrumWasLearnedIsTheOneThatTheCellFileNames) {
   Cell listing = *cell_;
   for (const char* spelling : {"joint_map:2", "joint_map:*"}) {
     listing.model.error_sources = {"base", spelling, "compliance"};
-    EXPECT_EQ(level_with_additions(listing, model), std::nullopt) << spelling;
+    EXPECT_EQ(level_with_additions(listing, model, batch_), std::nullopt) << spelling;
     const std::vector<std::string> in_force = sources_in_force(model, listing, checked(batch_));
     EXPECT_EQ(std::count(in_force.begin(), in_force.end(), "joint_map:2"), 1) << spelling;
   }
   listing.model.error_sources = {"base", "compliance"};
-  EXPECT_EQ(level_with_additions(listing, model), "base,compliance," + (*map)->name());
+  EXPECT_EQ(level_with_additions(listing, model, batch_), "base,compliance," + (*map)->name());
 }
 
 TEST(LastingSources, AreThoseThatBelongToTheRobotAndNotToTheBatch) {

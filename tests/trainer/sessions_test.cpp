@@ -9,6 +9,7 @@
 #include "server/compensate/model_notes.h"
 #include "server/compensate/session_changes.h"
 #include "server/compensate/world.h"
+#include "server/trainer/pipeline/lasting_sources.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -179,6 +180,88 @@ TEST(Sessions, HaveTheSameScaleWhereTheDataAskForNoOther) {
         test::demand(train(cell, stretched_sessions(robot, {0, 0, 0, 0}, 4100 * seed), kPhysics));
     EXPECT_FALSE(are_stretched(model.parts().sessions)) << "seed " << seed;
   }
+}
+
+/// On days of these temperatures, with links that grow by `growth` (1/K).
+CheckedBatch warm_sessions(const VirtualRobot& robot, const std::vector<double>& temperatures, double growth,
+                           std::uint64_t seed) {
+  std::vector<CheckedBatch> batches;
+  for (const double temperature : temperatures) {
+    const test::Day day{.poses = 80, .seed = seed + 17 * batches.size(), .set_up_anew = true};
+    batches.push_back(checked(measured_on(test::in_warmth(robot, temperature, growth), day),
+                              fmt::format("day-{}", batches.size() + 1), *robot.truth.cell));
+  }
+  return joined(batches);
+}
+
+/// 1/K; empty: the model's links do not grow.
+std::optional<double> growth_in(const CompensatedModel& model) {
+  const PhysicalModel& physics = model.parts().physics;
+  const std::vector<Parameter> parameters = physics.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (parameters[k].name == "growth") return physics.values(static_cast<Eigen::Index>(k));
+  return std::nullopt;
+}
+
+TEST(Sessions, AnArmThatIsLongerOnWarmerDaysIsLearnedToGrow) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel model =
+      test::demand(train(cell, warm_sessions(robot, {20, 26, 22, 28, 18}, 11.5e-6, 700), kPhysics));
+  ASSERT_TRUE(growth_in(model));
+  EXPECT_NEAR(1e6 * *growth_in(model), 11.5, 0.8);
+  EXPECT_FALSE(are_stretched(model.parts().sessions));
+  EXPECT_TRUE(model.parts().changes.empty());
+  const std::vector<std::string> notes = notes_of(model);
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
+    return note.find("longer in warmer sessions") != std::string::npos;
+  }));
+}
+
+TEST(Sessions, AnArmThatDoesNotGrowIsNotLearnedToThoughTheDaysDiffer) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const CompensatedModel model =
+        test::demand(train(cell, warm_sessions(robot, {20, 26, 22, 28, 18}, 0, 900 * seed), kPhysics));
+    EXPECT_FALSE(growth_in(model)) << "seed " << seed;
+  }
+}
+
+TEST(Sessions, AnArmThatWearsIsNotTakenForOneThatGrows) {
+  const auto cell = test::cell_7();
+  for (const double a_day : {1.5, -1.5}) {
+    std::vector<CheckedBatch> batches;
+    for (int day = 0; day < 5; ++day) {
+      VirtualRobot robot = test::chapter_5_robot(cell);
+      const std::vector<Parameter> parameters = robot.truth.parameters();
+      for (std::size_t k = 0; k < parameters.size(); ++k)
+        if (parameters[k].name == "C3") robot.truth.values(static_cast<Eigen::Index>(k)) *= 1 + 0.02 * day;
+      const test::Day taken{.poses = 80, .seed = 60 + 17 * batches.size(), .set_up_anew = true};
+      batches.push_back(checked(measured_on(test::in_warmth(robot, 24 + a_day * day, 0), taken),
+                                fmt::format("day-{}", day + 1), *cell));
+    }
+    const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
+    EXPECT_FALSE(growth_in(model)) << *growth_in(model);
+  }
+}
+
+TEST(Sessions, WhatGrowsWithTheTemperatureIsNotAskedOfABatchOfOneTemperature) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CheckedBatch days = warm_sessions(robot, {20, 26, 22, 28, 18}, 11.5e-6, 700);
+  const CompensatedModel model = test::demand(train(cell, days, kPhysics));
+  EXPECT_EQ(level_with_additions(*cell, model, days.rows()), "base,geometry,compliance,thermal_growth");
+  const CheckedBatch one_day = warm_sessions(robot, {24}, 11.5e-6, 800);
+  EXPECT_EQ(level_with_additions(*cell, model, one_day.rows()), std::nullopt);
+}
+
+TEST(Sessions, OfTwoDaysNobodyCanTellAGrowingArmFromAnotherScaleOfTheInstrument) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const CompensatedModel model = test::demand(train(cell, warm_sessions(robot, {20, 28}, 11.5e-6, 700), kPhysics));
+  EXPECT_FALSE(growth_in(model));
+  EXPECT_TRUE(are_stretched(model.parts().sessions));
 }
 
 TEST(Sessions, AZeroLostIsFoundBesideAnotherScale) {

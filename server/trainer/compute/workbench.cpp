@@ -146,7 +146,8 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
   const auto batch = batches_.to_learn_from();
   if (!batch) return tl::make_unexpected(batch.error());
   const bool as_usual = task_.level.empty() && task_.bias.empty();
-  auto successor = train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(watch));
+  auto successor =
+      train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(*batch, watch));
   if (!successor) return tl::make_unexpected(successor.error());
   if (!task_.earlier_ids.empty()) {
     if (const Status chosen = choose_alone(*successor, changed, watch); !chosen)
@@ -188,7 +189,7 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
   if (!own) return tl::make_unexpected(own.error());
   const bool adds_tools = in_force_ && has_unknown_tools(in_force_->model, own->rows());
   if (!changed && !adds_tools) return {};
-  auto alone = train_successor(task_.cell, *own, in_force_.get(), train_options(watch));
+  auto alone = train_successor(task_.cell, *own, in_force_.get(), train_options(*own, watch));
   if (!alone) return {};  // too little by itself
   const std::vector<JudgingSession>& sessions = batches_.judging_sessions();
   const auto session = std::find_if(sessions.begin(), sessions.end(),
@@ -245,7 +246,7 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
 
 Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<std::string>& own,
                                  const Diagnosis& diagnosis, const ComputeWatch& watch) {
-  TrainOptions options = train_options(watch);
+  TrainOptions options = train_options(batch, watch);
   options.progress = [&watch](const std::string& stage, double share) {
     return watch.progress(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
   };
@@ -260,12 +261,12 @@ Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<st
   return made(std::move(extended->model), remarks, std::move(found->sessions));
 }
 
-TrainOptions Workbench::train_options(const ComputeWatch& watch) const {
+TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWatch& watch) const {
   TrainOptions options;
   if (!task_.level.empty()) {
     options.level = task_.level;
   } else if (in_force_) {
-    options.level = level_with_additions(*task_.cell, in_force_->model);
+    options.level = level_with_additions(*task_.cell, in_force_->model, batch.rows());
   }
   if (!task_.bias.empty()) options.bias = task_.bias;
   options.fleet = task_.fleet;

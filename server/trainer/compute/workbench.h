@@ -38,7 +38,7 @@ class Workbench : public Computing {
                                       const Diagnosis& diagnosis, const ComputeWatch& watch);
   /// Of what the job asks for: level and bias, and where it asks for nothing special what the model in force has
   /// besides.
-  [[nodiscard]] TrainOptions train_options(const ComputeWatch& watch) const;
+  [[nodiscard]] TrainOptions train_options(const CheckedBatch& batch, const ComputeWatch& watch) const;
   [[nodiscard]] Made made(CompensatedModel model, std::string remarks, std::vector<JudgingSession> sessions);
   /// Null where there is none.
   [[nodiscard]] Result<std::shared_ptr<const ServedModel>> in_force();

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/error_sources/spelling.h"
+#include "server/measurement/warmth.h"
 
 namespace trammel {
 
@@ -24,7 +25,8 @@ std::vector<std::string> sources_in_force(const CompensatedModel& model, const C
   return model.provenance().batch_hash == batch.hash() ? sources : lasting_sources(sources);
 }
 
-std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force) {
+std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force,
+                                                const MeasurementBatch& batch) {
   std::vector<std::string> level = spelled_out(cell.model.error_sources, cell);
   const auto listed = [&](const std::string& name) {
     return std::find(level.begin(), level.end(), as_listed(name, level)) != level.end();
@@ -32,8 +34,9 @@ std::optional<std::string> level_with_additions(const Cell& cell, const Compensa
   std::vector<std::string> names;
   for (const ErrorSourcePtr& source : in_force.parts().physics.sources) names.push_back(source->name());
   const std::size_t own = level.size();
+  const bool is_warm = shows_warmth(batch);
   for (const std::string& name : lasting_sources(names)) {
-    if (!listed(name)) level.push_back(name);
+    if (!listed(name) && (is_warm || !cause_spelled(name).needs.temperature)) level.push_back(name);
   }
   if (level.size() == own) return std::nullopt;
   return level_of(level);

@@ -20,7 +20,9 @@ namespace trammel {
                                                         const CheckedBatch& batch);
 
 /// The cell's own list and what the model in force has besides, as an applied diagnosis or somebody's level put it
-/// there: what was won stays won. Empty where there is nothing besides.
-[[nodiscard]] std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force);
+/// there: what was won stays won, but for what goes with a temperature that is the same in all of `batch`. Empty where
+/// there is nothing besides.
+[[nodiscard]] std::optional<std::string> level_with_additions(const Cell& cell, const CompensatedModel& in_force,
+                                                              const MeasurementBatch& batch);
 
 }  // namespace trammel

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// What a model promises at poses that a cell was asked for.
+struct PromisedAtWork {
+  int out_of_domain = 0;  ///< of the poses
+  double rms = 0;         ///< m, of the stated standard deviations of the true position, Euclidean
+};
+
+/// The work of a cell, by its model and by another one that may follow.
+struct WorkAsked {
+  int poses = 0;  ///< whose tool and payload the models know; the others are left out
+  PromisedAtWork in_force;
+  std::optional<PromisedAtWork> other;
+  /// How far the predictions of the two are apart, m; 0 without another one.
+  double difference_rms = 0, difference_max = 0;
+  /// Where they are farthest apart, the farthest first.
+  struct Step {
+    PoseContext pose;
+    double difference = 0;  ///< m
+  };
+  std::vector<Step> farthest;
+  /// Where the model in force is least sure, no two of them near each other: the poses to measure next.
+  std::vector<PoseContext> measure_next;
+};
+
+/// `other`: null where there is none to compare with.
+[[nodiscard]] WorkAsked work_asked(const CompensatedModel& in_force, const CompensatedModel* other,
+                                   const std::vector<PoseContext>& poses);
+
+}  // namespace trammel
