@@ -9,6 +9,7 @@ namespace trammel {
 
 namespace {
 
+constexpr double kLessExpected = 8;  // nat, while the arm's geometry is not in the model
 constexpr int kHarmonics = 3;
 constexpr double kRadial = 0.02;  // mm, prior of a first harmonic: bearings of gearboxes
 constexpr double kAxial = 0.01;   // mm
@@ -89,10 +90,12 @@ const CauseRecord& causes::axis_runout() {
       .scope = Scope::kJoint,
       .lasting = Lasting::kAlways,
       .needs = {},
-      .search = SearchFamily::kNone,
+      .search = SearchFamily::kColumns,
       .acts = {ActsOn::kJoints, 9},
       .forms = {{"axis_runout", make}},
-      .rivals = {{.cause = "joint_map"}, {.cause = "encoder_eccentricity"}, {.cause = "geometry"}},
+      .rivals = {{.cause = "joint_map"},
+                 {.cause = "encoder_eccentricity"},
+                 {.cause = "geometry", .surprise = kLessExpected}},
       .told_apart_by = remedies::kWiderRange,
       .shown_by =
           "poses all around this axis at different postures of the joints beyond it; of the last axis "

@@ -72,7 +72,7 @@ const CauseRecord& causes::base_compliance() {
       .scope = Scope::kArm,
       .lasting = Lasting::kAlways,
       .needs = {},
-      .search = SearchFamily::kNone,
+      .search = SearchFamily::kColumns,
       .acts = {ActsOn::kLoadedArm, 4},
       .forms = {{"base_compliance", make}},
       .rivals = {{.cause = "compliance"}, {.cause = "base"}, {.cause = "link_bending"}},

@@ -25,6 +25,7 @@ struct ContextNeeds {
   bool payload = false;  ///< something must hang on the flange
   bool before = false;   ///< the pose that the robot came from
   bool history = false;  ///< temperature and time of every pose
+  bool stand = false;    ///< where the instrument stands, in the cell file
 };
 
 /// `gear_transmission:3@48.5+97`: a cause, its joint, and further numbers.

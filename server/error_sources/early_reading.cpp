@@ -47,7 +47,7 @@ const CauseRecord& causes::early_reading() {
       .scope = Scope::kSession,
       .lasting = Lasting::kOfTheSession,
       .needs = {.before = true},
-      .search = SearchFamily::kNone,
+      .search = SearchFamily::kColumns,
       .acts = {ActsOn::kJoints, 12},
       .forms = {{"early_reading", make}},
       .rivals = {{.cause = "backlash"}, {.cause = "hysteresis"}, {.cause = "time_lag"}},

@@ -9,6 +9,7 @@ namespace trammel {
 
 namespace {
 
+constexpr double kLessExpected = 8;  // nat, while the arm's geometry is not in the model
 constexpr int kHarmonics = 4;
 constexpr double kRatio = 1e-3;      // rad/rad, prior: teeth and bars are exact, what drags along is not
 constexpr double kAmplitude = 2e-4;  // rad, prior of a first harmonic: a tenth of a mm on a bar of half a metre
@@ -57,6 +58,10 @@ class JointCoupling final : public JointError {
 };
 
 Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
+  if (spec.at.empty() && spec.joint < 2) {
+    return failure(ErrorCode::kUsage, "error source '{}': the first two joints are driven past no other", spec.text)
+        .next(fmt::format("say which one, {}@3", spec.text));
+  }
   return other_joint(spec, cell.robot).map([&](int other) -> ErrorSourcePtr {
     return std::make_shared<JointCoupling>(spec, other);
   });
@@ -72,10 +77,14 @@ const CauseRecord& causes::joint_coupling() {
       .scope = Scope::kJoint,
       .lasting = Lasting::kAlways,
       .needs = {},
-      .search = SearchFamily::kNone,
+      .search = SearchFamily::kColumns,
       .acts = {ActsOn::kJoints, 6},
       .forms = {{"joint_coupling", make}},
-      .rivals = {{.cause = "joint_map"}, {.cause = "compliance"}, {.cause = "self_weight"}, {.cause = "cable_pull"}},
+      .rivals = {{.cause = "geometry", .surprise = kLessExpected},
+                 {.cause = "joint_map"},
+                 {.cause = "compliance"},
+                 {.cause = "self_weight"},
+                 {.cause = "cable_pull"}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = "poses over the range of both joints, at all angles between them",
       .action = "compensate it; have belt or parallelogram adjusted where it grows",

@@ -8,6 +8,7 @@ namespace trammel {
 
 namespace {
 
+constexpr double kLessExpected = 8;     // nat, while the arm's geometry is not in the model
 constexpr double kVertical = 1 - 1e-6;  // cosine: an axis along gravity feels no weight
 
 /// Whether the weight of what follows joint `i` can turn a joint at all: not where all axes up to it are one vertical.
@@ -77,10 +78,13 @@ const CauseRecord& causes::self_weight() {
       .scope = Scope::kArm,
       .lasting = Lasting::kAlways,
       .needs = {},
-      .search = SearchFamily::kNone,
+      .search = SearchFamily::kColumns,
       .acts = {ActsOn::kLoad, 2},
       .forms = {{"self_weight", make}},
-      .rivals = {{.cause = "compliance"}, {.cause = "encoder_eccentricity"}, {.cause = "payload"}},
+      .rivals = {{.cause = "compliance"},
+                 {.cause = "geometry", .surprise = kLessExpected},
+                 {.cause = "encoder_eccentricity"},
+                 {.cause = "payload", .likeness = Likeness::kSimplerCase}},
       .told_apart_by = remedies::kOtherLoad,
       .shown_by = remedies::kOtherLoad.text,
       .action = "keep it in the cell's error sources, or give the links' masses in the robot file",

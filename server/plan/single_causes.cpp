@@ -47,7 +47,8 @@ bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
   });
 }
 
-constexpr double kWarmer = 2;  // K between poses, from which on temperature shows
+constexpr std::size_t kMostNumbers = 6;  // of one cause: what needs more is not seen by few poses
+constexpr double kWarmer = 2;            // K between poses, from which on temperature shows
 
 bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
   std::optional<double> low = learned_at, high = learned_at;
@@ -69,6 +70,7 @@ std::string lacking(const CauseRecord& record, int joint, const Cell& cell, cons
   if (needs.temperature && !warms(poses, learned_at))
     return "temperatures that differ between the poses, or from those of the training";
   if (needs.velocity || needs.time) return "a continuous path with times";
+  if (needs.before || needs.history) return "a batch of many poses with their times";
   return "";
 }
 
@@ -138,6 +140,7 @@ void CauseEffects::add_numbers(const CauseRecord& record, int joint, const Error
   const causes::Rival* whole = whole_of(record);
   const bool is_tool = whole != nullptr && cause_spelled(whole->cause).part == Part::kTool;
   if (record.numbers == Numbers::kTogether) {
+    if (all.size() > kMostNumbers) return;
     ask({&record, joint, "", false}, source.name(), all);
     if (is_tool) tool_ = causes_.back().columns;
     return;

@@ -54,7 +54,7 @@ World drawn_world(std::uint64_t seed) {
   Random random(seed * 7919 + 3);
   const hidden::Scene scene{world.arm, &world.poses};
   world.effects = {hidden::draw_foreign_effect("foreign_wave", scene, random),
-                   hidden::draw_foreign_effect("foreign_wobble", scene, random)};
+                   hidden::draw_effect({"axis_runout", 4, "", -1, {}}, scene, random)};
   world.effects[0].values *= kWave / 1e-4;
   world.effects[1].values *= kWobble / 1e-4;
   return world;

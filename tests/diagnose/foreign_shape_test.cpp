@@ -49,9 +49,9 @@ TEST_P(ForeignShape, IsNotTakenForACauseForCertain) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, ForeignShape,
-                         testing::Values(Foreign{"foreign_wave", 3000}, Foreign{"foreign_wobble", 15000},
-                                         Foreign{"foreign_foot", 90000}, Foreign{"foreign_walks", 30000},
-                                         Foreign{"foreign_loads", 30000}),
+                         testing::Values(Foreign{"foreign_wave", 3000}, Foreign{"foreign_seam", 3000},
+                                         Foreign{"foreign_crack", 3000}, Foreign{"foreign_mount", 3000},
+                                         Foreign{"foreign_walks", 30000}, Foreign{"foreign_loads", 30000}),
                          [](const auto& kind) { return std::string(kind.param.kind).substr(8); });
 
 /// How `cause` of `effect` (m) is judged beside what depends on `on`, with everything recorded.

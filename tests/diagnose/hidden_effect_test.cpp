@@ -78,7 +78,8 @@ INSTANTIATE_TEST_SUITE_P(Causes, HiddenEffect,
                          testing::Values("gear_transmission", "encoder_eccentricity", "joint_map", "backlash",
                                          "wrist_coupling", "thermal_growth", "tracker_moved", "joint_slip",
                                          "tool_changed", "payload", "tool", "time_lag", "outlier", "geometry",
-                                         "compliance", "backlash+outlier"),
+                                         "compliance", "backlash+outlier", "axis_runout", "base_compliance",
+                                         "joint_coupling", "early_reading", "instrument_scale"),
                          test_name);
 
 class HiddenNothing : public testing::TestWithParam<const char*> {};

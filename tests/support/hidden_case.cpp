@@ -124,6 +124,7 @@ void arrange(Draft& draft) {
   if (has("tool")) draft.plan.tools = 2;
   if (has("payload")) draft.plan.loads = 2;
   if (whole(draft.random, 0, 1) == 1) draft.plan.approach = Approach::kBothSides;
+  if (has("hysteresis") || has("early_reading")) draft.plan.approach = Approach::kAsItComes;
   if (has("backlash_one_side")) draft.plan.approach = Approach::kFromBelow;
   if (has("constant_warmth") || has("slow_growth")) draft.plan.constant_temperature = true;
   if (has("replica_ripple_1dim")) draft.plan.ranges = "1dim";
@@ -150,6 +151,7 @@ void build(Draft& draft) {
   world.arm = changed(drawn_arm(), draw_arm_errors(world.sources, draft.random));
   draft.belief.tools = {motion({100, 0, 150}, 0, -std::numbers::pi / 4, 0), motion({-80, 60, 220}, 0.7, 0.3, -0.5)};
   draft.belief.loads = {{100, {40, -25, 140}}, {45, {-15, 20, 90}}};
+  draft.belief.knows_stand = contains(draft.names, "instrument_scale");
   draft.belief.tools.resize(static_cast<std::size_t>(draft.plan.tools));
   draft.belief.loads.resize(static_cast<std::size_t>(draft.plan.loads));
   world.tools = draft.belief.tools;
@@ -444,8 +446,8 @@ const std::vector<std::string>& slow_kinds() {
 }
 
 const std::vector<std::string>& foreign_kinds() {
-  static const std::vector<std::string> kinds = {"foreign_wave",  "foreign_wobble", "foreign_foot",
-                                                 "foreign_walks", "foreign_loads",  "foreign_scale"};
+  static const std::vector<std::string> kinds = {"foreign_wave",  "foreign_seam",  "foreign_crack",
+                                                 "foreign_mount", "foreign_walks", "foreign_loads"};
   return kinds;
 }
 

@@ -25,8 +25,8 @@ struct HiddenSpec {
   /// (`foreign_wave`, `foreign_wobble`, `foreign_foot`, `foreign_walks`, `foreign_loads`, `foreign_scale`), what cannot
   /// be decided
   /// (`backlash_one_side`, `payload_alone`, `tool_or_link`, `tool_absorbed`, `joint1_or_tracker`, `joint6_or_tool`,
-  /// `constant_warmth`) or a replica of the source's studies (`replica_ripple_1dim`, `replica_ripple_6dim`,
-  /// `replica_tool`, `replica_p28`).
+  /// `constant_warmth`) or a replica of the source's studies (`replica_ripple_1dim`,
+  /// `replica_ripple_6dim`, `replica_tool`, `replica_p28`).
   std::string kind = "gear_transmission";
   std::uint64_t seed = 1;
   /// Squared length of each effect over sigma, outside what the cell's error sources and the other effects hidden can

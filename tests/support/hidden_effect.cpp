@@ -1,5 +1,6 @@
 #include "tests/support/hidden_effect.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -17,7 +18,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kTurn = 2 * std::numbers::pi;
-const Vector3d kTrackerStand(4200, -1800, 1300);  // mm
 constexpr double kReferenceTemperature = 20;
 
 VectorXd one(double value) { return VectorXd::Constant(1, value); }
@@ -213,7 +213,7 @@ Effect thermal_growth(const HiddenCause& cause, const Scene&, Random& random) {
 
 /// The stand moves: it is shifted, and turned about its own place.
 Matrix4d stand_moved(const VectorXd& values) {
-  return motion(kTrackerStand, 0, 0, 0) * motion_of(values) * motion(-kTrackerStand, 0, 0, 0);
+  return motion(tracker_stand_mm(), 0, 0, 0) * motion_of(values) * motion(-tracker_stand_mm(), 0, 0, 0);
 }
 
 Effect tracker_moved(const HiddenCause& cause, const Scene&, Random& random) {
@@ -315,6 +315,82 @@ Effect slow_stand(const HiddenCause& cause, const Scene& scene, Random& random) 
                 });
 }
 
+/// An axis that wobbles in an oval bearing: it tilts and shifts two and three times a turn, and a little back once.
+Effect axis_runout(const HiddenCause& cause, const Scene&, Random& random) {
+  const double tilt = uniform(random, 0, kTurn), shift = uniform(random, 0, kTurn), back = uniform(random, 0, kTurn);
+  return effect(cause, {"size"}, one(1e-4),
+                [j = joint_of(cause), tilt, shift, back](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  const double q = p.q(j);
+                  const double x = std::cos(2 * q + tilt) + 0.3 * std::cos(3 * q + shift) + 0.4 * std::cos(back - q);
+                  const double y = std::sin(2 * q + tilt) + 0.3 * std::sin(3 * q + shift) + 0.4 * std::sin(back - q);
+                  const Vector3d across(200 * v(0) * std::cos(2 * q + shift), 200 * v(0) * std::sin(2 * q + shift), 0);
+                  m.arm.bearings[static_cast<std::size_t>(j)] = motion(across, 0, v(0) * y, v(0) * x);
+                });
+}
+
+/// The plate under the foot yields, to one side more than to the other.
+Effect base_compliance(const HiddenCause& cause, const Scene&, Random& random) {
+  const double share = uniform(random, 0.3, 0.9);
+  return effect(cause, {"yield"}, one(1e-11), [share](const MeasuringPose&, const VectorXd& v, Moment& m) {
+    m.arm.foot += v(0) * Eigen::Vector2d(1, share);
+  });
+}
+
+/// The links weigh something, which the gearboxes feel: the upper arm most.
+Effect self_weight(const HiddenCause& cause, const Scene&, Random& random) {
+  const double second = uniform(random, 0.5, 1), third = uniform(random, 0.1, 0.4);
+  return effect(cause, {"mass"}, one(150), [second, third](const MeasuringPose&, const VectorXd& v, Moment& m) {
+    m.arm.weights[1] = {v(0), {-600, 20, 0}};
+    m.arm.weights[2] = {second * v(0), {-80, 0, 60}};
+    m.arm.weights[3] = {third * v(0), {0, -150, 0}};
+  });
+}
+
+/// A bar or belt of a joint that is not as long as it should be: it is off by the angle of the joint before it, and by
+/// that between the two.
+Effect joint_coupling(const HiddenCause& cause, const Scene&, Random& random) {
+  const double rate = uniform(random, 0.5, 1), phase = uniform(random, 0, kTurn), other = uniform(random, 0, kTurn);
+  return effect(cause, {"size"}, one(1e-4),
+                [j = joint_of(cause), rate, phase, other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) += v(0) * (rate * p.q(j - 1) + std::sin(2 * p.q(j - 1) + phase) +
+                                    0.6 * std::sin(p.q(j) - p.q(j - 1) + other));
+                });
+}
+
+/// The joints of the pose before; of the first one its own.
+Joints come_from(const std::vector<MeasuringPose>& poses, const MeasuringPose& p) {
+  const auto i = static_cast<std::size_t>(std::clamp<int>(p.index, 0, static_cast<int>(poses.size()) - 1));
+  return i == 0 ? p.q : poses[i - 1].q;
+}
+
+/// Friction holds the joint back, the more the longer its last move was.
+Effect hysteresis(const HiddenCause& cause, const Scene& scene, Random& random) {
+  const double way = uniform(random, 0.05, 0.4);
+  return effect(cause, {"hold"}, one(4e-5),
+                [j = joint_of(cause), way, poses = *scene.poses](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q(j) -= v(0) * std::tanh((p.q(j) - come_from(poses, p)(j)) / way);
+                });
+}
+
+/// Measured before it stood still: every joint still lacks a share of its last move, some a little more.
+Effect early_reading(const HiddenCause& cause, const Scene& scene, Random& random) {
+  Joints lacks;
+  for (Index j = 0; j < kJoints; ++j) lacks(j) = uniform(random, 0.9, 1.1);
+  return effect(cause, {"share"}, one(5e-5),
+                [lacks, poses = *scene.poses](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  m.q -= v(0) * lacks.cwiseProduct(p.q - come_from(poses, p));
+                });
+}
+
+/// All that the tracker measures is larger in warm air, as seen from its stand.
+Effect instrument_scale(const HiddenCause& cause, const Scene&, Random& random) {
+  return effect(
+      cause, {"scale"}, one(uniform(random, 2e-6, 6e-6)), [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+        const Matrix4d tool = m.seen * tool_frame(m.arm, m.q);
+        m.shift += v(0) * (p.temperature_c - kReferenceTemperature) * (tool.block<3, 1>(0, 3) - tracker_stand_mm());
+      });
+}
+
 HiddenCause unknown_of(std::vector<std::string> joints) { return {"unknown", 0, "", -1, std::move(joints), 0}; }
 
 /// The angle of joint 3 is off by a wave that runs along two joints at once.
@@ -327,23 +403,32 @@ Effect wave_of_two(Random& random) {
                 });
 }
 
-/// Axis 4 tilts twice a turn, as in a bearing that is oval.
-Effect wobble(Random& random) {
-  const double phase = uniform(random, 0, kTurn);
-  const double other = uniform(random, 0, kTurn);
-  return effect(unknown_of({"q4"}), {"size"}, one(1e-4),
-                [phase, other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  m.arm.links[2].alpha += v(0) * std::sin(2 * p.q(3) + phase);
-                  m.arm.links[3].alpha += 0.6 * v(0) * std::sin(2 * p.q(3) + other);
+/// The floor has a seam: beyond some angle of joint 1 the foot stands a little elsewhere.
+Effect seam_in_the_floor(Random& random) {
+  const double at = uniform(random, -0.5, 0.5);
+  const VectorXd way = draw_motion(random, 1, 1e-4);
+  return effect(unknown_of({"q1"}), {"size"}, one(0.05),
+                [at, way](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+                  if (p.q(0) > at) m.arm.base = m.arm.base * motion_of(v(0) * way);
                 });
 }
 
-/// The plate under the foot yields, to one side more than to the other.
-Effect yielding_foot(Random& random) {
-  const double share = uniform(random, 0.3, 0.9);
-  return effect(
-      unknown_of({"q1", "q2", "q3"}), {"yield"}, one(1e-11),
-      [share](const MeasuringPose&, const VectorXd& v, Moment& m) { m.arm.foot += v(0) * Eigen::Vector2d(1, share); });
+/// A cracked link: its lower half opens as soon as joint 2 leans back.
+Effect cracked_link(Random& random) {
+  const double at = uniform(random, -0.2, 0.4);
+  return effect(unknown_of({"q2"}), {"size"}, one(0.05), [at](const MeasuringPose& p, const VectorXd& v, Moment& m) {
+    if (p.q(1) < at) m.arm.links[1].a += v(0);
+  });
+}
+
+/// A spindle in a soft mount: it sags by how it stands to gravity.
+Effect soft_mount(Random& random) {
+  const Vector3d softness(uniform(random, 0.3, 1), uniform(random, 0.3, 1), uniform(random, 0.1, 0.3));
+  return effect(unknown_of({}), {"size"}, one(0.05), [softness](const MeasuringPose&, const VectorXd& v, Moment& m) {
+    const Matrix4d tool = tool_frame(m.arm, m.q);
+    const Vector3d down = tool.block<3, 3>(0, 0).transpose() * Vector3d(0, 0, -1);
+    m.arm.tool = m.arm.tool * motion(v(0) * softness.cwiseProduct(down), 0, 0, 0);
+  });
 }
 
 /// Every joint's zero walks at random, from pose to pose.
@@ -366,16 +451,6 @@ Effect other_loads(const Scene& scene, Random& random) {
   return effect(unknown_of({}), {"mass"}, one(20), [other](const MeasuringPose& p, const VectorXd& v, Moment& m) {
     if (other[std::min(static_cast<std::size_t>(p.index), other.size() - 1)]) m.arm.load.mass_kg -= v(0);
   });
-}
-
-/// All that the tracker measures is larger in warm air, as seen from its stand.
-Effect scale_with_temperature(Random& random) {
-  return effect(unknown_of({"temperature"}), {"scale"}, one(uniform(random, 2e-6, 6e-6)),
-                [](const MeasuringPose& p, const VectorXd& v, Moment& m) {
-                  const Matrix4d tool = m.seen * tool_frame(m.arm, m.q);
-                  m.shift +=
-                      v(0) * (p.temperature_c - kReferenceTemperature) * (tool.block<3, 1>(0, 3) - kTrackerStand);
-                });
 }
 
 /// A smooth random function of some joints, in three axes of the base: waves of random direction and phase.
@@ -420,6 +495,13 @@ const std::map<std::string, Maker>& makers() {
                                                    {"joint_slip", joint_slip},
                                                    {"time_lag", time_lag},
                                                    {"outlier", outlier},
+                                                   {"axis_runout", axis_runout},
+                                                   {"base_compliance", base_compliance},
+                                                   {"self_weight", self_weight},
+                                                   {"joint_coupling", joint_coupling},
+                                                   {"hysteresis", hysteresis},
+                                                   {"early_reading", early_reading},
+                                                   {"instrument_scale", instrument_scale},
                                                    {"unknown", unknown}};
   return all;
 }
@@ -443,7 +525,8 @@ const std::vector<std::string>& hideable_causes() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> list;
     for (const auto& [name, maker] : makers()) {
-      if (name != "unknown") list.push_back(name);
+      // At scattered poses every move is long, and hysteresis is play.
+      if (name != "unknown" && name != "hysteresis") list.push_back(name);
     }
     return list;
   }();
@@ -455,6 +538,10 @@ HiddenCause draw_cause(const std::string& name, const Scene& scene, Random& rand
   const auto count = static_cast<int>(scene.poses->size());
   if (name == "gear_transmission" || name == "encoder_eccentricity" || name == "joint_map" || name == "backlash") {
     cause.joint = whole(random, 1, 6);
+  } else if (name == "axis_runout" || name == "hysteresis") {
+    cause.joint = whole(random, 1, 5);
+  } else if (name == "joint_coupling") {
+    cause.joint = whole(random, 3, 4);  // joint 2 is not driven past joint 1; of the wrist it is a wrist coupling
   } else if (name == "joint_slip") {
     cause.joint = whole(random, 2, 5);  // of joint 6 it looks like a tool that turned
   } else if (name == "link_bending") {
@@ -484,11 +571,11 @@ Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& ran
 
 Effect draw_foreign_effect(const std::string& kind, const Scene& scene, Random& random) {
   if (kind == "foreign_wave") return wave_of_two(random);
-  if (kind == "foreign_wobble") return wobble(random);
-  if (kind == "foreign_foot") return yielding_foot(random);
+  if (kind == "foreign_seam") return seam_in_the_floor(random);
+  if (kind == "foreign_crack") return cracked_link(random);
+  if (kind == "foreign_mount") return soft_mount(random);
   if (kind == "foreign_walks") return walking_zeros(scene, random);
-  if (kind == "foreign_loads") return other_loads(scene, random);
-  return scale_with_temperature(random);
+  return other_loads(scene, random);
 }
 
 Effect draw_effect(const HiddenCause& cause, const Scene& scene, Random& random) {

@@ -55,9 +55,9 @@ struct Scene {
 /// (`slow_stand`) or the lengths of all links (`slow_growth`).
 [[nodiscard]] Effect draw_slow_effect(const std::string& kind, const Scene& scene, Random& random);
 /// What has another form than any cause, and is near to some: a joint that is off by a wave of two joints
-/// (`foreign_wave`), an axis that tilts twice a turn (`foreign_wobble`), a foot that yields with the moment about it
-/// (`foreign_foot`), zeros that all walk at random (`foreign_walks`), a load that is another one at every third pose or
-/// so (`foreign_loads`), an instrument whose scale goes with the temperature (`foreign_scale`).
+/// (`foreign_wave`), a floor with a seam (`foreign_seam`), a cracked link (`foreign_crack`), a spindle in a soft mount
+/// (`foreign_mount`), zeros that all walk at random (`foreign_walks`), a load that is another one at every third pose
+/// or so (`foreign_loads`).
 [[nodiscard]] Effect draw_foreign_effect(const std::string& kind, const Scene& scene, Random& random);
 
 }  // namespace trammel::hidden

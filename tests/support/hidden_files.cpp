@@ -61,7 +61,11 @@ std::string cell_text(const World& world, const Belief& belief, const std::strin
     text += fmt::format("  load-{}: {{mass_kg: {:.9g}, cog_mm: [{:.9g}, {:.9g}, {:.9g}]}}\n", i + 1, load.mass_kg,
                         load.cog_mm.x(), load.cog_mm.y(), load.cog_mm.z());
   }
-  text += fmt::format("tracker: {{sigma_mm: {:.9g}, sigma_deg: {:.9g}}}\n", world.sigma_mm, world.sigma_rad / kDegree);
+  const Eigen::Vector3d stand = tracker_stand_mm();
+  const std::string told =
+      belief.knows_stand ? fmt::format(", xyz_mm: [{}, {}, {}]", stand.x(), stand.y(), stand.z()) : "";
+  text += fmt::format("tracker: {{sigma_mm: {:.9g}, sigma_deg: {:.9g}{}}}\n", world.sigma_mm, world.sigma_rad / kDegree,
+                      told);
   text += "model: {error_sources: [" + joined(world.sources) + "], bias: none}\n";
   return text + ranges_text(ranges);
 }

@@ -12,6 +12,7 @@ namespace trammel::hidden {
 struct Belief {
   std::vector<Eigen::Matrix4d> tools;
   std::vector<Load> loads;
+  bool knows_stand = false;  ///< where the tracker stands
 };
 
 /// The arm as drawn.

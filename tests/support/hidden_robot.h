@@ -41,6 +41,9 @@ struct Spring {
   return frames;
 }
 
+/// Where the tracker stands, in the world.
+[[nodiscard]] inline Eigen::Vector3d tracker_stand_mm() { return {4200, -1800, 1300}; }
+
 /// Everything that decides where the tool stands.
 struct Arm {
   std::array<Link, kJoints> links;

@@ -67,6 +67,16 @@ Index first_place(const PhysicalModel& model, const ErrorSourcePtr& source) {
   return first;
 }
 
+/// Adds `source` so that it does nothing yet. What is expected of some is not nothing (the weight of the links).
+void add_at_zero(PhysicalModel& model, const ErrorSourcePtr& source, const MeasurementBatch& batch) {
+  const Pose without = model.pose_W(batch.measurements.front().context);
+  const Index first = add_source(model, source);
+  if (model.pose_W(batch.measurements.front().context).isApprox(without, 1e-12)) return;
+  const std::vector<Parameter>& parameters = source->parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (!parameters[k].is_place) model.values(first + static_cast<Index>(k)) = 0;
+}
+
 /// What was measured less `X_WT`: 3 numbers (m), or 6 with the rotation (rad).
 VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
   VectorXd distance(m.R_WT ? 6 : 3);
@@ -129,7 +139,7 @@ LinearProblem::Extended LinearProblem::extended_by(const std::vector<std::string
   }
   Extended extended{model_, {}, {}, {}};
   for (const ErrorSourcePtr& source : joints) add_source(extended.model, source);
-  for (const ErrorSourcePtr& source : wanted) add_source(extended.model, source);
+  for (const ErrorSourcePtr& source : wanted) add_at_zero(extended.model, source, *batch_);
   std::vector<bool> is_own(static_cast<std::size_t>(extended.model.parameter_count()), true);
   const auto take = [&](const ErrorSourcePtr& source) {
     const Index first = first_place(extended.model, source);

@@ -68,6 +68,11 @@ std::string lacking(const ContextNeeds& needs, const Cell& cell, const Measureme
     return "the time of every pose (time_s)";
   if (needs.velocity && !any(batch, [](const PoseContext& c) { return c.velocity.has_value(); }))
     return "a continuous path with times (time_s)";
+  if (needs.stand && !cell.tracker.p_W) return "where the instrument stands (tracker: xyz_mm in the cell file)";
+  if (needs.before && !any(batch, [](const PoseContext& c) { return c.before.has_value(); }))
+    return "the time of every pose (time_s), in the order in which they were measured";
+  if (needs.history && !every(batch, [](const PoseContext& c) { return !c.lagged.empty(); }))
+    return "the temperature and the time of every pose (temperature_c, time_s)";
   if (needs.temperature && !(every(batch, [](const PoseContext& c) { return c.temperature.has_value(); }) &&
                              warming(batch) > thresholds::kSameTemperature))
     return "the temperature of every pose (temperature_c), differing between poses";
