@@ -56,6 +56,7 @@ void add_fleet_command(CLI::App& app, Action& chosen);
 void add_diagnose_command(CLI::App& app, Action& chosen);
 void add_study_command(CLI::App& app, Action& chosen);
 void add_audit_command(CLI::App& app, Action& chosen);
+void add_replay_command(CLI::App& app, Action& chosen);
 void add_history_command(CLI::App& app, Action& chosen);
 void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
 
