@@ -145,14 +145,17 @@ struct Session::Participant {
                                                              Route route) {
     if (!caller) return not_allowed(Operation::kName);
     const auto until = deadline();
+    std::optional<typename Operation::Reply::type> referral;
     int referrals = 0;
     while (true) {
       auto reply = caller->call(request, route, until);
       if (const auto writer = reply ? writer_named(reply->header()) : std::nullopt;
           writer && ++referrals < kReferrals) {
         route.server = *writer;
+        referral = std::move(*reply);
         continue;
       }
+      if (!reply && referral) return as_result<typename Operation::Reply::type>(std::move(*referral));
       const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
       const auto again = Clock::now() + std::chrono::milliseconds(
                                             is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
