@@ -292,6 +292,36 @@ void shape(CdrWalk& walk, Of<ServiceStatus>) {
   walk.wides(1);
 }
 
+void shape(CdrWalk& walk, Of<ReplicaStatus>) {
+  token(walk, "server");
+  walk.enumerator("role", REPLICA_FOLLOWER);
+  token(walk, "follows");
+  walk.wides(1);
+  walk.list("cells", MAX_CELLS, 3 * kNumber, "cell", [&] {
+    walk.text("cell", MAX_NAME, Text::kPlain);
+    walk.longs(1);
+    id(walk, "hash");
+  });
+  sentence(walk, "trouble");
+}
+
+void shape(CdrWalk& walk, Of<BatchCopy>) {
+  token(walk, "server");
+  token(walk, "to");
+  walk.wides(1);
+  walk.text("cell", MAX_NAME, Text::kPlain);
+  id(walk, "batch_id");
+  file_text(walk, "csv");
+}
+
+void shape(CdrWalk& walk, Of<BatchCopied>) {
+  token(walk, "server");
+  token(walk, "to");
+  walk.wides(1);
+  walk.enumerator("result", RESULT_MALFORMED);
+  sentence(walk, "why");
+}
+
 void shape(CdrWalk& walk, Of<ModelSnapshot>) {
   walk.text("cell", MAX_NAME, Text::kPlain);
   id(walk, "server");
@@ -346,6 +376,9 @@ template std::optional<Fault> find_fault<ReleaseBatchesReply>(Sample);
 template std::optional<Fault> find_fault<ModelStatus>(Sample);
 template std::optional<Fault> find_fault<TrainingProgress>(Sample);
 template std::optional<Fault> find_fault<ServiceStatus>(Sample);
+template std::optional<Fault> find_fault<ReplicaStatus>(Sample);
+template std::optional<Fault> find_fault<BatchCopy>(Sample);
+template std::optional<Fault> find_fault<BatchCopied>(Sample);
 template std::optional<Fault> find_fault<ModelSnapshot>(Sample);
 
 }  // namespace trammel::wire

@@ -120,6 +120,10 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
+void log_replicas(const ReplicaNews& news) {
+  tell(news.is_good ? LogLevel::kInfo : LogLevel::kWarn, news.event, news.what);
+}
+
 /// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are written.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
@@ -222,6 +226,7 @@ void reload(const std::string& path, ServerConfig& config, DdsService& service, 
     config = plan.config;
     change_log(config.log);
     service.set_limits(config.dds);
+    service.set_replica(config.dds.replica);
     trainer.set_limits(config.trainer.queue_capacity, config.trainer.keep);
     tell(LogLevel::kInfo, "reloaded",
          plan.now.empty() ? "read again: nothing has changed"
@@ -272,6 +277,7 @@ Status serve(ServerConfig config, const std::string& path) {
   if (const Status listens = http.start(); !listens) return listens;
   service.set_call_listener(log_call);
   service.set_packet_listener([](const std::string& dropped) { tell(LogLevel::kWarn, "packets_dropped", dropped); });
+  service.set_replica_listener(log_replicas);
   trainer.set_listeners(
       [&service, &http](const JobProgress& progress) {
         log_progress(progress);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
@@ -61,8 +62,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     if (reader_ != nullptr) subscriber_.delete_datareader(reader_);
   }
 
-  /// Sends the request to a server whose reader and writer are matched. If that server leaves, or is silent for half of
-  /// the time, the request is sent once more with the same id. kUnreachable: no answer by `deadline`.
+  /// Sends the request to a server whose reader and writer are matched, and again as Sending says, always with the same
+  /// id: the first answer counts. kUnreachable: no answer by `deadline`.
   [[nodiscard]] Result<Reply> call(Request request, const Route& route, Clock::time_point deadline) {
     request.header().contract_version(wire::CONTRACT_VERSION);
     request.header().reply_partition(partition_);
@@ -78,7 +79,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     request.header().trace_id(fmt::format("{}-{}", partition_.substr(partition_.size() - kTraceBytes), last_sequence_));
     waiting_.try_emplace(last_sequence_);
     lock.unlock();
-    auto answer = attempt_twice(request, route, deadline);
+    auto answer = attempt(request, route, deadline);
     lock.lock();
     waiting_.erase(id.sequence_number());
     room_.notify_one();
@@ -87,6 +88,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
 
  private:
   static constexpr std::size_t kTraceBytes = 8;  // of the partition's name
+  static constexpr std::chrono::milliseconds kHedge{100};
 
   /// A call under way. An element of waiting_, guarded by the same mutex.
   struct Waiting {
@@ -97,30 +99,66 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
   Caller(wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, std::string partition, ServerWatch& watch)
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
-  Result<Reply> attempt_twice(Request& request, const Route& route, Clock::time_point deadline) {
-    const auto now = Clock::now();
-    std::string asked;
-    for (const bool again : {false, true}) {
-      const auto until = again ? deadline : now + (deadline - now) / 2;
-      // The repeat may also go to a server whose reply writer is not matched yet: it may have had too many clients.
-      const auto server = watch_.wait_for_server(
-          route.cell, route.changes_something ? std::string() : asked, until, [&](const KnownServer& known) {
-            return (route.server.empty() || route.server == known.id()) && reachable(known.participant, !again);
-          });
-      if (!server) continue;
-      asked = server->id();
-      request.header().server(asked);
-      request.header().deadline_ms(milliseconds_until(deadline));
-      if (!writer_->write(&request)) {
-        return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
+  /// The times that a request is sent. What only reads is asked of a second server where the first is silent for
+  /// kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server only.
+  enum class Sending { kFirst, kHedge, kAgain };
+
+  Result<Reply> attempt(Request& request, const Route& route, Clock::time_point deadline) {
+    const auto half = Clock::now() + (deadline - Clock::now()) / 2;
+    const bool hedges = !route.changes_something && route.server.empty();
+    std::set<std::string> asked;  // participants
+    std::string first, last;      // servers
+    for (const Sending sending : {Sending::kFirst, Sending::kHedge, Sending::kAgain}) {
+      if (sending == Sending::kHedge && (!hedges || first.empty())) continue;
+      if (const auto server = find_server(sending, route, last, sending == Sending::kAgain ? deadline : half)) {
+        last = server->id();
+        if (first.empty()) first = last;
+        asked.insert(server->participant);
+        request.header().server(last);
+        request.header().deadline_ms(milliseconds_until(deadline));
+        if (!writer_->write(&request)) {
+          return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
+        }
       }
-      MutexLock lock(mutex_);
-      Waiting& waiting = waiting_.at(request.header().request_id().sequence_number());
-      waiting.changed.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
-        return waiting.reply || !readers_.contains(server->participant);
-      });
-      if (waiting.reply) return std::move(*waiting.reply);
+      auto until = sending == Sending::kAgain ? deadline : half;
+      if (sending == Sending::kFirst && hedges) until = std::min(until, Clock::now() + kHedge);
+      if (auto reply = wait_for_reply(request.header().request_id().sequence_number(), asked, until)) {
+        if (reply->header().server().to_string() != first) watch_.was_slow(first);
+        return *std::move(reply);
+      }
     }
+    return unanswered(last);
+  }
+
+  [[nodiscard]] std::optional<KnownServer> find_server(Sending sending, const Route& route, const std::string& last,
+                                                       Clock::time_point until) {
+    if (sending == Sending::kHedge)
+      return watch_.another_server(route.cell, last,
+                                   [&](const auto& known) { return reachable(known.participant, true); });
+    // The repeat may also go to a server whose reply writer is not matched yet: it may have had too many clients.
+    const bool and_back = sending == Sending::kFirst;
+    const std::string only = route.server.empty() && route.changes_something ? last : route.server;
+    return watch_.wait_for_server(route.cell, route.changes_something ? std::string() : last, route.changes_something,
+                                  until, [&](const KnownServer& known) {
+                                    return (only.empty() || only == known.id()) &&
+                                           reachable(known.participant, and_back);
+                                  });
+  }
+
+  /// Waits until it is there, or all that were asked have left.
+  [[nodiscard]] std::optional<Reply> wait_for_reply(std::int64_t sequence, const std::set<std::string>& asked,
+                                                    Clock::time_point until) {
+    MutexLock lock(mutex_);
+    Waiting& waiting = waiting_.at(sequence);
+    waiting.changed.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
+      return waiting.reply || std::none_of(asked.begin(), asked.end(),
+                                           [&](const std::string& participant)
+                                               TRAMMEL_REQUIRES(mutex_) { return readers_.contains(participant); });
+    });
+    return std::exchange(waiting.reply, std::nullopt);
+  }
+
+  [[nodiscard]] Result<Reply> unanswered(const std::string& asked) const {
     if (const auto other = watch_.other_contract(); asked.empty() && other) return tl::make_unexpected(*other);
     return asked.empty()
                ? failure(ErrorCode::kUnreachable, "{}: no server found in time", Operation::kName)

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "idl/quiet_library.h"
+
 namespace trammel::client {
 namespace {
 
@@ -18,26 +20,38 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
                                                        wire::dds::Subscriber& subscriber) {
   std::unique_ptr<ServerWatch> watch(new ServerWatch);
   ServerWatch* self = watch.get();
-  auto status =
-      StateReader<wire::ServiceStatusTopic>::open(participant, subscriber, wire::state_reader_qos(),
-                                                  [self](const wire::ServiceStatus* sample, const std::string& writer,
-                                                         double) { self->on_status(sample, writer); });
+  auto status = wire::StateReader<wire::ServiceStatusTopic>::open(
+      participant, subscriber, wire::state_reader_qos(),
+      [self](const wire::ServiceStatus* sample, const std::string& writer, double) {
+        self->on_status(sample, writer);
+      });
   if (!status) return tl::make_unexpected(status.error());
   watch->status_reader_ = std::move(*status);
-  auto old_status = StateReader<wire::OldServiceStatusTopic>::open(
+  auto old_status = wire::StateReader<wire::OldServiceStatusTopic>::open(
       wire::make_old_status_topic(participant), subscriber, wire::state_reader_qos(),
       [self](const contract_1::ServiceStatus* sample, const std::string& writer, double) {
         self->on_old_status(sample, writer);
       });
   if (!old_status) return tl::make_unexpected(old_status.error());
   watch->old_status_reader_ = std::move(*old_status);
-  auto model =
-      StateReader<wire::ModelStatusTopic>::open(participant, subscriber, wire::state_reader_qos(),
-                                                [self](const wire::ModelStatus* sample, const std::string& writer,
-                                                       double written) { self->on_model(sample, writer, written); });
+  {
+    // Permissions that were given before there were replicas do not allow it.
+    const wire::QuietLibrary quiet;
+    auto replica = wire::StateReader<wire::ReplicaStatusTopic>::open(
+        participant, subscriber, wire::state_reader_qos(),
+        [self](const wire::ReplicaStatus* sample, const std::string& writer, double) {
+          self->on_replica(sample, writer);
+        });
+    if (replica) watch->replica_reader_ = std::move(*replica);
+  }
+  auto model = wire::StateReader<wire::ModelStatusTopic>::open(
+      participant, subscriber, wire::state_reader_qos(),
+      [self](const wire::ModelStatus* sample, const std::string& writer, double written) {
+        self->on_model(sample, writer, written);
+      });
   if (!model) return tl::make_unexpected(model.error());
   watch->model_reader_ = std::move(*model);
-  auto progress = StateReader<wire::TrainingProgressTopic>::open(
+  auto progress = wire::StateReader<wire::TrainingProgressTopic>::open(
       participant, subscriber, wire::progress_reader_qos(),
       [self](const wire::TrainingProgress* sample, const std::string&, double) { self->on_progress(sample); });
   if (!progress) return tl::make_unexpected(progress.error());
@@ -68,24 +82,52 @@ void ServerWatch::wait_for_first(MutexLock& lock, Clock::time_point deadline, co
 }
 
 std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
-                                                        Clock::time_point deadline,
+                                                        bool to_change, Clock::time_point deadline,
                                                         const std::function<bool(const KnownServer&)>& reachable) {
   MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
   wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
-    chosen = choose(cell, avoid, reachable);
+    chosen = choose(cell, avoid, to_change, reachable);
     return chosen != nullptr;
   });
   if (chosen == nullptr) return std::nullopt;
   return *chosen;
 }
 
-const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid,
+namespace {
+
+bool serves(const KnownServer& server, const std::string& cell) {
+  const auto& cells = server.status.cells();
+  return std::find(cells.begin(), cells.end(), cell) != cells.end();
+}
+
+}  // namespace
+
+std::optional<KnownServer> ServerWatch::another_server(const std::string& cell, const std::string& avoid,
+                                                       const std::function<bool(const KnownServer&)>& reachable) {
+  const MutexLock lock(mutex_);
+  const KnownServer* chosen = choose(cell, avoid, false, [&](const KnownServer& server) {
+    return server.id() != avoid && serves(server, cell) && reachable(server);
+  });
+  if (chosen == nullptr) return std::nullopt;
+  return *chosen;
+}
+
+void ServerWatch::was_slow(const std::string& server) {
+  const MutexLock lock(mutex_);
+  slow_[server] = Clock::now();
+}
+
+const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid, bool to_change,
                                        const std::function<bool(const KnownServer&)>& reachable) const {
   const auto merit = [&](const KnownServer& server) {
-    const auto& cells = server.status.cells();
-    const bool serves = std::find(cells.begin(), cells.end(), cell) != cells.end();
-    return std::tuple(serves, Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid);
+    const auto replica = replicas_.find(server.id());
+    const bool writes = replica != replicas_.end() && replica->second.second.role() == wire::REPLICA_WRITER;
+    const std::uint64_t epoch = to_change && writes ? replica->second.second.epoch() : 0;
+    const auto slow = slow_.find(server.id());
+    const bool is_quick = slow == slow_.end() || slow->second < server.heard;
+    return std::tuple(serves(server, cell), Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid,
+                      epoch, is_quick);
   };
   const KnownServer* best = nullptr;
   for (const auto& [id, server] : servers_) {
@@ -109,10 +151,21 @@ std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock:
   MutexLock lock(mutex_);
   wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
   changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
-                      [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count; });
+                      [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count && knows_all_parts(); });
   std::vector<KnownServer> servers;
-  for (const auto& [id, server] : servers_) servers.push_back(server);
+  for (const auto& [id, server] : servers_) {
+    servers.push_back(server);
+    if (const auto replica = replicas_.find(id); replica != replicas_.end())
+      servers.back().replica = replica->second.second;
+  }
   return servers;
+}
+
+bool ServerWatch::knows_all_parts() const {
+  return replica_reader_ == nullptr ||
+         std::all_of(servers_.begin(), servers_.end(), [this](const auto& entry) TRAMMEL_REQUIRES(mutex_) {
+           return entry.second.status.epoch() == 0 || replicas_.contains(entry.first);
+         });
 }
 
 bool ServerWatch::knows_all_models() const {
@@ -128,17 +181,22 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   MutexLock lock(mutex_);
   changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod,
                       [this]() TRAMMEL_REQUIRES(mutex_) { return knows_all_models(); });
-  std::map<std::string, wire::ModelInfo> newest;
+  // What the newest decision put in force; of servers that count none, the highest version.
+  std::map<std::string, std::uint64_t> epoch_of;  // by participant
+  for (const auto& [id, replica] : replicas_) epoch_of[replica.first] = replica.second.epoch();
+  std::map<std::string, std::pair<std::uint64_t, wire::ModelInfo>> newest;
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
     const double since_s = std::max(0.0, unix_time_s() - known.written_unix_s);
     model.data_age_s(model.data_age_s() + since_s);
     model.training_age_s(model.training_age_s() + since_s);
-    const auto [entry, added] = newest.emplace(key.second, model);
-    if (!added && model.version() > entry->second.version()) entry->second = model;
+    const std::pair found{epoch_of[key.first], model};
+    const auto [entry, added] = newest.emplace(key.second, found);
+    const auto& [epoch, present] = entry->second;
+    if (!added && std::pair(found.first, model.version()) > std::pair(epoch, present.version())) entry->second = found;
   }
   std::vector<wire::ModelInfo> models;
-  for (const auto& [cell, model] : newest) models.push_back(model);
+  for (const auto& [cell, found] : newest) models.push_back(found.second);
   return models;
 }
 
@@ -178,6 +236,18 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
       servers_[status->server().to_string()] = {participant, *status, Clock::now()};
     } else {
       std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
+    }
+  }
+  changed_.notify_all();
+}
+
+void ServerWatch::on_replica(const wire::ReplicaStatus* status, const std::string& participant) {
+  {
+    const MutexLock lock(mutex_);
+    if (status != nullptr) {
+      replicas_[status->server().to_string()] = {participant, *status};
+    } else {
+      std::erase_if(replicas_, [&](const auto& entry) { return entry.second.first == participant; });
     }
   }
   changed_.notify_all();

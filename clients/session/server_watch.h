@@ -2,8 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include "idl/contract_1.h"
+#include "idl/state_reader.h"
 #include "idl/transport.h"
 #include "server/base/mutex.h"
 
@@ -20,66 +19,12 @@ namespace trammel::client {
 
 using Clock = std::chrono::steady_clock;
 
-/// Reads a state topic. The listener is called in threads of DDS and must neither block nor call DDS.
-template <typename State>
-class StateReader final : private wire::dds::DataReaderListener {
- public:
-  using Sample = typename State::Type::type;
-  /// The sample, the participant that wrote it and when (Unix time, s); no sample: the participant has left.
-  using Listener = std::function<void(const Sample*, const std::string& participant, double written_unix_s)>;
-
-  [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(wire::dds::DomainParticipant& participant,
-                                                                 wire::dds::Subscriber& subscriber,
-                                                                 const wire::dds::DataReaderQos& qos,
-                                                                 Listener listener) {
-    return open(wire::make_state_topic<State>(participant), subscriber, qos, std::move(listener));
-  }
-  [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(const Result<wire::dds::Topic*>& topic,
-                                                                 wire::dds::Subscriber& subscriber,
-                                                                 const wire::dds::DataReaderQos& qos,
-                                                                 Listener listener) {
-    if (!topic) return tl::make_unexpected(topic.error());
-    std::unique_ptr<StateReader> result(new StateReader(subscriber, std::move(listener)));
-    const auto mask = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched();
-    result->reader_ = subscriber.create_datareader(*topic, qos, result.get(), mask);
-    if (result->reader_ == nullptr)
-      return failure(ErrorCode::kInternal, "cannot create the reader of {}", State::kName);
-    return result;
-  }
-
-  ~StateReader() override {
-    if (reader_ != nullptr) subscriber_.delete_datareader(reader_);
-  }
-
- private:
-  StateReader(wire::dds::Subscriber& subscriber, Listener listener)
-      : subscriber_(subscriber), listener_(std::move(listener)) {}
-
-  void on_data_available(wire::dds::DataReader* reader) override {
-    Sample sample;
-    wire::dds::SampleInfo info;
-    while (reader->take_next_sample(&sample, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-      if (!info.valid_data) continue;
-      const double written = 1e-9 * static_cast<double>(info.source_timestamp.to_ns());
-      listener_(&sample, wire::participant_of(info.sample_identity.writer_guid()), written);
-    }
-  }
-
-  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
-    if (status.current_count_change >= 0) return;
-    listener_(nullptr, wire::participant_of(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle)), 0);
-  }
-
-  wire::dds::Subscriber& subscriber_;
-  const Listener listener_;
-  wire::dds::DataReader* reader_ = nullptr;
-};
-
 /// A server as its status describes it.
 struct KnownServer {
   std::string participant;
   wire::ServiceStatus status;
   Clock::time_point heard;
+  std::optional<wire::ReplicaStatus> replica = {};  ///< empty: it is no replica, or this is not allowed to be read
 
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
@@ -103,11 +48,17 @@ class ServerWatch {
                                                                  wire::dds::Subscriber& subscriber);
 
   /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
-  /// status lately, then one that is not `avoid`. Waits until `deadline` for the first server, less long where all that
+  /// status lately, then one that is not `avoid`, then (`to_change`) the one that writes, then one that was not slower
+  /// than another one lately (was_slow()). Waits until `deadline` for the first server, less long where all that
   /// are there speak another contract.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
-                                                           Clock::time_point deadline,
+                                                           bool to_change, Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
+  /// The same without waiting, and never `avoid` nor one that does not serve the cell.
+  [[nodiscard]] std::optional<KnownServer> another_server(const std::string& cell, const std::string& avoid,
+                                                          const std::function<bool(const KnownServer&)>& reachable);
+  /// Another server answered before this one did: others are asked first until it is heard of again.
+  void was_slow(const std::string& server);
   /// Why no server is found, where the only ones that are there speak another contract than this program.
   [[nodiscard]] std::optional<Error> other_contract() const;
   /// Lets the time pass.
@@ -138,9 +89,12 @@ class ServerWatch {
   void on_status(const wire::ServiceStatus* status, const std::string& participant);
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
   void on_progress(const wire::TrainingProgress* progress);
-  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
+  void on_replica(const wire::ReplicaStatus* status, const std::string& participant);
+  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool to_change,
                                           const std::function<bool(const KnownServer&)>& reachable) const
       TRAMMEL_REQUIRES(mutex_);
+  /// Whether the part of every server that has one is known.
+  [[nodiscard]] bool knows_all_parts() const TRAMMEL_REQUIRES(mutex_);
   /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
@@ -149,15 +103,19 @@ class ServerWatch {
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
   std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
+  std::map<std::string, std::pair<std::string, wire::ReplicaStatus>> replicas_
+      TRAMMEL_GUARDED_BY(mutex_);  // by id: the participant, and what it says
+  std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell
   std::map<std::int64_t, std::map<std::string, std::pair<std::uint64_t, wire::Job>>> jobs_
       TRAMMEL_GUARDED_BY(mutex_);  // by number, then by server
   std::uint64_t progress_count_ TRAMMEL_GUARDED_BY(mutex_) = 0;
-  std::unique_ptr<StateReader<wire::ServiceStatusTopic>> status_reader_;
-  std::unique_ptr<StateReader<wire::OldServiceStatusTopic>> old_status_reader_;
-  std::unique_ptr<StateReader<wire::ModelStatusTopic>> model_reader_;
-  std::unique_ptr<StateReader<wire::TrainingProgressTopic>> progress_reader_;
+  std::unique_ptr<wire::StateReader<wire::ServiceStatusTopic>> status_reader_;
+  std::unique_ptr<wire::StateReader<wire::OldServiceStatusTopic>> old_status_reader_;
+  std::unique_ptr<wire::StateReader<wire::ReplicaStatusTopic>> replica_reader_;
+  std::unique_ptr<wire::StateReader<wire::ModelStatusTopic>> model_reader_;
+  std::unique_ptr<wire::StateReader<wire::TrainingProgressTopic>> progress_reader_;
 };
 
 }  // namespace trammel::client

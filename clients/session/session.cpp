@@ -19,7 +19,9 @@ namespace {
 /// is far below.
 constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
-constexpr std::uint32_t kLeastPatience = 10;  // ms, before a busy server is asked again
+constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
+constexpr int kReferrals = 4;                   // from server to server, of one request
+constexpr std::uint32_t kLeastPatience = 10;    // ms, before a busy server is asked again
 
 /// A unique name, also across hosts: 128 random bits.
 std::string make_name(const char* what) {
@@ -46,6 +48,14 @@ Status check_text(const std::string& what, const std::string& text) {
   return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), wire::kMaxText)
       .in(what)
       .beyond(text.size(), wire::kMaxText);
+}
+
+/// The server that makes the change that was asked of one that does not; empty: that is not what is wrong.
+std::optional<std::string> writer_named(const wire::ReplyHeader& header) {
+  if (header.result() != wire::RESULT_UNSUPPORTED || header.problems().size() != 1) return std::nullopt;
+  const wire::Problem& problem = header.problems().front();
+  if (problem.field() != "server" || problem.text().empty()) return std::nullopt;
+  return problem.text();
 }
 
 bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled"; }
@@ -127,20 +137,30 @@ struct Session::Participant {
     return reply;
   }
 
-  /// Sends one request. A server that is busy has not done it and is asked again when it says, until the deadline; a
-  /// change keeps its id.
+  /// Sends one request. A server that follows another one names it, and that one is asked. A server that is busy has
+  /// not done it and is asked again when it says, until the deadline; a change keeps its id.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(const std::unique_ptr<Caller<Operation>>& caller,
                                                              const typename Operation::Request::type& request,
-                                                             const Route& route) {
+                                                             Route route) {
     if (!caller) return not_allowed(Operation::kName);
     const auto until = deadline();
+    std::optional<typename Operation::Reply::type> referral;
+    int referrals = 0;
     while (true) {
       auto reply = caller->call(request, route, until);
+      if (const auto writer = reply ? writer_named(reply->header()) : std::nullopt;
+          writer && ++referrals < kReferrals) {
+        route.server = *writer;
+        referral = std::move(*reply);
+        continue;
+      }
+      if (!reply && referral) return as_result<typename Operation::Reply::type>(std::move(*referral));
       const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
       const auto again = Clock::now() + std::chrono::milliseconds(
                                             is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
       if (!is_busy || again >= until) return as_result(std::move(reply));
+      if (std::exchange(referrals, 0) > 0) route.server.clear();  // who writes may be another one by then
       watch->wait_until(again);
     }
   }
@@ -553,8 +573,21 @@ Result<std::vector<ServerStatus>> Session::servers() {
   const auto known = participant_->watch->wait_for_servers(options.servers.size(), participant_->deadline());
   if (known.empty()) return tl::make_unexpected(participant_->no_server());
   std::vector<ServerStatus> servers;
-  for (const KnownServer& server : known) servers.push_back(from_wire(server.status));
+  for (const KnownServer& server : known) {
+    servers.push_back(from_wire(server.status));
+    if (server.replica) servers.back().replica = from_wire(*server.replica);
+  }
   return servers;
+}
+
+Result<std::vector<ServerStatus>> Session::servers_when(
+    const std::function<bool(const std::vector<ServerStatus>&)>& holds, std::chrono::milliseconds limit) {
+  const auto until = Clock::now() + limit;
+  while (true) {
+    auto known = servers();
+    if (!known || holds(*known) || Clock::now() >= until) return known;
+    participant_->watch->wait_until(std::min(until, Clock::now() + kLook));
+  }
 }
 
 Result<std::vector<ModelInfo>> Session::model_status() {

@@ -113,6 +113,9 @@ class Session {
 
   /// The servers that are there, by their last status. Waits up to the timeout for the first.
   [[nodiscard]] Result<std::vector<ServerStatus>> servers();
+  /// The same once `holds` for them, or after `limit`.
+  [[nodiscard]] Result<std::vector<ServerStatus>> servers_when(
+      const std::function<bool(const std::vector<ServerStatus>&)>& holds, std::chrono::milliseconds limit);
   /// Models in force, of every cell, from ModelStatus.
   [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
   /// Calls `listener` with the job's progress until it is done or failed, and returns its last state. kUnreachable:

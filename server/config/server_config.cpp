@@ -119,6 +119,42 @@ void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOption
   map.attempt([&] { dds.cell_share = number_within(map, "cell_share", dds.cell_share, 0.5, 1); });
 }
 
+std::string word_of(const YamlMap& map, const std::string& key, const std::string& otherwise,
+                    const std::vector<std::string>& known) {
+  const std::string word = map.text(key, otherwise);
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    map.refuse(key,
+               refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known)).with_text(word));
+  return word;
+}
+
+double seconds_of(const YamlMap& map, const std::string& key, double otherwise, double lower, double upper) {
+  return map.is_null(key) ? otherwise : number_within(map, key, otherwise, lower, upper);
+}
+
+void read_replica(const YamlMap& map, const std::string& self, ReplicaOptions& replica) {
+  map.only({"role", "of", "promote_after_s", "batches_to_followers", "copy_timeout_s"});
+  map.attempt([&] {
+    const std::string role = word_of(map, "role", "", {"writer", "follower"});
+    replica.role = role == "writer" ? ReplicaOptions::Role::kWriter : ReplicaOptions::Role::kFollower;
+  });
+  map.attempt([&] {
+    const bool follows = replica.role == ReplicaOptions::Role::kFollower;
+    if (follows || map.has("of")) replica.of = server_id(map, "of");
+    if (!follows && map.has("of")) map.refuse("of", refused("a writer follows nobody").with_text(replica.of));
+    if (replica.of == self) map.refuse("of", refused("{} is this server itself", self).with_text(self));
+  });
+  map.attempt([&] { replica.promote_after_s = seconds_of(map, "promote_after_s", 0, 3, 86400); });
+  map.attempt([&] { replica.batches_to_followers = map.boolean("batches_to_followers", false); });
+  map.attempt([&] { replica.copy_timeout_s = seconds_of(map, "copy_timeout_s", replica.copy_timeout_s, 0.1, 60); });
+}
+
+void read_record(const YamlMap& map, const std::filesystem::path& folder, RecordOptions& record) {
+  map.only({"folder", "max_mb"});
+  map.attempt([&] { record.folder = (folder / map.text("folder")).string(); });
+  map.attempt([&] { record.max_mb = integer_within(map, "max_mb", record.max_mb, 8, 1'000'000); });
+}
+
 void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
   map.only({"queue_capacity", "max_poses", "validation_share", "accept_ratio", "seed", "memory_mb", "cpu_s",
             "keep_models", "keep_batches", "keep_answers"});
@@ -144,15 +180,6 @@ void read_trainer(const YamlMap& map, TrainerOptions& trainer) {
     compute.memory_mb = memory;
   });
   map.attempt([&] { compute.cpu_s = integer_within(map, "cpu_s", compute.cpu_s, 1, 30 * 24 * 3600); });
-}
-
-std::string word_of(const YamlMap& map, const std::string& key, const std::string& otherwise,
-                    const std::vector<std::string>& known) {
-  const std::string word = map.text(key, otherwise);
-  if (std::find(known.begin(), known.end(), word) == known.end())
-    map.refuse(key,
-               refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known)).with_text(word));
-  return word;
 }
 
 /// Pages and metrics stay on this host: whoever reads them from elsewhere goes through a server that asks who he is.
@@ -203,7 +230,8 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "dds", "trainer", "log", "http"});
+  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "replica", "record", "dds", "trainer", "log",
+            "http"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -219,6 +247,12 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
   map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), folder, config.dds);
+  });
+  map.attempt([&] {
+    if (!map.is_null("replica")) read_replica(map.map("replica"), config.dds.server_id, config.dds.replica);
+  });
+  map.attempt([&] {
+    if (!map.is_null("record")) read_record(map.map("record"), folder, config.dds.record);
   });
   map.attempt([&] {
     if (map.has("trainer")) read_trainer(map.map("trainer"), config.trainer);

@@ -5,8 +5,23 @@
 #include <vector>
 
 #include "server/base/host_port.h"
+#include "server/dds/records/record_options.h"
 
 namespace trammel {
+
+/// Which part a server has among those that serve the same cells.
+struct ReplicaOptions {
+  enum class Role {
+    kAlone,    ///< it knows nothing of others
+    kWriter,   ///< what changes its cells is asked of it
+    kFollower  ///< it has what `of` puts in force
+  } role = Role::kAlone;
+  std::string of = {};                ///< of a follower: the server that writes
+  double promote_after_s = 0;         ///< a follower writes when nobody has for so long; 0: a person decides
+  bool batches_to_followers = false;  ///< a batch is on all followers that are there before it is acknowledged
+  double copy_timeout_s = 2;          ///< that this may take
+  bool operator==(const ReplicaOptions&) const = default;
+};
 
 /// Domain, address, ports and name of the service on DDS. The default talks to this host only.
 struct DdsOptions {
@@ -24,7 +39,9 @@ struct DdsOptions {
   int client_mb = 64;          ///< memory that they may take, all together
   int queued_requests = 4096;  ///< requests of all clients that may wait, likewise
   int queued_mb = 256;         ///< memory that they may take, all together
-  double cell_share = 0.5;     ///< of these two, for the requests of one cell
+  ReplicaOptions replica = {};
+  RecordOptions record = {};  ///< of predictions and corrections
+  double cell_share = 0.5;    ///< of these two, for the requests of one cell
 };
 
 }  // namespace trammel

@@ -21,6 +21,7 @@
 #include "server/dds/old_contract.h"
 #include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
+#include "server/dds/replicas/replica_link.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
 #include "server/dds/service_events.h"
@@ -122,7 +123,8 @@ class DdsService::Running {
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
                                                               const PacketListener& packet_listener,
-                                                              const CallListener& call_listener) {
+                                                              const CallListener& call_listener,
+                                                              const ReplicaListener& replica_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
@@ -148,6 +150,15 @@ class DdsService::Running {
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));
     running->core_.listener = call_listener;
+    auto replicas = ReplicaLink::open(*running->participant_, *subscriber, running->topics_.snapshot_topic(),
+                                      options.server_id, options.replica, trainer, store, replica_listener);
+    if (!replicas) return tl::make_unexpected(replicas.error());
+    running->replicas_ = std::move(*replicas);
+    auto recorder = RequestRecorder::open(options.record);
+    if (!recorder) return tl::make_unexpected(recorder.error());
+    running->recorder_ = std::move(*recorder);
+    running->core_.recorder = running->recorder_.get();
+    running->handlers_.set_replicas(running->replicas_.get());
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
@@ -169,6 +180,7 @@ class DdsService::Running {
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
+    replicas_.reset();
   }
 
   Running(const Running&) = delete;
@@ -189,6 +201,11 @@ class DdsService::Running {
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
+    if (replicas_) replicas_->changed();
+  }
+
+  void set_replica(const ReplicaOptions& options) {
+    if (replicas_) replicas_->set_options(options);
   }
 
   void set_limits(const DdsOptions& options) {
@@ -210,6 +227,8 @@ class DdsService::Running {
     now.unreadable = *core_.unreadable;
     now.lost = core_.counts.lost;
     now.work = handlers_.work().all();
+    if (replicas_) now.replica = replicas_->figures();
+    if (recorder_) now.not_recorded = recorder_->dropped();
     now.strangers = events_->strangers().count;
     for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
       const auto reason = static_cast<wire::Dropped>(i);
@@ -325,7 +344,10 @@ class DdsService::Running {
     status.misdirected(core_.counts.misdirected);
     status.unreadable(*core_.unreadable);
     status.lost(core_.counts.lost);
-    status.trouble(cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
+    std::vector<std::string> troubles = trainer_.troubles();
+    if (replicas_) std::ranges::move(replicas_->troubles(), std::back_inserter(troubles));
+    status.trouble(cut(fmt::format("{}", fmt::join(troubles, "; ")), wire::MAX_SENTENCE));
+    if (replicas_) status.epoch(replicas_->epoch());
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -346,7 +368,9 @@ class DdsService::Running {
   Room room_;
   Lane predictions_, corrections_, reads_, changes_;
   ServiceCore core_;
-  std::map<std::string, Mutex> publishing_;  // by cell, the map never changes; a cell publishes one model at a time
+  std::unique_ptr<RequestRecorder> recorder_;  // null: nothing is recorded
+  std::unique_ptr<ReplicaLink> replicas_;      // null: it knows of no others
+  std::map<std::string, Mutex> publishing_;    // by cell, the map never changes; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
@@ -370,6 +394,8 @@ DdsService::~DdsService() { stop(); }
 
 void DdsService::set_call_listener(CallListener listener) { call_listener_ = std::move(listener); }
 
+void DdsService::set_replica_listener(ReplicaListener listener) { replica_listener_ = std::move(listener); }
+
 void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
   packet_listener_ = std::move(listener);
 }
@@ -380,7 +406,8 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_);
+  auto started =
+      Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_, replica_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);
@@ -407,6 +434,10 @@ void DdsService::publish_model(const std::string& cell) {
 
 void DdsService::set_limits(const DdsOptions& options) {
   while_running([&](Running& running) { running.set_limits(options); });
+}
+
+void DdsService::set_replica(const ReplicaOptions& options) {
+  while_running([&](Running& running) { running.set_replica(options); });
 }
 
 ServiceFigures DdsService::figures() {

@@ -9,12 +9,15 @@
 #include "idl/valid.h"
 #include "server/base/mutex.h"
 #include "server/dds/portioned_answer.h"
+#include "server/dds/replicas/replica_news.h"
 #include "server/metrics/work_counts.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
 
 namespace trammel {
+
+class ReplicaLink;
 
 /// What a request is about, looked up once. The whole answer comes from this one model.
 struct Subject {
@@ -50,6 +53,11 @@ class Handlers {
  public:
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
+
+  /// Who the other servers of the same cells are; null: nobody. It outlives the requests. Set before there are any.
+  void set_replicas(ReplicaLink* replicas) { replicas_ = replicas; }
+  /// Whether another server makes changes; empty: this one.
+  [[nodiscard]] std::optional<ChangesElsewhere> changes_elsewhere() const;
 
   /// What the cells were asked for since the start.
   [[nodiscard]] const WorkCounts& work() const { return work_; }
@@ -102,6 +110,7 @@ class Handlers {
   Store& store_;
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
+  ReplicaLink* replicas_ = nullptr;
   WorkCounts work_;  // requests refer to it, and end before it
 };
 

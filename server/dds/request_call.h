@@ -15,6 +15,7 @@
 #include "server/dds/call_report.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/records/request_recorder.h"
 #include "server/dds/reply_memory.h"
 #include "server/dds/reply_sink.h"
 #include "server/dds/request_weight.h"
@@ -72,6 +73,7 @@ struct CallContext {
   ReplyMemory<Reply> memory{kRepliesRemembered};  ///< of operations that change something, by request id
   ReplyMemory<Reply> lately{kLately};             ///< of long computations, by writer and request id
   UnderWay under_way = {};
+  RequestRecorder* recorder = nullptr;
   CallListener listener = {};  ///< told of what was to change something, and of what was refused
   OperationCounts operation = {};
 };
@@ -130,6 +132,9 @@ class Call final : public Job {
     guarded([&] {
       if constexpr (kComputes) {
         portions_->compute(first, count);
+      } else if (const auto elsewhere =
+                     happens_once(*request_) ? context_.handlers.changes_elsewhere() : std::nullopt) {
+        refuse(*elsewhere);
       } else {
         accept(context_.handlers.answer(*request_));
       }
@@ -144,6 +149,7 @@ class Call final : public Job {
     const bool is_good = result == wire::RESULT_OK;
     put_identity();
     if (is_good && !is_known_) remember();
+    if (is_good && !is_known_) record();
     report(is_good);
     const std::uint64_t times = answer(&ReplySink::send);
     context_.counts.requests += times;
@@ -203,7 +209,7 @@ class Call final : public Job {
     }
   }
 
-  /// `why`: an Error or a wire::Fault.
+  /// `why`: an Error, a wire::Fault or ChangesElsewhere.
   template <typename Why>
   void refuse(const Why& why) {
     const MutexLock lock(mutex_);
@@ -237,6 +243,15 @@ class Call final : public Job {
     if (kComputes) context_.lately.remember(sent_, request_->content, reply_);
     if (happens_once(*request_)) {
       context_.memory.remember(request_id_text(request_->header().request_id()), request_->content, reply_);
+    }
+  }
+
+  void record() const {
+    if constexpr (kComputes) {
+      if (context_.recorder == nullptr) return;
+      const auto kept = std::make_shared<std::pair<typename Operation::Request::type, Reply>>(*request_, reply_);
+      context_.recorder->record([kept, at = unix_now_s()] { return record_line(kept->first, kept->second, at); },
+                                bytes_of_request(*request_) + bytes_of_reply(reply_));
     }
   }
 

@@ -29,6 +29,7 @@ struct ServiceCore {
   Handlers& handlers;
   ReplyChannels& channels;
   CallListener listener{};
+  RequestRecorder* recorder = nullptr;  ///< null: nothing is recorded
   CallCounts counts{};
   /// Dropped: not even the header could be read.
   std::shared_ptr<std::atomic<std::uint64_t>> unreadable = std::make_shared<std::atomic<std::uint64_t>>(0);
@@ -92,6 +93,7 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
         lanes_(lanes),
         context_{core.server_id, std::move(reply_topic), core.handlers, core.channels, core.counts} {
     context_.listener = core.listener;
+    context_.recorder = core.recorder;
   }
 
   void on_data_available(wire::dds::DataReader* reader) override {

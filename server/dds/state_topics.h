@@ -14,6 +14,8 @@ class StateTopics {
 
   [[nodiscard]] const wire::dds::DataWriter& status_writer() const { return *service_status_; }
 
+  [[nodiscard]] wire::dds::Topic& snapshot_topic() const { return *model_snapshot_->get_topic(); }
+
   /// Writes it for clients of every contract.
   void publish(wire::ServiceStatus status);
   void publish(wire::TrainingProgress progress);

@@ -2,6 +2,7 @@
 
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/replicas/replica_link.h"
 
 namespace trammel {
 namespace {
@@ -26,6 +27,10 @@ Status check_training(const wire::TrainRequest& request) {
 
 }  // namespace
 
+std::optional<ChangesElsewhere> Handlers::changes_elsewhere() const {
+  return replicas_ == nullptr ? std::nullopt : replicas_->changes_elsewhere();
+}
+
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
@@ -35,6 +40,7 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
                                                               : request.change_id().to_string(),
                       requester(request.header()));
   if (!job) return tl::make_unexpected(job.error());
+  if (replicas_ != nullptr) replicas_->copy_batch(request.about().cell(), request.batch_id(), request.csv());
   wire::SubmitMeasurementsReply reply;
   reply.job(*job);
   return reply;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,14 @@ struct QueueFigures {
   std::size_t requests = 0;  ///< that wait or are worked on
 };
 
+/// Of a server among others that serve the same cells.
+struct ReplicaFigures {
+  bool writes = false;                ///< it changes what is in force
+  std::uint64_t epoch = 0;            ///< of the last decision that it knows
+  std::size_t others = 0;             ///< that are there
+  std::vector<std::string> troubles;  ///< their kinds: `role`, `follow`, `divergence`, `batches`
+};
+
 /// Counts are since the service started.
 struct ServiceFigures {
   std::vector<OperationFigures> operations;
@@ -36,6 +45,8 @@ struct ServiceFigures {
   std::uint64_t lost = 0;                                ///< requests that DDS lost before the service saw them
   std::map<std::string, std::uint64_t> dropped_packets;  ///< by reason
   std::map<std::string, WorkFigures> work;               ///< by cell
+  std::optional<ReplicaFigures> replica = {};            ///< empty: it is no replica
+  std::optional<std::uint64_t> not_recorded = {};        ///< requests that were to be; empty: none are
 };
 
 /// Whether the threads of a service do their work.

@@ -68,6 +68,11 @@ void insert_activation(SQLite::Database& database, const std::string& cell, int 
   row.exec();
 }
 
+/// Whoever decides what is in force counts it; who follows takes the number of the one that decided.
+void count_decision(SQLite::Database& database) {
+  change(database, "UPDATE replica SET epoch = epoch + 1 WHERE writes = 1");
+}
+
 /// Releases from quarantine the batches that the job of this version may release.
 void release_batches_of(SQLite::Database& database, const std::string& cell, int version, const ChangeId& by) {
   auto rows = prepare(database,
@@ -137,6 +142,7 @@ void activate_on_top(SQLite::Database& database, const std::string& cell, int ve
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
+  count_decision(database);
   record_audit(database, {cell, what, "in force", spoken(present), fmt::format("version {}", version), why}, by);
 }
 
@@ -231,6 +237,58 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
   return activated.map([](const ChangeOutcome&) {});
 }
 
+namespace {
+
+/// The version under which a model of this hash is stored with its text; empty: none is.
+std::optional<int> version_of_hash(SQLite::Database& database, const std::string& cell, const std::string& hash) {
+  auto rows =
+      prepare(database, "SELECT version FROM models WHERE cell = ? AND hash = ? ORDER BY version DESC", cell, hash);
+  while (rows.executeStep()) {
+    const int version = rows.getColumn(0).getInt();
+    if (!is_pruned(database, "version", cell, std::to_string(version))) return version;
+  }
+  return std::nullopt;
+}
+
+/// The other server's number, if it is free here: what is stored already is not written over.
+int free_version(SQLite::Database& database, const std::string& cell, int wanted) {
+  const bool taken =
+      prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, wanted).executeStep();
+  return taken || wanted < 1 ? next_version(database, cell) : wanted;
+}
+
+}  // namespace
+
+Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided, const CompensatedModel* model,
+                         const ChangeId& by) {
+  const std::string content = model == nullptr ? std::string() : serialize(*model);
+  const auto adopted = connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+    std::optional<int> version = version_of_hash(database, cell, decided.hash);
+    if (!version && model == nullptr)
+      return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, decided.hash).of("hash");
+    if (!version) {
+      version = free_version(database, cell, decided.version);
+      insert_model(database, cell, *version, *model, content);
+      record_audit(database,
+                   {cell, "follow", fmt::format("version {}", *version), "", fmt::format("sha256 {}", decided.hash),
+                    fmt::format("version {} there", decided.version)},
+                   by);
+    }
+    const auto present = present_activation(database, cell);
+    if (present && present->version == *version) return *version;
+    insert_activation(database, cell, *version, present ? std::optional(present->number) : std::nullopt);
+    record_audit(database, {cell, "follow", "in force", spoken(present), fmt::format("version {}", *version)}, by);
+    return *version;
+  });
+  if (adopted) copy_after_change(cell);
+  return adopted;
+}
+
+Result<bool> Store::has_model(const std::string& cell, const std::string& hash) const {
+  return connection_->exclusively(
+      [&](SQLite::Database& database) -> Result<bool> { return version_of_hash(database, cell, hash).has_value(); });
+}
+
 Result<std::optional<InForceRecord>> Store::in_force_record(const std::string& cell) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<InForceRecord>> {
     const auto present = present_activation(database, cell);
@@ -272,6 +330,7 @@ Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& 
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     const auto present = present_activation(database, cell);
     insert_activation(database, cell, wanted.version, wanted.back);
+    count_decision(database);
     record_audit(database, {cell, "rollback", "in force", spoken(present), fmt::format("version {}", wanted.version)},
                  change_id);
     return ChangeOutcome{wanted.version};

@@ -92,7 +92,8 @@ CREATE TABLE diagnoses (
 /// released if its model is put in force. Also which jobs are checks of a robot's health, which look like diagnoses to
 /// programs that know none. How a version was judged when a person put it in force. And the changes that clients asked
 /// for under an id, with what came of them; what of the rest has lost its text; which batches nothing takes any more;
-/// and the store's identity.
+/// and the store's identity. And, of a server among
+/// others, which part it has (one row, or none).
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -155,6 +156,13 @@ CREATE TABLE IF NOT EXISTS discarded (
   FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS store_identity (id TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS replica (
+  one     INTEGER PRIMARY KEY CHECK (one = 1),
+  epoch   INTEGER NOT NULL,
+  writes  INTEGER NOT NULL,
+  follows TEXT    NOT NULL,
+  told    TEXT    NOT NULL
+);
 )sql";
 
 /// The models whose times are not recorded: found from the keys alone, for the rest is large.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -100,6 +101,30 @@ struct KeepRule {
   int models = 0;   ///< versions besides those
   int batches = 0;  ///< likewise
   int answers = 0;  ///< findings of diagnoses that are over
+};
+
+/// What a server among others remembers of its part (server/dds/replicas).
+struct ReplicaRecord {
+  /// Of the last decision that it knows of what is in force. What is put in force here makes it one higher, in the same
+  /// transaction.
+  std::uint64_t epoch = 0;
+  bool writes = false;
+  std::string follows = {};  ///< the server that writes instead; empty: not known
+  std::string told = {};     ///< the part that the server file gave it when this was decided
+  bool operator==(const ReplicaRecord&) const = default;
+};
+
+/// What a cell is served with, as a replica tells it.
+struct VersionInForce {
+  int version = 0;
+  std::string hash;
+  bool operator==(const VersionInForce&) const = default;
+};
+
+/// What a replica has, at one moment.
+struct ReplicaView {
+  std::optional<ReplicaRecord> record;          ///< empty: this server was never one of several
+  std::map<std::string, VersionInForce> cells;  ///< that have a model in force
 };
 
 struct StoreConnection;
@@ -207,6 +232,16 @@ class Store {
   /// remembers the version that is in force at that moment, even if a rollback put it there.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {},
                                 const std::optional<JobOutcome>& judged = {});
+  /// Takes over what another server has put in force, under its version number if that is free here: stores the model
+  /// (null: one of this hash is stored already, else kNotFound) and puts it in force. Returns the version. A rollback
+  /// leads to what was in force here before. The epoch of replica_record() stays.
+  [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const CompensatedModel* model,
+                                  const ChangeId& by);
+  /// Whether the cell's history has a model of this hash, with its text.
+  [[nodiscard]] Result<bool> has_model(const std::string& cell, const std::string& hash) const;
+  [[nodiscard]] Result<ReplicaView> replica_view() const;
+  /// `why`: for the audit trail, where the part changes.
+  [[nodiscard]] Status keep_replica_record(const ReplicaRecord& record, const std::string& why);
   /// Empty: nothing is in force.
   [[nodiscard]] Result<std::optional<InForceRecord>> in_force_record(const std::string& cell) const;
   /// The versions that repeated rollbacks restore, the next one first. kNotFound: there is none.

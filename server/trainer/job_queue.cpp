@@ -21,9 +21,17 @@ void JobQueue::push_front(WaitingJob job) {
   ready_.notify_one();
 }
 
+void JobQueue::hold(bool held) {
+  {
+    const MutexLock lock(mutex_);
+    held_ = held;
+  }
+  ready_.notify_one();
+}
+
 std::optional<TakenJob> JobQueue::take(const std::stop_token& stop) {
   MutexLock lock(mutex_);
-  if (!ready_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty(); }) ||
+  if (!ready_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty() && !held_; }) ||
       stop.stop_requested())
     return std::nullopt;
   WaitingJob job = next();

@@ -32,6 +32,8 @@ class JobQueue {
   void push(WaitingJob job);
   /// Puts a job back where it was taken from: it is the next one of its cell.
   void push_front(WaitingJob job);
+  /// From now on the jobs wait, or do so no longer; one that is taken goes on.
+  void hold(bool held);
   /// Waits for a job; empty once `stop` is requested.
   [[nodiscard]] std::optional<TakenJob> take(const std::stop_token& stop);
   /// The job that was taken is over. Until then cancel() finds it.
@@ -54,7 +56,8 @@ class JobQueue {
   mutable Mutex mutex_;
   Condition ready_;                                                                   // there are jobs
   std::map<std::string, std::deque<WaitingJob>> waiting_ TRAMMEL_GUARDED_BY(mutex_);  // by cell; none is empty
-  std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);                                  // whose turn it was
+  bool held_ TRAMMEL_GUARDED_BY(mutex_) = false;
+  std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);  // whose turn it was
   std::optional<std::int64_t> taken_ TRAMMEL_GUARDED_BY(mutex_);
   std::stop_source cancelling_ TRAMMEL_GUARDED_BY(mutex_);  // of the one taken
 };

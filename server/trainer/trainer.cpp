@@ -523,6 +523,39 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
   return jobs;
 }
 
+void Trainer::set_decides(bool decides) {
+  history_.set_decides(decides);
+  queue_.hold(!decides);
+}
+
+Result<int> Trainer::adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
+                           const ChangeId& by) {
+  auto version = history_.adopt(cell, decided, text, by);
+  if (version) end_jobs_done_elsewhere(cell, by.who);
+  return version;
+}
+
+void Trainer::end_jobs_done_elsewhere(const std::string& cell, const std::string& by) {
+  const auto model = registry_.in_force(cell);
+  const auto unfinished = store_.unfinished_jobs();
+  if (!model || !unfinished) return;                                           // a promotion trains once more
+  const std::string learned = "+" + model->model.provenance().batch_id + "+";  // several are joined so
+  for (const StoredJob& job : *unfinished) {
+    const auto is_learned = [&](const std::string& batch) {
+      return learned.find("+" + batch + "+") != std::string::npos;
+    };
+    if (job.cell != cell || job.kind != JobKind::kTrain || job.batch_ids.empty()) continue;
+    if (!std::all_of(job.batch_ids.begin(), job.batch_ids.end(), is_learned)) continue;
+    if (queue_.cancel(job.id) != JobQueue::Cancelled::kRemoved) continue;
+    const std::string what = by + " has learned from it";
+    if (!store_.set_job_done(job.id, what)) continue;
+    JobProgress progress = progress_of(job);
+    progress.stage = JobStage::kDone;
+    progress.what = what;
+    book_.report(progress);
+  }
+}
+
 int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }
 
 Result<std::optional<std::int64_t>> Trainer::queued_before(const ChangeId& id) const {

@@ -118,6 +118,11 @@ class Trainer {
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
     return history_.import_model(cell, text, id);
   }
+  /// Whether what is in force is decided here. Where it is not, jobs wait, and adopt() alone changes what is in force.
+  void set_decides(bool decides);
+  /// See ModelHistory. Jobs that wait for batches which the model has learned from are done.
+  [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
+                                  const ChangeId& by);
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
   }
@@ -139,6 +144,8 @@ class Trainer {
   [[nodiscard]] int queued_jobs() const;
 
  private:
+  /// Ends the trainings that wait and would learn only what the models of the cell have learned.
+  void end_jobs_done_elsewhere(const std::string& cell, const std::string& by);
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);

@@ -59,6 +59,8 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->dds.queued_requests, minimal.dds.queued_requests);
   EXPECT_EQ(shipped->dds.queued_mb, minimal.dds.queued_mb);
   EXPECT_EQ(shipped->dds.cell_share, minimal.dds.cell_share);
+  EXPECT_EQ(shipped->dds.replica, minimal.dds.replica);
+  EXPECT_EQ(shipped->dds.record, minimal.dds.record);
   EXPECT_EQ(shipped->trainer.queue_capacity, minimal.trainer.queue_capacity);
   EXPECT_EQ(shipped->trainer.max_poses, minimal.trainer.max_poses);
   EXPECT_EQ(shipped->trainer.validation_share, minimal.trainer.validation_share);
@@ -151,6 +153,13 @@ TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
   EXPECT_EQ(refusal_for("dds: {peer_ports: [17500]}\n"), at(5, "dds: peer_ports").value(17500));
   EXPECT_EQ(refusal_for("dds: {peer_ports: [1e4]}\n"), at(5, "dds: peer_ports").text("1e4"));
   EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), at(5, "dds: compute_workers").beyond(0, 1));
+  EXPECT_EQ(refusal_for("replica: {role: boss}\n"), at(5, "replica: role").text("boss"));
+  EXPECT_EQ(refusal_for("replica: {role: follower, of: a}\n"), at(5, "replica: of").text("a"));
+  EXPECT_EQ(refusal_for("replica: {role: follower}\n"), at(5, "replica: of"));
+  EXPECT_EQ(refusal_for("replica: {role: writer, of: b}\n"), at(5, "replica: of").text("b"));
+  EXPECT_EQ(refusal_for("replica: {role: writer, promote_after_s: 1}\n"),
+            at(5, "replica: promote_after_s").beyond(1, 3));
+  EXPECT_EQ(refusal_for("record: {folder: r, max_mb: 1}\n"), at(5, "record: max_mb").beyond(1, 8));
   EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
   EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
   EXPECT_EQ(refusal_for("trainer: {seed: -1}\n"), at(5, "trainer: seed").beyond(-1, 0));

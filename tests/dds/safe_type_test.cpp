@@ -189,6 +189,24 @@ TEST(SafeType, TheShapeOfEveryReplyAndStateIsThatOfItsType) {
   status.cells({"cell-7", "c"});
   status.trouble("the disk is full");
   expect_shape<ServiceStatusTopic::Type>(status);
+  ReplicaStatus replica;
+  replica.role(REPLICA_FOLLOWER);
+  replica.follows("trammel-1");
+  replica.cells().resize(2);
+  replica.cells()[1].cell("cell-7");
+  replica.cells()[1].hash("ab");
+  replica.trouble("two write");
+  expect_shape<ReplicaStatusTopic::Type>(replica);
+  BatchCopy copy;
+  copy.to("trammel-2");
+  copy.cell("cell-7");
+  copy.batch_id("lt-07");
+  copy.csv("q1_deg\n1\n");
+  expect_shape<BatchCopyTopic::Type>(copy);
+  BatchCopied copied;
+  copied.result(RESULT_MALFORMED);
+  copied.why("the disk is full");
+  expect_shape<BatchCopiedTopic::Type>(copied);
   expect_shape<ModelSnapshotTopic::Type>(ModelSnapshot());
 }
 

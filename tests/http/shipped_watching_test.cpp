@@ -34,6 +34,8 @@ std::set<std::string> names_told() {
   server.figures.queues = {{"reads", 0}};
   server.figures.dropped_packets = {{"fragment", 0}};
   server.figures.work = {{"cell-7", {}}};
+  server.figures.replica.emplace();
+  server.figures.not_recorded = 0;
   // Of a batch whose rows have no times the age of the data is not known.
   const Watched watched = server.watched();
   Metrics metrics(watched);

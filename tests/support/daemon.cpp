@@ -33,12 +33,12 @@ std::string cell_with_a_bias() {
 
 std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
 
-Daemon::Daemon() : port_(port_of_this_process()), domain_(domain_of_this_process()) {
+Daemon::Daemon(int replica)
+    : port_(static_cast<std::uint16_t>(port_of_this_process() + 2 * replica)), domain_(domain_of_this_process()) {
   folder_.write("cell-7.yaml", cell_with_a_bias());
   folder_.write(
       "server.yaml",
-      fmt::format("version: 1\nserver: test-{}\ncells: [cell-7.yaml]\nstore: trammel.db\nlog: {{level: debug}}\n",
-                  port_));
+      fmt::format("version: 1\nserver: {}\ncells: [cell-7.yaml]\nstore: trammel.db\nlog: {{level: debug}}\n", name()));
 }
 
 std::vector<std::string> Daemon::command_line() const {

@@ -18,7 +18,8 @@ namespace trammel::test {
 /// at the same time has: they come from this process's id. May be stopped, killed and started again on the same store.
 class Daemon {
  public:
-  Daemon();
+  /// `replica`: the second one (1) of a test, on the port beside the first one's (0).
+  explicit Daemon(int replica = 0);
 
   /// Until it says that it is ready; fails the test when it does not.
   void start();
@@ -33,6 +34,7 @@ class Daemon {
   [[nodiscard]] std::string store_path() const { return folder_.file("trammel.db"); }
   [[nodiscard]] std::string config_path() const { return folder_.file("server.yaml"); }
   [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::string name() const { return "test-" + std::to_string(port_); }
   [[nodiscard]] std::uint32_t domain() const { return domain_; }
   [[nodiscard]] client::SessionOptions session_options() const;
 

@@ -53,10 +53,10 @@ void add_doctor_command(CLI::App& app, Action& chosen);
 void add_help_commands(CLI::App& app, Action& chosen);
 void add_check_command(CLI::App& app, Action& chosen);
 void add_fleet_command(CLI::App& app, Action& chosen);
-void add_replay_command(CLI::App& app, Action& chosen);
 void add_diagnose_command(CLI::App& app, Action& chosen);
 void add_study_command(CLI::App& app, Action& chosen);
 void add_audit_command(CLI::App& app, Action& chosen);
+void add_replay_command(CLI::App& app, Action& chosen);
 void add_history_command(CLI::App& app, Action& chosen);
 void add_service_commands(CLI::App& app, Action& chosen);  // submit, retrain, status, watch, models, ...
 

@@ -1,11 +1,15 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <set>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/commands/recent_work.h"
+#include "clients/cli/files/recorded_calls.h"
+#include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
-#include "clients/cli/text/diagnose_text.h"
-#include "server/base/json_guard.h"
-#include "server/report/work_json.h"
+#include "server/compensate/model_file.h"
 
 namespace trammel::cli {
 
@@ -13,39 +17,226 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr std::size_t kTold = 10;  // of those that differ, the largest
+
 struct ReplayArguments {
   std::string model, json, next_poses;
+  std::vector<std::string> inputs;
+  double tolerance_mm = 1e-6;
+  bool strict = false;
   ServiceOptions service;
 };
 
-/// Its bytes come from outside.
-Result<ordered_json> asked_of_service(const ReplayArguments& arguments) {
-  const Result<ModelReference> model = parse_model_reference(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  const auto text = (*session)->replay(model->cell, model->version);
-  if (!text) return tl::make_unexpected(text.error());
-  if (const Status small = check_json_limits(*text, "the service's replay"); !small)
-    return tl::make_unexpected(small.error());
-  return ordered_json::parse(*text, nullptr, false);
+/// An item whose answer is another one now.
+struct Different {
+  double by_mm = 0;  ///< infinite where one has a pose to command and the other has none
+  std::string what;
+};
+
+/// What came of all of them.
+struct Replayed {
+  std::size_t requests = 0, items = 0, different = 0;
+  double largest_mm = 0;
+  std::vector<Different> told;       ///< the largest first
+  std::set<std::string> models;      ///< that answered then
+  std::set<std::string> models_now;  ///< likewise, by hash
+  std::size_t of_other_models = 0;   ///< requests that another model answered then
+};
+
+double distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-Status replay(const ReplayArguments& arguments) {
-  Outputs outputs;
-  outputs.add("--next-poses", arguments.next_poses);
-  outputs.add("--json", arguments.json);
-  if (const Status good = outputs.check({}); !good) return good;
-  const Result<ordered_json> json = asked_of_service(arguments);
-  if (!json) return tl::make_unexpected(json.error());
-  try {
-    tell(work_text(*json), {arguments.json, arguments.next_poses});
-    if (!json->at("next_poses").empty()) outputs.put("--next-poses", next_poses_csv(*json));
-  } catch (const ordered_json::exception& error) {
-    return failure(ErrorCode::kInternal, "the service's replay is none: {}", error.what());
+double distance(const client::PoseMm& a, const client::PoseMm& b) {
+  return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm, a.z_mm - b.z_mm);
+}
+
+bool has_command(const client::CorrectedTarget& target) {
+  return target.status == "ok" || target.status == "out_of_domain";
+}
+
+Different compared(const RecordedPose& then, const client::PredictedError& now) {
+  const double error = distance(then.error_mm, {now.dx_mm, now.dy_mm, now.dz_mm});
+  const double spread = distance(then.true_stddev_mm, {now.slx_mm, now.sly_mm, now.slz_mm});
+  return {std::max(error, spread),
+          fmt::format("the error by {:.3g} mm, its standard deviation by {:.3g} mm", error, spread)};
+}
+
+Different compared(const client::CorrectedTarget& then, const client::CorrectedTarget& now) {
+  if (then.status != now.status)
+    return {has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY,
+            fmt::format("{} then, {} now", then.status, now.status)};
+  if (!has_command(then)) return {0, ""};
+  const double moved = distance(then.commanded, now.commanded);
+  const double expected = std::abs(then.error_after_mm - now.error_after_mm);
+  return {std::max(moved, expected),
+          fmt::format("the commanded pose by {:.3g} mm, the error expected by {:.3g} mm", moved, expected)};
+}
+
+void note(Replayed& all, const RecordedCall& call, std::size_t item, Different different, double tolerance_mm) {
+  ++all.items;
+  const bool is_same = different.by_mm <= tolerance_mm && different.what.find(" then, ") == std::string::npos;
+  if (is_same) return void(all.largest_mm = std::max(all.largest_mm, different.by_mm));
+  ++all.different;
+  all.largest_mm = std::max(all.largest_mm, different.by_mm);
+  different.what = fmt::format("{} row {} item {}{}: {}", call.file, call.line, item + 1,
+                               call.trace.empty() ? "" : " (trace " + call.trace + ")", different.what);
+  all.told.push_back(std::move(different));
+  std::stable_sort(all.told.begin(), all.told.end(),
+                   [](const Different& a, const Different& b) { return a.by_mm > b.by_mm; });
+  if (all.told.size() > kTold) all.told.pop_back();
+}
+
+/// Who answers now: predictions and corrections of one recorded request, and the hash of the model.
+struct Answers {
+  std::string hash;
+  std::vector<client::PredictedError> predictions;
+  std::vector<client::CorrectedTarget> corrections;
+};
+using Ask = std::function<Result<Answers>(const RecordedCall&)>;
+
+Result<Answers> answered_here(const CompensatedModel& model, const RecordedCall& call) {
+  const Cell& cell = model.cell();
+  if (call.cell != cell.name)
+    return refused("a request of cell {}, and the model is of cell {}", call.cell, cell.name)
+        .in(call.file)
+        .at_row(call.line)
+        .of("cell");
+  const auto at_line = [&](const Error& error) {
+    return Failure(error).as(ErrorCode::kRefused).in(call.file).at_row(call.line);
+  };
+  const auto tool = resolve_tool(cell, call.tool), payload = resolve_payload(cell, call.payload);
+  if (!tool) return at_line(tool.error());
+  if (!payload) return at_line(payload.error());
+  if (const Status known = model.check_trained_with(*tool, *payload); !known) return at_line(known.error());
+  std::vector<JointType> types;
+  for (int j = 0; j < cell.robot.size(); ++j) types.push_back(cell.robot.joint(j).type);
+  const auto joints = static_cast<std::size_t>(cell.robot.size());
+  Answers answers{model.provenance().hash, {}, {}};
+  const auto of_another_robot = [&] {
+    return refused("joints of another robot").in(call.file).at_row(call.line).of("joints_rad");
+  };
+  for (const RecordedPose& pose : call.poses) {
+    if (pose.asked.q_rad.size() != joints) return of_another_robot();
+    PoseContext asked;
+    asked.q = from_wire(pose.asked.q_rad, cell.robot);
+    asked.tool = *tool;
+    asked.payload = *payload;
+    asked.direction = pose.asked.approach.directions;
+    asked.temperature = pose.asked.approach.temperature_c;
+    asked.time = pose.asked.approach.time_s;
+    asked.served = true;
+    answers.predictions.push_back(to_wire(model.predict_all({asked}).front()));
   }
-  outputs.put("--json", json_text(*json));
-  return outputs.write();
+  for (const RecordedTarget& target : call.targets) {
+    if (!target.asked.conf && target.asked.seed_rad.size() != joints) return of_another_robot();
+    answers.corrections.push_back(to_wire(model.correct(from_wire(target.asked, cell.robot), *tool, *payload), types));
+  }
+  return answers;
+}
+
+Result<Answers> answered_by(client::Session& session, const ModelReference& model, const RecordedCall& call) {
+  client::CallContext context;
+  context.cell = call.cell;
+  context.tool = call.tool;
+  context.payload = call.payload;
+  if (call.cell != model.cell)
+    return refused("a request of cell {}, not of {}", call.cell, model.cell).in(call.file).at_row(call.line).of("cell");
+  if (model.version > 0) context.model = fmt::format("@{}", model.version);
+  if (!call.poses.empty()) {
+    std::vector<client::CommandedJoints> poses;
+    for (const RecordedPose& pose : call.poses) poses.push_back(pose.asked);
+    return session.predict_error_at(context, poses).map([](client::Answer<client::PredictedError> answer) {
+      return Answers{answer.model.hash, std::move(answer.items), {}};
+    });
+  }
+  std::vector<client::TargetMm> targets;
+  for (const RecordedTarget& target : call.targets) targets.push_back(target.asked);
+  return session.correct_targets(context, targets).map([](client::Answer<client::CorrectedTarget> answer) {
+    return Answers{answer.model.hash, {}, std::move(answer.items)};
+  });
+}
+
+Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Replayed& all) {
+  const Result<Answers> now = ask(call);
+  if (!now) return tl::make_unexpected(now.error());
+  ++all.requests;
+  all.models.insert(fmt::format("{}@{} ({})", call.cell, call.model_version, call.model_hash.substr(0, 8)));
+  all.models_now.insert(now->hash.substr(0, 8));
+  if (now->hash != call.model_hash) ++all.of_other_models;
+  for (std::size_t i = 0; i < call.poses.size(); ++i)
+    note(all, call, i, compared(call.poses[i], now->predictions.at(i)), tolerance_mm);
+  for (std::size_t i = 0; i < call.targets.size(); ++i)
+    note(all, call, i, compared(call.targets[i].answer, now->corrections.at(i)), tolerance_mm);
+  return {};
+}
+
+std::string replayed_text(const Replayed& all, double tolerance_mm) {
+  std::string text = fmt::format(
+      "{} requests, {} items: {} differ by more than {:g} mm, the largest by {:.3g} mm\nanswered then by {}, now by "
+      "{}\n",
+      all.requests, all.items, all.different, tolerance_mm, all.largest_mm, fmt::join(all.models, ", "),
+      fmt::join(all.models_now, ", "));
+  if (all.of_other_models > 0)
+    text += fmt::format("{} of the requests were answered by another model than now\n", all.of_other_models);
+  for (const Different& one : all.told) text += one.what + "\n";
+  return text;
+}
+
+ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
+  ordered_json told = ordered_json::array();
+  for (const Different& one : all.told)
+    told.push_back(
+        {{"by_mm", std::isfinite(one.by_mm) ? ordered_json(one.by_mm) : ordered_json(nullptr)}, {"what", one.what}});
+  return {{"requests", all.requests},
+          {"items", all.items},
+          {"different", all.different},
+          {"tolerance_mm", tolerance_mm},
+          {"largest_mm", std::isfinite(all.largest_mm) ? ordered_json(all.largest_mm) : ordered_json(nullptr)},
+          {"answered_by_another_model", all.of_other_models},
+          {"largest", told}};
+}
+
+/// Without records: what the service was lately asked.
+Result<Extent> replay_recent(const ReplayArguments& arguments) {
+  if (!arguments.service.service)
+    return failure(ErrorCode::kUsage, "either files of recorded requests, or --service").of("records");
+  return tell_recent_work({arguments.model, arguments.json, arguments.next_poses}, arguments.service).map([] {
+    return Extent::kAll;
+  });
+}
+
+Result<Extent> replay(const ReplayArguments& arguments) {
+  if (arguments.inputs.empty()) return replay_recent(arguments);
+  if (!arguments.next_poses.empty())
+    return failure(ErrorCode::kUsage, "--next-poses is of what a service was lately asked, not of records")
+        .of("--next-poses");
+  std::optional<CompensatedModel> here;
+  std::unique_ptr<client::Session> session;
+  Ask ask;
+  if (arguments.service.service) {
+    const Result<ModelReference> model = parse_model_reference(arguments.model);
+    if (!model) return tl::make_unexpected(model.error());
+    auto opened = open_session(arguments.service);
+    if (!opened) return tl::make_unexpected(opened.error());
+    session = std::move(*opened);
+    ask = [&session, model = *model](const RecordedCall& call) { return answered_by(*session, model, call); };
+  } else {
+    auto model = load_model(arguments.model);
+    if (!model) return tl::make_unexpected(model.error());
+    here = std::move(*model);
+    ask = [&here](const RecordedCall& call) { return answered_here(*here, call); };
+  }
+  Replayed all;
+  for (const std::string& input : arguments.inputs) {
+    const Status done =
+        read_records(input, [&](const RecordedCall& call) { return compare(call, ask, arguments.tolerance_mm, all); });
+    if (!done) return tl::make_unexpected(done.error());
+  }
+  tell(replayed_text(all, arguments.tolerance_mm), {arguments.json});
+  if (const Status written = write_json(arguments.json, replayed_json(all, arguments.tolerance_mm)); !written)
+    return tl::make_unexpected(written.error());
+  return arguments.strict && all.different > 0 ? Extent::kPart : Extent::kAll;
 }
 
 }  // namespace
@@ -53,14 +244,21 @@ Status replay(const ReplayArguments& arguments) {
 void add_replay_command(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ReplayArguments>();
   CLI::App* command = app.add_subcommand(
-      "replay",
-      "Give the poses that a cell was lately asked for to another version of its model, and tell the difference");
-  command->add_option("--model", arguments->model, "The cell's id, or cell@version to compare with what is in force")
-      ->required();
-  command->add_option("--next-poses", arguments->next_poses,
-                      "Write the poses at work where the model in force is least sure (CSV; `plan --from` reads it)");
+      "replay", "Ask again what a service has recorded, or was lately asked, and tell how the answers differ");
+  command->add_option(
+      "records", arguments->inputs,
+      "Files of recorded requests (record: in server.yaml), or folders of them; none: with --service the "
+      "last poses that the cell was asked for, by its model in force and by --model cell@version");
+  command->add_option("--model", arguments->model, "Model file; with --service a cell or cell@version")->required();
+  command->add_option("--tolerance", arguments->tolerance_mm, "Differences up to this are none, mm")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--strict", arguments->strict, "Exit 1 where an answer is another one");
+  command->add_option(
+      "--next-poses", arguments->next_poses,
+      "Of what a service was lately asked: the poses where it is least sure (CSV; plan --from reads it)");
   add_json_option(*command, arguments->json);
-  add_options_of_service_command(*command, arguments->service);
+  add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return replay(*arguments); }; });
 }
 

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <type_traits>
 
@@ -98,6 +99,13 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
 
 bool is_checked(const ordered_json& cell) { return cell.contains("verdict") && cell["verdict"].is_string(); }
 
+/// What the servers say one after the other may look divergent for a moment: only what stays so is.
+std::vector<std::string> lasting_divergence(client::Session& session) {
+  const auto servers = session.servers_when(
+      [](const std::vector<client::ServerStatus>& all) { return divergence_of(all).empty(); }, std::chrono::seconds(2));
+  return servers ? divergence_of(*servers) : std::vector<std::string>();
+}
+
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::vector<client::ServerStatus>> servers = session.servers();
   if (!servers) return tl::make_unexpected(servers.error());
@@ -116,8 +124,11 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
     text += server_text(server);
     list.push_back(server_json(server));
   }
+  const std::vector<std::string> divergent = lasting_divergence(session);
+  for (const std::string& one : divergent) text += "divergent: " + one + "\n";
   tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
   return write_json(arguments.json, {{"servers", list},
+                                     {"divergent", divergent},
                                      {"models", models_json(*models)},
                                      {"health", *health},
                                      {"jobs", jobs_json(*jobs)},

@@ -145,8 +145,11 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"export", "  trammel export --model cell-7 -o cell-7.model"},
     {"import", "  trammel import --cell cell-7 --model cell-7.model"},
     {"audit", "  trammel audit --cell cell-7"},
-    {"replay", "  trammel replay --model cell-7@5 --next-poses next.csv"},
     {"history", "  trammel history --cell cell-7 -o history.html"},
+    {"replay",
+     "  trammel replay --model cell-7.model /var/lib/trammel/records\n"
+     "  trammel replay --service --model cell-7@4 requests-000000001.jsonl --strict\n"
+     "  trammel replay --service --model cell-7@5 --next-poses next.csv"},
     {"backup",
      "  trammel backup --store data/trammel.db -o monday.db\n"
      "  trammel backup --check monday.db"},

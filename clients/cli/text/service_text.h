@@ -22,6 +22,9 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
 
+/// Cells that two replicas serve with different models though both have the same decisions: one sentence each.
+[[nodiscard]] std::vector<std::string> divergence_of(const std::vector<client::ServerStatus>& servers);
+
 [[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches);
 [[nodiscard]] std::string quarantine_text(const std::vector<client::BatchOfService>& batches);
 

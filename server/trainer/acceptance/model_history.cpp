@@ -134,6 +134,7 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   const auto made_meanwhile = store_.outcome_of(request.id);
   if (!made_meanwhile) return tl::make_unexpected(made_meanwhile.error());
   if (*made_meanwhile) return {};
+  if (auto decides = check_decides(cell); !decides) return decides;
   if (auto as_expected = check_expected(cell, request); !as_expected) return as_expected;
   const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
   if (auto activated = store_.activate(cell, version, request.id, figures); !activated) return activated;
@@ -173,6 +174,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest&
     if (!found) return tl::make_unexpected(found.error());
     const MutexLock lock(changes_of(cell));
     if (const auto now = way_back(cell); !now || *now != *way) continue;
+    if (auto decides = check_decides(cell); !decides) return tl::make_unexpected(decides.error());
     if (auto as_expected = check_expected(cell, request); !as_expected) return tl::make_unexpected(as_expected.error());
     const auto restored = store_.rollback(cell, found->first, request.id);
     if (!restored) return restored;
@@ -182,18 +184,53 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest&
   return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");
 }
 
-Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text, const ChangeId& id) {
-  const auto cell_found = find_cell(cells_, cell);
-  if (!cell_found) return tl::make_unexpected(cell_found.error());
-  const auto model = deserialize(text, "imported model");
-  if (!model) return tl::make_unexpected(model.error());
+Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const std::string& text,
+                                                  const char* what) const {
+  const auto served = find_cell(cells_, cell);
+  if (!served) return tl::make_unexpected(served.error());
+  auto model = deserialize(text, what);
+  if (!model) return model;
+  const std::string& id = model->provenance().id;
   if (model->cell().name != cell) {
-    return refused("imported model {} is of cell {}, not {}", model->provenance().id, model->cell().name, cell)
+    return refused("{} {} is of cell {}, not {}", what, id, model->cell().name, cell)
         .of("cell")
         .with_text(model->cell().name);
   }
-  const Status fits = check_fits_cell(*model, **cell_found, "imported model " + model->provenance().id);
+  const Status fits = check_fits_cell(*model, **served, fmt::format("{} {}", what, id));
   if (!fits) return tl::make_unexpected(fits.error());
+  return model;
+}
+
+Result<int> ModelHistory::adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
+                                const ChangeId& by) {
+  std::optional<CompensatedModel> model;
+  if (!text.empty()) {
+    auto read = model_from(cell, text, "model of another server");
+    if (!read) return tl::make_unexpected(read.error());
+    if (read->provenance().hash != decided.hash)
+      return refused("cell {}: its hash is {}, not {} as told", cell, read->provenance().hash, decided.hash).of("hash");
+    model = std::move(*read);
+  }
+  if (const auto served = find_cell(cells_, cell); !served) return tl::make_unexpected(served.error());
+  const MutexLock lock(changes_of(cell));
+  if (decides_) return failure(ErrorCode::kConflict, "cell {}: this server decides itself", cell).of("cell");
+  const auto version = store_.adopt(cell, decided, model ? &*model : nullptr, by);
+  if (!version || registry_.version_in_force(cell) == *version) return version;
+  auto served = model ? Result<ServedModelPtr>(registry_.reclaimed({cell, *version, std::move(*model)}))
+                      : registry_.version(cell, *version);
+  if (!served) return tl::make_unexpected(served.error());
+  put_in_force(std::move(*served));
+  return version;
+}
+
+Status ModelHistory::check_decides(const std::string& cell) const {
+  if (decides_) return {};
+  return failure(ErrorCode::kConflict, "cell {}: another server decides what is in force", cell).of("server");
+}
+
+Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text, const ChangeId& id) {
+  const auto model = model_from(cell, text, "imported model");
+  if (!model) return tl::make_unexpected(model.error());
   const MutexLock lock(changes_of(cell));
   const auto present = store_.models(cell);
   if (!present) return tl::make_unexpected(present.error());
@@ -259,6 +296,12 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
 
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
   const std::string& cell = candidate.job.cell;
+  if (judged.put_in_force && !decides_) {
+    judged.put_in_force = judged.release = false;
+    judged.outcome.verdict = JobVerdict::kUndecided;
+    judged.outcome.why = "another server decides now what is in force";
+    judged.message = fmt::format("not in force: {} ({})", judged.outcome.why, judged.message);
+  }
   const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
                                         judged.release, {}, judged.outcome);
   if (!version) return tl::make_unexpected(version.error());

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "clients/cli/terminal/options.h"
+#include "server/base/result.h"
+
+namespace trammel::cli {
+
+/// The poses that a cell of a service was lately asked for, by its model in force and by another version beside it.
+struct RecentWorkArguments {
+  std::string model;             ///< `cell` or `cell@version`
+  std::string json, next_poses;  ///< where to write; empty: nowhere
+};
+[[nodiscard]] Status tell_recent_work(const RecentWorkArguments& arguments, const ServiceOptions& service);
+
+}  // namespace trammel::cli

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/session/session_types.h"
+#include "server/base/result.h"
+
+namespace trammel::cli {
+
+/// Joints that a service was asked about, and what it answered.
+struct RecordedPose {
+  client::CommandedJoints asked;
+  std::array<double, 3> error_mm{}, true_stddev_mm{};
+  bool in_domain = false;
+};
+
+/// A target that a service was asked about, and what it answered.
+struct RecordedTarget {
+  client::TargetMm asked;
+  client::CorrectedTarget answer;
+};
+
+/// One request that a service has recorded (server/dds/records/README.md). Either poses or targets.
+struct RecordedCall {
+  std::string file;
+  long line = 0;
+  std::string trace, cell, tool, payload;
+  std::string model_id, model_hash;
+  int model_version = 0;
+  std::int64_t at_unix_s = 0;
+  std::vector<RecordedPose> poses;
+  std::vector<RecordedTarget> targets;
+};
+
+/// Calls `take` for each request of the file, or of all files of the folder, in their order. A last line that was not
+/// written to its end is left out. Refuses what is no record, with file and line.
+[[nodiscard]] Status read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take);
+
+}  // namespace trammel::cli

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+namespace trammel {
+
+/// Whether what is asked and answered is kept for `trammel replay`.
+struct RecordOptions {
+  std::string folder;  ///< empty: it is not
+  int max_mb = 100;    ///< of all files; the oldest goes
+  bool operator==(const RecordOptions&) const = default;
+};
+
+}  // namespace trammel

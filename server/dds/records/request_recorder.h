@@ -1,0 +1,65 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "idl/valid.h"
+#include "server/base/mutex.h"
+#include "server/base/result.h"
+#include "server/dds/records/record_options.h"
+
+namespace trammel {
+
+/// What was asked and answered, as one line of JSON: README.md has its members. Nothing in it says who asked.
+[[nodiscard]] std::string record_line(const wire::PredictErrorRequest& request, const wire::PredictErrorReply& reply,
+                                      std::int64_t at_unix_s);
+[[nodiscard]] std::string record_line(const wire::CorrectTargetRequest& request, const wire::CorrectTargetReply& reply,
+                                      std::int64_t at_unix_s);
+
+/// Writes what predictions and corrections were asked and answered to files that follow each other, in a thread of its
+/// own: nobody waits for the disk. What does not fit into its queue is dropped and counted. Thread-safe.
+class RequestRecorder {
+ public:
+  /// Null where nothing is to be recorded. Makes the folder; refuses one that cannot be written.
+  [[nodiscard]] static Result<std::unique_ptr<RequestRecorder>> open(const RecordOptions& options);
+  ~RequestRecorder();  ///< writes what waits
+  RequestRecorder(const RequestRecorder&) = delete;
+  RequestRecorder& operator=(const RequestRecorder&) = delete;
+
+  /// `bytes`: memory of what `line` holds.
+  void record(std::function<std::string()> line, std::size_t bytes);
+  /// Requests that are in no file: there was no room in the queue, or the disk did not take them.
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+
+ private:
+  struct Waiting {
+    std::function<std::string()> line;
+    std::size_t bytes = 0;
+  };
+  explicit RequestRecorder(RecordOptions options) : options_(std::move(options)) {}
+  void run(const std::stop_token& stop);
+  void write(const std::string& line);
+  /// Begins the next file, and lets the oldest ones go.
+  void next_file();
+
+  const RecordOptions options_;
+  std::atomic<std::uint64_t> dropped_{0};
+  Mutex mutex_;
+  Condition changed_;
+  std::deque<Waiting> waiting_ TRAMMEL_GUARDED_BY(mutex_);
+  std::size_t waiting_bytes_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  std::ofstream file_;  // of the thread, as the next two
+  std::size_t file_bytes_ = 0;
+  std::int64_t number_ = 0;
+  std::jthread thread_;
+};
+
+}  // namespace trammel

@@ -1,0 +1,262 @@
+// Two servers of the same cell as processes: one writes, the other follows.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "server/base/text_file.h"
+#include "tests/support/daemon.h"
+#include "tests/support/virtual_cell.h"
+
+namespace trammel {
+namespace {
+
+using client::ServerStatus;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kLimit{120};
+const client::CallContext kContext = [] {
+  client::CallContext context;
+  context.cell = "cell-7";
+  return context;
+}();
+
+class ReplicasTest : public testing::Test {
+ protected:
+  ReplicasTest() { files_ = {test::read_file(first_.config_path()), test::read_file(second_.config_path())}; }
+
+  /// Gives a server its part; it knows the other one.
+  void give(int which, const std::string& part) {
+    const test::Daemon& other = which == 0 ? second_ : first_;
+    ASSERT_TRUE(write_text_file(daemon(which).config_path(),
+                                fmt::format("{}replica: {{{}}}\ndds: {{peer_ports: [{}]}}\n",
+                                            files_.at(static_cast<std::size_t>(which)), part, other.port())));
+  }
+  void give_usual_parts(const std::string& more = "") {
+    give(0, "role: writer" + more);
+    give(1, fmt::format("role: follower, of: {}{}", first_.name(), more));
+  }
+  void start_both() {
+    first_.start();
+    second_.start();
+    client::SessionOptions options = first_.session_options();
+    options.server_ports = {first_.port(), second_.port()};
+    auto opened = client::Session::open(options);
+    ASSERT_TRUE(opened) << opened.error().message;
+    session_ = std::move(*opened);
+  }
+  test::Daemon& daemon(int which) { return which == 0 ? first_ : second_; }
+
+  void learn(const std::string& batch, std::uint64_t seed) {
+    const auto job = session_->submit_measurements("cell-7", batch, test::virtual_batch_csv(60, seed));
+    ASSERT_TRUE(job) << sentence(job.error());
+    const auto over = session_->wait_for_job(*job, kLimit, nullptr);
+    ASSERT_TRUE(over) << sentence(over.error());
+    ASSERT_EQ(over->stage, "done") << over->what;
+  }
+  /// What a server says of itself; empty: nothing, or it has no part.
+  [[nodiscard]] static std::optional<ServerStatus> status_in(const std::vector<ServerStatus>& all,
+                                                             const test::Daemon& daemon) {
+    for (const ServerStatus& status : all) {
+      if (status.server_id == daemon.name() && status.replica) return status;
+    }
+    return std::nullopt;
+  }
+  std::optional<ServerStatus> status_of(const test::Daemon& daemon) {
+    return status_in(session_->servers().value_or(std::vector<ServerStatus>()), daemon);
+  }
+  /// Until it holds for what both say; a server that is not there says nothing.
+  using Both = std::function<bool(const ServerStatus& first, const ServerStatus& second)>;
+  [[nodiscard]] bool wait_until(const Both& holds) {
+    bool is_so = false;
+    const auto look = [&](const std::vector<ServerStatus>& all) {
+      const auto first = status_in(all, first_), second = status_in(all, second_);
+      return is_so = first && second && holds(*first, *second);
+    };
+    static_cast<void>(session_->servers_when(look, kLimit));
+    return is_so;
+  }
+  /// Both serve the same model, by the same decisions.
+  [[nodiscard]] static bool same(const ServerStatus& first, const ServerStatus& second) {
+    const auto &a = *first.replica, &b = *second.replica;
+    return a.epoch == b.epoch && a.cells.at(0).hash == b.cells.at(0).hash && a.cells.at(0).version > 0;
+  }
+  /// A command that knows one server only.
+  test::Finished ask(const test::Daemon& daemon, std::vector<std::string> words) {
+    words.insert(words.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
+    words.insert(words.end(), {"--port", std::to_string(daemon.port()), "--domain", std::to_string(daemon.domain())});
+    return test::run(words, kLimit);
+  }
+
+  test::Daemon first_{0}, second_{1};
+  std::vector<std::string> files_;
+  std::unique_ptr<client::Session> session_;
+};
+
+TEST_F(ReplicasTest, AFollowerServesWhatTheWriterPutInForceAlsoAfterItsOwnRestart) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  EXPECT_EQ(status_of(second_)->replica->follows, first_.name());
+  first_.kill();
+  second_.kill();
+  second_.start();
+  const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  EXPECT_EQ(answer->model.version, 1);
+  EXPECT_EQ(answer->model.batch_id, "lt-1");
+}
+
+TEST_F(ReplicasTest, ARollbackIsFollowedThoughItsVersionIsLower) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  learn("lt-2", 2);
+  ASSERT_TRUE(session_->activate("cell-7", 2));
+  ASSERT_TRUE(wait_until(
+      [](const ServerStatus& a, const ServerStatus& b) { return same(a, b) && b.replica->cells.at(0).version == 2; }));
+  ASSERT_TRUE(session_->rollback("cell-7"));
+  EXPECT_TRUE(wait_until(
+      [](const ServerStatus& a, const ServerStatus& b) { return same(a, b) && b.replica->cells.at(0).version == 1; }));
+}
+
+TEST_F(ReplicasTest, AChangeThatIsAskedOfTheFollowerIsReferredToTheWriter) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  const auto refused = ask(second_, {"activate", "--model", "cell-7@1", "--timeout", "3"});
+  EXPECT_NE(refused.exit_code, 0) << refused.out;
+  EXPECT_NE(refused.err.find("ask " + first_.name()), std::string::npos) << refused.err;
+  EXPECT_TRUE(session_->activate("cell-7", 1));
+}
+
+TEST_F(ReplicasTest, ABatchIsOnTheFollowerBeforeItIsAcknowledged) {
+  give_usual_parts(", batches_to_followers: true, copy_timeout_s: 30");
+  start_both();
+  ASSERT_TRUE(
+      wait_until([&](const ServerStatus&, const ServerStatus& b) { return b.replica->follows == first_.name(); }));
+  ASSERT_TRUE(session_->submit_measurements("cell-7", "lt-1", test::virtual_batch_csv(60, 1)));
+  first_.kill();
+  const auto kept = ask(second_, {"batches", "--cell", "cell-7", "--json", "-"});
+  EXPECT_EQ(kept.exit_code, 0) << kept.err;
+  EXPECT_NE(kept.out.find("lt-1"), std::string::npos) << kept.out;
+}
+
+TEST_F(ReplicasTest, AFollowerThatWasAwayGetsTheBatchesThatItLacks) {
+  give_usual_parts(", batches_to_followers: true, copy_timeout_s: 1");
+  start_both();
+  ASSERT_TRUE(wait_until([](const ServerStatus&, const ServerStatus&) { return true; }));
+  second_.kill();
+  learn("lt-1", 1);
+  second_.start();
+  ASSERT_TRUE(wait_until(same));
+  const auto until = steady_clock::now() + kLimit;
+  std::string kept;
+  while (kept.find("lt-1") == std::string::npos && steady_clock::now() < until)
+    kept = ask(second_, {"batches", "--cell", "cell-7", "--json", "-"}).out;
+  EXPECT_NE(kept.find("lt-1"), std::string::npos) << kept;
+}
+
+TEST_F(ReplicasTest, WhenTheWriterIsKilledTheFollowerAnswersAtOnce) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  const auto joints = test::virtual_joints(3, 7);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(session_->predict_error(kContext, joints));
+  first_.kill();
+  const auto answer = session_->predict_error(kContext, joints);
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  EXPECT_EQ(answer->model.batch_id, "lt-1");
+}
+
+TEST_F(ReplicasTest, APromotedFollowerWritesAndTheOldWriterComesBackAsItsFollower) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  learn("lt-2", 2);  // version 2 of the first one, whether it is in force or not
+  ASSERT_TRUE(wait_until(same));
+  first_.kill();
+  give(1, "role: writer");
+  second_.process().signal(SIGHUP);
+  ASSERT_TRUE(second_.process().wait_for_line("writes from now on", kLimit)) << second_.process().standard_error();
+  learn("lt-3", 3);
+  const auto versions = session_->models("cell-7");
+  ASSERT_TRUE(versions) << sentence(versions.error());
+  const auto activated = session_->activate("cell-7", versions->back().version);
+  ASSERT_TRUE(activated) << sentence(activated.error());
+  first_.start();  // its file still says that it writes
+  ASSERT_TRUE(wait_until([](const ServerStatus& a, const ServerStatus& b) {
+    return same(a, b) && !a.replica->writes && b.replica->writes;
+  }));
+  const auto kept = ask(first_, {"models", "--cell", "cell-7", "--json", "-"});
+  for (const char* batch : {"lt-1", "lt-2", "lt-3"})
+    EXPECT_NE(kept.out.find(batch), std::string::npos) << batch << " is written over: " << kept.out;
+}
+
+TEST_F(ReplicasTest, TwoWritersAreSaidOneOfThemStopsAndNothingIsLost) {
+  give(0, "role: writer");
+  give(1, "role: writer");
+  first_.start();
+  client::SessionOptions options = first_.session_options();
+  options.server_ports = {first_.port(), second_.port()};
+  auto opened = client::Session::open(options);
+  ASSERT_TRUE(opened) << opened.error().message;
+  session_ = std::move(*opened);
+  learn("lt-1", 1);
+  second_.start();  // has decided nothing yet: its epoch is the lower one
+  ASSERT_TRUE(second_.process().wait_for_line("two servers write", kLimit)) << second_.process().standard_error();
+  ASSERT_TRUE(first_.process().wait_for_line("two servers write", kLimit)) << first_.process().standard_error();
+  EXPECT_TRUE(wait_until([](const ServerStatus& a, const ServerStatus& b) {
+    return same(a, b) && a.replica->writes && !b.replica->writes && a.replica->cells.at(0).version == 1;
+  }));
+}
+
+TEST_F(ReplicasTest, AFollowerWritesByItselfWhereItsFileSaysAfterHowLong) {
+  give(0, "role: writer");
+  give(1, fmt::format("role: follower, of: {}, promote_after_s: 3", first_.name()));
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  first_.kill();
+  const auto writes = [&](const std::vector<ServerStatus>& all) {
+    const auto second = status_in(all, second_);
+    return second && second->replica->writes;
+  };
+  const auto left = session_->servers_when(writes, kLimit);
+  ASSERT_TRUE(left && writes(*left));
+  EXPECT_TRUE(session_->activate("cell-7", 1));
+}
+
+TEST_F(ReplicasTest, StoppingAndStartingOneAfterTheOtherLosesNoRequest) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  std::atomic<int> asked{0}, failed{0};
+  std::jthread client([&](const std::stop_token& stop) {
+    const auto joints = test::virtual_joints(3, 7);
+    while (!stop.stop_requested()) {
+      ++asked;
+      if (!session_->predict_error(kContext, joints)) ++failed;
+    }
+  });
+  for (const int which : {0, 1}) {
+    const int before = asked;
+    EXPECT_EQ(daemon(which).stop(), 0);
+    daemon(which).start();
+    while (asked < before + 200) std::this_thread::yield();
+    EXPECT_TRUE(wait_until(same));
+  }
+  client.request_stop();
+  client.join();
+  EXPECT_EQ(failed, 0) << "of " << asked;
+}
+
+}  // namespace
+}  // namespace trammel
