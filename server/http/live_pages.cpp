@@ -27,6 +27,11 @@ struct Row {
   std::string kind = {};           ///< class for the style sheet; empty: none
 };
 
+std::string html_time(std::optional<std::int64_t> unix_s) { return "<time>" + shown_time(unix_s) + "</time>"; }
+
+/// Text that may be broken anywhere, as hashes are.
+std::string breakable(const std::string& text) { return "<span class=\"breaks\">" + html_text(text) + "</span>"; }
+
 /// A table; on narrow screens each cell stands on a line of its own, behind the name of its column.
 std::string table(const std::vector<std::string>& head, const std::vector<Row>& rows) {
   std::string html = "<div class=\"wide\"><table>\n<thead>" + html_head(head) + "</thead>\n<tbody>\n";
@@ -106,7 +111,7 @@ Row fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now
   }
   const ModelProvenance& made = model->model.provenance();
   const auto& judged = model->model.parts().validation;
-  row.cells.push_back(shown_time(made.trained_at));
+  row.cells.push_back(html_time(made.trained_at));
   row.cells.push_back(made.measured_at ? shown_age(static_cast<double>(now - *made.measured_at)) : "–");
   row.cells.push_back(millimetres(judged && judged->poses > 0 ? std::optional(judged->compensated.rms) : std::nullopt));
   return row;
@@ -148,7 +153,7 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
     const auto now = progress_in(running, job->id);
     rows.push_back({{html_link(job_address(job->id), std::to_string(job->id)),
                      html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
-                     shown_time(job->created_at), shown_time(job->finished_at), outcome_of(*job, now)},
+                     html_time(job->created_at), html_time(job->finished_at), outcome_of(*job, now)},
                     now ? "now" : ""});
   }
   return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "outcome"}, rows);
@@ -164,7 +169,7 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
     const bool now = one->version == in_force;
     rows.push_back(
         {{html_link(model_address(cell, one->version), std::to_string(one->version)) + (now ? " in force" : ""),
-          shown_time(one->trained_at), shown_time(one->measured_at), html_text(one->batch_id),
+          html_time(one->trained_at), html_time(one->measured_at), html_text(one->batch_id),
           html_text(level_in_words(one->level)), std::to_string(one->training_poses), millimetres(one->validation_rms)},
          now ? "now" : ""});
   }
@@ -177,7 +182,7 @@ Result<std::string> quarantine_table(const Watched& server, const std::string& c
   if (!batches) return tl::make_unexpected(batches.error());
   std::vector<Row> rows;
   for (const StoredBatch& batch : *batches)
-    rows.push_back({{html_text(batch.id), std::to_string(batch.poses), shown_time(batch.accepted_at),
+    rows.push_back({{html_text(batch.id), std::to_string(batch.poses), html_time(batch.accepted_at),
                      html_text(batch.quarantine)}});
   return rows.empty() ? std::string() : table({"batch", "poses", "came (UTC)", "why it is kept out"}, rows);
 }
@@ -185,9 +190,9 @@ Result<std::string> quarantine_table(const Watched& server, const std::string& c
 std::string event_table(const AuditTrail& trail) {
   std::vector<Row> rows;
   for (auto row = trail.rows.rbegin(); row != trail.rows.rend(); ++row)
-    rows.push_back({{shown_time(row->at), html_text(row->what), html_text(row->subject),
-                     html_text(row->before + (row->after.empty() ? "" : " → " + row->after)), html_text(row->why),
-                     html_text(row->who)}});
+    rows.push_back({{html_time(row->at), html_text(row->what), html_text(row->subject),
+                     breakable(row->before + (row->after.empty() ? "" : " → " + row->after)), html_text(row->why),
+                     breakable(row->who)}});
   std::string html =
       rows.empty() ? "<p>None.</p>" : table({"when (UTC)", "what", "of what", "before → after", "why", "who"}, rows);
   if (trail.broken) html = "<p>The trail is broken: " + html_text(sentence(*trail.broken)) + "</p>" + html;
@@ -227,7 +232,8 @@ ServicePage fleet_page(const Watched& server) {
   std::vector<Row> rows;
   for (const CellReadiness& one : cells) rows.push_back(fleet_row(one, models, unix_now()));
   const std::string verdict =
-      dark == 0 ? fmt::format("All {} cells are answered for.", cells.size())
+      dark == 0 ? cells.size() == 1 ? "Its cell is answered for."
+                                    : fmt::format("All {} cells are answered for.", cells.size())
                 : fmt::format("{} of {} cells are dark: nobody gets an answer for them.", dark, cells.size());
   const Movement movement = server.movement();
   const std::string still =
@@ -277,9 +283,9 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
   std::vector<Row> rows = {{{"cell", html_link(cell_address(job->cell), job->cell)}},
                            {{"what", kind_of(job->kind)}},
                            {{"batches", batches_of(*job)}},
-                           {{"asked (UTC)", shown_time(job->created_at)}},
-                           {{"begun (UTC)", shown_time(job->started_at)}},
-                           {{"ended (UTC)", shown_time(job->finished_at)}},
+                           {{"asked (UTC)", html_time(job->created_at)}},
+                           {{"begun (UTC)", html_time(job->started_at)}},
+                           {{"ended (UTC)", html_time(job->finished_at)}},
                            {{"outcome", outcome_of(*job, now)}}};
   const JobOutcome& outcome = job->outcome;
   if (outcome.before || outcome.after)

@@ -22,7 +22,7 @@ constexpr std::string_view kStyle = R"(
   h1 { margin-bottom: 16px; }
   .wide { overflow-x: auto; }
   a { color: var(--mark); }
-  td { overflow-wrap: break-word; }
+  td { overflow-wrap: break-word; } time { white-space: nowrap; } .breaks { overflow-wrap: anywhere; }
   .now td { font-weight: 600; }
   .dark td:first-child { border-left: 4px solid var(--dark); padding-left: 8px; }
   .served td:first-child { border-left: 4px solid var(--good); padding-left: 8px; }

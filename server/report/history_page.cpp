@@ -102,12 +102,13 @@ std::string parameter_table(const CellHistory& history, const std::vector<Moved>
     const ParameterOnRecord& last = *one.last;
     if (last.cause != cause) rows.push_back({{html_text(last.cause)}, "cause", 5});
     cause = last.cause;
-    const ShownValue first = show_with_uncertainty(one.first->value, one.first->u95);
-    const ShownValue now = show_with_uncertainty(last.value, last.u95);
+    const Reading reading = reading_of(last.unit);
+    const ShownValue first = show_read(one.first->value, one.first->u95, reading);
+    const ShownValue now = show_read(last.value, last.u95, reading);
     const bool marked = has_moved(moved, last);
     rows.push_back(
         {{html_text(last.name), fmt::format("{} ± {}", first.value, first.expanded),
-          fmt::format("{} ± {}", now.value, now.expanded), html_text(last.unit), track_svg(one.track, versions)},
+          fmt::format("{} ± {}", now.value, now.expanded), html_text(reading.unit), track_svg(one.track, versions)},
          marked            ? "moved"
          : last.identified ? ""
                            : "unknown"});
@@ -133,7 +134,7 @@ std::string outcome_of(const TrainingOnRecord& one) {
 }
 
 std::string training_table(const CellHistory& history) {
-  if (history.trainings.empty()) return "<p>The service remembers none.</p>";
+  if (history.trainings.empty()) return "<p>None on record.</p>";
   std::vector<HtmlRow> rows;
   for (const TrainingOnRecord& one : history.trainings) {
     rows.push_back({{day_of(one.at), html_text(one.batches), millimetres(one.before), millimetres(one.after),
@@ -162,16 +163,25 @@ std::string verdict(const CellHistory& history, const std::vector<Moved>& moved)
   if (now != history.versions.end())
     for (const std::string& note : now->notes) list += "<li>" + html_text(note) + "</li>";
   for (const Moved& one : moved) {
-    const ShownValue step = show_with_uncertainty(one.to - one.from, one.u95);
+    const Reading reading = reading_of(one.unit);
+    const ShownValue step = show_read(one.to - one.from, one.u95, reading);
     list +=
         fmt::format("<li>{}, {}: {} ± {} {} from version {} to {}</li>", html_text(one.cause), html_text(one.parameter),
-                    step.value, step.expanded, html_text(one.unit), one.from_version, one.to_version);
+                    step.value, step.expanded, html_text(reading.unit), one.from_version, one.to_version);
   }
   if (moved.empty()) {
     text += fmt::format(" No {}parameter of the arm moved by more than its uncertainty between versions.",
                         list.empty() ? "" : "other ");
   }
   return "<p>" + text + "</p>" + (list.empty() ? "" : "<ul>" + list + "</ul>");
+}
+
+/// From when to when.
+std::string span_of(const CellHistory& history) {
+  if (history.versions.empty()) return "No version on record.";
+  const VersionOnRecord &first = history.versions.front(), &last = history.versions.back();
+  return fmt::format("Versions {} to {}, trained from {} to {} UTC", first.version, last.version,
+                     day_of(first.trained_at), day_of(last.trained_at));
 }
 
 }  // namespace
@@ -181,6 +191,7 @@ std::string history_page(const CellHistory& history) {
   const std::string title = "History of cell " + html_text(history.cell);
   return fill_in(embedded::history_page_html, {{"page_css", std::string(page_style())},
                                                {"title", title},
+                                               {"span", span_of(history)},
                                                {"verdict", verdict(history, moved)},
                                                {"versions", version_table(history)},
                                                {"trainings", training_table(history)},

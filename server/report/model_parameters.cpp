@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "server/base/coverage.h"
-#include "server/base/units.h"
 #include "server/report/html.h"
 #include "server/report/shown_value.h"
 
@@ -13,7 +12,6 @@ namespace trammel {
 namespace {
 
 constexpr int kColumns = 7;
-constexpr double kSmallestShown = 1e-7;  // mm, deg: of an uncertainty without powers of ten
 
 HtmlRow source_row(const ErrorSource& source) {
   return {
@@ -47,36 +45,17 @@ std::optional<double> stated(const CompensatedModel& model, const ErrorSource& s
   return model.parts().physics.X_WB.translation()(static_cast<Eigen::Index>(axis));
 }
 
-/// Angles are kept in rad and read in degrees.
-struct Reading {
-  double scale = 1;
-  std::string unit;
-};
-
-Reading reading_of(const Parameter& parameter) {
-  return parameter.unit == "rad" ? Reading{to_deg(1) * parameter.scale, "deg"}
-                                 : Reading{parameter.scale, parameter.unit};
-}
-
-/// To two digits of the uncertainty, without powers of ten for what people read in mm and degrees.
-ShownValue shown_as(double value, double u95, const std::string& unit) {
-  const bool plain = (unit == "mm" || unit == "deg") && u95 > kSmallestShown && std::isfinite(u95);
-  if (!plain) return show_with_uncertainty(value, u95);
-  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(u95))));
-  return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", u95, decimals)};
-}
-
 HtmlRow parameter_row(const CompensatedModel& model, const ErrorSource& source, const IdentifiedParameter& identified) {
   const Parameter& parameter = identified.parameter;
-  const auto [scale, unit] = reading_of(parameter);
+  const Reading reading = reading_of(parameter.unit);
   const std::optional<double> drawn = stated(model, source, parameter.name);
   const double nominal = drawn.value_or(parameter.prior);
   const double correction = drawn ? identified.value : identified.value - parameter.prior;
-  const double u95 = kExpanded * scale * identified.stddev;
-  const ShownValue shown = shown_as(scale * correction, u95, unit);
-  return {.cells = {html_text(parameter.name), fmt::format("{:.7g}", scale * nominal), shown.value,
-                    shown_as(scale * (nominal + correction), u95, unit).value, shown.expanded, html_text(unit),
-                    identified.identified ? "" : "not identified by itself"},
+  const double u95 = kExpanded * parameter.scale * identified.stddev;
+  const ShownValue shown = show_read(parameter.scale * correction, u95, reading);
+  return {.cells = {html_text(parameter.name), fmt::format("{:.7g}", reading.scale * parameter.scale * nominal),
+                    shown.value, show_read(parameter.scale * (nominal + correction), u95, reading).value,
+                    shown.expanded, html_text(reading.unit), identified.identified ? "" : "not identified by itself"},
           .kind = identified.identified ? "" : "unknown"};
 }
 

@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
+
+#include "server/base/units.h"
 
 namespace trammel {
 
@@ -11,6 +15,15 @@ namespace {
 
 constexpr int kMostDecimals = 4;
 constexpr int kMostDigits = 5;  // in front of the point that still read as a number
+
+constexpr double kSmallestPlain = 1e-7;  // of an uncertainty that is written without a power of ten
+
+/// Units that begin with an angle, and what people read instead.
+struct Angular {
+  std::string_view unit, read;
+  double scale;  // degrees of the angle, and the rest
+};
+constexpr std::array<Angular, 3> kAngular = {{{"rad", "deg", 1}, {"rad/h", "deg/h", 1}, {"rad/Nmm", "deg/kNm", 1e6}}};
 
 /// Power of ten of the first digit.
 int order(double x) { return x == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(x)))); }
@@ -30,6 +43,22 @@ ShownValue show_with_uncertainty(double value, double expanded) {
   }
   const int digits = value == 0 ? 1 : std::clamp(order(value) - order(expanded) + 1, 0, 9);
   return {fmt::format("{:.{}e}", value, digits), fmt::format("{:.1e}", expanded)};
+}
+
+Reading reading_of(const std::string& unit) {
+  for (const Angular& one : kAngular) {
+    if (one.unit == unit) return {one.scale * to_deg(1), std::string(one.read)};
+  }
+  return {1, unit};
+}
+
+ShownValue show_read(double value, double expanded, const Reading& reading) {
+  const double read = reading.scale * value, u95 = reading.scale * expanded;
+  const bool measure = reading.unit.starts_with("mm") || reading.unit.starts_with("deg");
+  const bool small = u95 > kSmallestPlain && u95 < 1;  // beyond, both are written without powers of ten anyway
+  if (!measure || !small) return show_with_uncertainty(read, u95);
+  const int decimals = 1 - order(u95);
+  return {fmt::format("{:.{}f}", read, decimals), fmt::format("{:.{}f}", u95, decimals)};
 }
 
 }  // namespace trammel

@@ -116,7 +116,7 @@ CREATE TABLE IF NOT EXISTS job_releases (
   job   INTEGER NOT NULL REFERENCES jobs (id),
   cell  TEXT    NOT NULL,
   batch TEXT    NOT NULL,
-  PRIMARY KEY (job, batch),
+  PRIMARY KEY (job, cell, batch),
   FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS health_checks (job INTEGER PRIMARY KEY REFERENCES jobs (id));
@@ -184,6 +184,18 @@ void fill_in_times(SQLite::Database& database) {
   }
 }
 
+/// In stores of before, the cell of a release is not in the key of its row: there SQLite 3.40 takes it for missing
+/// where it checks a copy.
+void put_cells_of_releases_into_their_key(SQLite::Database& database) {
+  constexpr const char* kOutside =
+      "SELECT COUNT(*) FROM pragma_table_info('job_releases') WHERE name = 'cell' AND pk = 0";
+  if (database.execAndGet(kOutside).getInt() == 0) return;
+  database.exec("ALTER TABLE job_releases RENAME TO job_releases_before");
+  database.exec(kTimes);
+  database.exec("INSERT INTO job_releases (job, cell, batch) SELECT job, cell, batch FROM job_releases_before");
+  database.exec("DROP TABLE job_releases_before");
+}
+
 /// Refuses a file that is neither empty nor a store of ours. Changes nothing.
 Status check_owner(SQLite::Database& database, const std::string& path) {
   const int application = database.execAndGet("PRAGMA application_id").getInt();
@@ -224,6 +236,7 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
     database.exec(fmt::format("PRAGMA user_version = {}", kSchemaVersion));
   }
   database.exec(kTimes);
+  put_cells_of_releases_into_their_key(database);
   fill_in_times(database);
   prepare_audit(database, schema == 0, schema);
   transaction.commit();

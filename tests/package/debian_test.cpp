@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <regex>
@@ -81,9 +82,23 @@ class Debian : public testing::Test {
 TEST_F(Debian, EachPackageHasItsFiles) {
   expect_files("trammel", {"usr/bin/trammel", "usr/share/trammel/config/cell-7\\.yaml",
                            "usr/share/trammel/models/truth/chapter-5\\.yaml", "usr/share/doc/trammel/copyright"});
-  expect_files("trammeld",
-               {"usr/bin/trammeld", "usr/libexec/trammel/supervise", "etc/trammel/server\\.yaml",
-                "etc/trammel/cell-7\\.yaml", "etc/logrotate\\.d/trammeld", "lib/systemd/system/trammeld\\.service"});
+  expect_files("trammeld", {"usr/bin/trammeld", "usr/libexec/trammel/supervise", "etc/trammel/server\\.yaml",
+                            "etc/trammel/cell-7\\.yaml", "etc/logrotate\\.d/trammeld",
+                            "lib/systemd/system/trammeld\\.service", "usr/share/man/man8/trammeld\\.8\\.gz"});
+}
+
+TEST_F(Debian, TheDaemonsManualHasEveryOption) {
+  std::string manual = test::read_file(TRAMMEL_SOURCE_DIR "/deploy/debian/trammeld.8");
+  manual.erase(std::remove(manual.begin(), manual.end(), '\\'), manual.end());
+  const std::string help = test::run({TRAMMEL_BINARY_DIR "/server/trammeld", "--help"}, kLimit).out;
+  static const std::regex kOption("--[a-z-]+");
+  int options = 0;
+  for (auto at = std::sregex_iterator(help.begin(), help.end(), kOption); at != std::sregex_iterator(); ++at) {
+    if (at->str() == "--help") continue;
+    ++options;
+    EXPECT_NE(manual.find(at->str()), std::string::npos) << at->str();
+  }
+  EXPECT_GE(options, 6);
 }
 
 TEST_F(Debian, LibrariesHaveTheirFiles) {

@@ -26,8 +26,10 @@ TEST(History, AParameterThatMovedByMoreThanItsUncertaintyIsNamedWithBothVersions
   EXPECT_EQ(moved[0].from_version, 2);
   EXPECT_EQ(moved[0].to_version, 3);
   EXPECT_NEAR(moved[0].u95, std::hypot(0.03e-3, 0.02e-3), 1e-12);
-  EXPECT_TRUE(has(history_page(history), "link geometry, q3: 1.60e-04 ± 3.6e-05 rad from version 2 to 3"))
+  EXPECT_TRUE(has(history_page(history), "link geometry, q3: 0.0092 ± 0.0021 deg from version 2 to 3"))
       << history_page(history);
+  EXPECT_TRUE(has(history_page(history), "Versions 1 to 3, trained from 2023-11-14 22:13 to 2023-11-14 22:13 UTC"));
+  EXPECT_FALSE(has(history_page(history), " rad ")) << "people read degrees";
 }
 
 TEST(History, WhereTheTrackerStoodAndWhatNoMeasurementTellsIsNeverSaidToHaveMoved) {

@@ -72,6 +72,34 @@ TEST_F(BackupTest, ACopyOfAStoreThatIsServedHoldsEveryRowOfIt) {
   EXPECT_EQ(content_of(copy_), content_of(path_));
 }
 
+TEST_F(BackupTest, ACopyOfAStoreInWhichABatchWasReleasedIsWhole) {
+  train("lt-07");
+  StoredJob job;
+  job.cell = "cell-7";
+  job.batch_ids = {"lt-07"};
+  ASSERT_TRUE(store_->add_job(job, true));
+  const auto copy = back_up();
+  EXPECT_TRUE(copy) << copy.error().message;
+}
+
+TEST_F(BackupTest, AReleaseInAStoreOfBeforeIsKeptAndItsCopyIsWhole) {
+  const std::int64_t job = submit("lt-07");
+  store_.reset();
+  {
+    SQLite::Database file(path_, SQLite::OPEN_READWRITE);
+    file.exec("DROP TABLE job_releases");
+    file.exec(
+        "CREATE TABLE job_releases (job INTEGER NOT NULL REFERENCES jobs (id), cell TEXT NOT NULL, batch TEXT NOT "
+        "NULL, "
+        "PRIMARY KEY (job, batch), FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID");
+    file.exec("INSERT INTO job_releases VALUES (" + std::to_string(job) + ", 'cell-7', 'lt-07')");
+  }
+  store_ = demand(Store::open(path_));
+  EXPECT_TRUE(demand(store_->may_release(job)));
+  const auto copy = back_up();
+  EXPECT_TRUE(copy) << copy.error().message;
+}
+
 TEST_F(BackupTest, AStoreThatIsPutBackServesWhatItServedBitForBit) {
   train("lt-07");
   train("lt-08");

@@ -71,22 +71,28 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
   return said;
 }
 
+/// What became of --apply: the extended model, or why the cell file and the model are as they were.
+struct Applied {
+  std::optional<Extension> extension = {};
+  std::string why_not = {};
+};
+
 /// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance.
-Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
-                        const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
+Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
+                      const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
+  if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
   Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
-  if (!extension) return extension;
+  if (!extension) return tl::make_unexpected(extension.error());
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
   if (!extension->gain.beyond_chance()) {
-    return refused("cell {}: with what was found {}", cell->name, to_string(extension->gain))
-        .next("cell file and model were not written");
+    return Applied{{}, fmt::format("cell {}: with what was found {}", cell->name, to_string(extension->gain))};
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
   outputs.put(kCellOption, std::move(*text));
   outputs.put("--model", serialize(extension->after));
-  return extension;
+  return Applied{std::move(*extension)};
 }
 
 /// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
@@ -94,14 +100,24 @@ Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const
   return read_checked_batches(arguments.batches, cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
 }
 
-Status diagnose_files(const DiagnoseArguments& arguments) {
+/// Says what was applied, or why nothing was.
+Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) {
+  if (applied.extension) {
+    say(extension_written(*applied.extension, arguments), arguments);
+    return Extent::kAll;
+  }
+  fmt::print(stderr, "not applied: {}; cell file and model were not written\n", applied.why_not);
+  return Extent::kPart;
+}
+
+Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   if (arguments.batches.empty()) return failure(ErrorCode::kUsage, "--batch is required").of("--batch");
   Outputs outputs = outputs_of(arguments);
   if (arguments.apply) outputs.add(kCellOption, extended_cell(arguments), "--cell");
   outputs.add("--model", arguments.model);
   std::vector<NamedFile> inputs = {{"--cell", arguments.cell}};
   for (const std::string& path : arguments.batches) inputs.push_back({"--batch", path});
-  if (const Status fine = outputs.check(inputs); !fine) return fine;
+  if (const Status fine = outputs.check(inputs); !fine) return tl::make_unexpected(fine.error());
   Result<Cell> read = read_cell_to_train(arguments.cell);
   if (!read) return tl::make_unexpected(read.error());
   const auto cell = std::make_shared<const Cell>(std::move(*read));
@@ -111,15 +127,14 @@ Status diagnose_files(const DiagnoseArguments& arguments) {
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
   ordered_json json = diagnosis_json(*diagnosis);
   say(diagnosis_text(json), arguments);
-  std::optional<Result<Extension>> applied;
+  std::optional<Result<Applied>> applied;
   if (arguments.apply) applied = apply(cell, *batch, *diagnosis, arguments, json, outputs);
   if (const Status written = write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments); !written) {
-    return written;
+    return tl::make_unexpected(written.error());
   }
-  if (!applied) return {};
+  if (!applied) return Extent::kAll;
   if (!*applied) return tl::make_unexpected(applied->error());
-  say(extension_written(**applied, arguments), arguments);
-  return {};
+  return tell_applied(**applied, arguments);
 }
 
 }  // namespace
@@ -183,8 +198,9 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
-    chosen = [arguments] {
-      return arguments->service.service ? diagnose_at_service(*arguments) : diagnose_files(*arguments);
+    chosen = [arguments]() -> Result<Extent> {
+      if (!arguments->service.service) return diagnose_files(*arguments);
+      return diagnose_at_service(*arguments).map([](bool all) { return all ? Extent::kAll : Extent::kPart; });
     };
   });
 }

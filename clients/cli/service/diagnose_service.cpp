@@ -5,6 +5,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
 #include "server/base/json_guard.h"
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/error_sources/cause_words.h"
 
@@ -55,7 +56,7 @@ Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
 
 }  // namespace
 
-Status diagnose_at_service(const DiagnoseArguments& arguments) {
+Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!arguments.model.empty() || !arguments.cell_out.empty()) {
     return failure(ErrorCode::kUsage, "--model and --cell-out are for files")
         .of(arguments.model.empty() ? "--cell-out" : "--model")
@@ -66,7 +67,8 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
     return failure(ErrorCode::kUsage, "a service diagnoses one batch, {} are named", arguments.batches.size())
         .of("--batch");
   const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
-  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}); !fine) return fine;
+  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}); !fine)
+    return tl::make_unexpected(fine.error());
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto session = open_session(arguments.service);
@@ -101,9 +103,10 @@ Status diagnose_at_service(const DiagnoseArguments& arguments) {
     return refused("the service has this page no more").in(arguments.report).of("--report");
   }
   const Status written = write_diagnosis(json, std::move(found->page_html), outputs, arguments);
-  if (!written) return written;
-  if (!arguments.apply || end->in_force) return {};
-  return refused("cell {}: {}", *cell, end->what);
+  if (!written) return tl::make_unexpected(written.error());
+  if (!arguments.apply || end->in_force) return true;
+  fmt::print(stderr, "not applied: cell {}: {}\n", *cell, shown_lines(end->what));
+  return false;
 }
 
 }  // namespace trammel::cli

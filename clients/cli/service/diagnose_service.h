@@ -29,7 +29,7 @@ void say(const std::string& text, const DiagnoseArguments& arguments);
                                      const DiagnoseArguments& arguments);
 
 /// Has a service diagnose one of its batches (`batches` names it; none: the newest) or a file, waits, and
-/// writes what it found. Refuses if the result was to be put in force and was not.
-[[nodiscard]] Status diagnose_at_service(const DiagnoseArguments& arguments);
+/// writes what it found. False where the result was to be put in force and was not, which it says on standard error.
+[[nodiscard]] Result<bool> diagnose_at_service(const DiagnoseArguments& arguments);
 
 }  // namespace trammel::cli

@@ -125,6 +125,16 @@ ordered_json points(const CorrectedProgram& program) {
   return all;
 }
 
+/// `drill.mod`, or `main.mod and 3 more`.
+std::string files_of(const CorrectedProgram& program) {
+  std::vector<std::string> files;
+  for (const ReceiptRow& row : program.rows) {
+    if (std::find(files.begin(), files.end(), row.file) == files.end()) files.push_back(row.file);
+  }
+  if (files.empty()) return "";
+  return files.size() == 1 ? files[0] : fmt::format("{} and {} more", files[0], files.size() - 1);
+}
+
 }  // namespace
 
 ToleranceVerdict tolerance_verdict(const CorrectedProgram& program, double tolerance_mm) {
@@ -152,14 +162,14 @@ std::string receipt_page(const CorrectedProgram& program, double tolerance_mm) {
   std::string more;
   if (program.rows.size() > kMostRows)
     more = fmt::format("<p>The first {} of {} targets; the CSV receipt has all.</p>", kMostRows, program.rows.size());
-  return fill_in(kReceiptPage,
-                 {{"page_css", std::string(page_style())},
-                  {"view3d_js", std::string(view3d_script())},
-                  {"subtitle", html_text(fmt::format("Cell {} · {}", program.model.cell, shown_day(unix_now())))},
-                  {"facts", facts(program, tolerance_mm)},
-                  {"targets", targets(program) + more},
-                  {"points", script_json(points(program))},
-                  {"tolerance", fmt::format("{}", tolerance_mm)}});
+  return fill_in(kReceiptPage, {{"page_css", std::string(page_style())},
+                                {"view3d_js", std::string(view3d_script())},
+                                {"subtitle", html_text(fmt::format("{} · cell {} · {}", files_of(program),
+                                                                   program.model.cell, shown_day(unix_now())))},
+                                {"facts", facts(program, tolerance_mm)},
+                                {"targets", targets(program) + more},
+                                {"points", script_json(points(program))},
+                                {"tolerance", fmt::format("{}", tolerance_mm)}});
 }
 
 }  // namespace trammel::cli

@@ -28,6 +28,7 @@ constexpr std::size_t kMostValueBytes = 65'536;  // of one value
 constexpr const char* kSaveAsUtf8 = "save it as UTF-8: \"CSV UTF-8\" in Excel";
 constexpr const char* kTwoCommas =
     "write decimal points, or separate values by ';' or tabs: a comma that does both may be read in two ways";
+constexpr const char* kThousands = "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
 
 std::string lower_case(std::string_view text) {
   std::string lower(text);
@@ -373,11 +374,13 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
         .beyond(std::copysign(std::numeric_limits<double>::infinity(), text.starts_with('-') ? -1 : 1), limit);
   }
   if (error != std::errc() || end != text.data() + text.size()) {
-    const bool comma = text.find(',') != std::string_view::npos;
+    const bool comma = text.find(',') != std::string_view::npos, point = text.find('.') != std::string_view::npos;
     return refuse(row, "{} is '{}', expected a number", columns_[column], shown_short(field(row, column)))
         .of(columns_[column])
         .with_text(shown_short(field(row, column)))
-        .next(comma ? kTwoCommas : "write it with digits alone: the unit stands in the column's name");
+        .next(comma && point ? kThousands
+              : comma        ? kTwoCommas
+                             : "write it with digits alone: the unit stands in the column's name");
   }
   if (!std::isfinite(value)) {
     return refuse(row, "{} is {}, expected a finite number", columns_[column], field(row, column))
