@@ -71,15 +71,20 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
   return said;
 }
 
-/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance.
+std::string why_not(const Extension& extension) {
+  return extension.gain.beyond_chance() ? to_string(*extension.day) : to_string(extension.gain);
+}
+
+/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance, and
+/// does not rise on blocks of time held out.
 Result<Extension> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                         const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
   if (!extension) return extension;
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
-  if (!extension->gain.beyond_chance()) {
-    return refused("cell {}: with what was found {}", cell->name, to_string(extension->gain))
+  if (!extension->worthwhile()) {
+    return refused("cell {}: with what was found {}", cell->name, why_not(*extension))
         .next("cell file and model were not written");
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
