@@ -590,6 +590,43 @@ TEST_F(CommandLine, ADiagnosisNamesTheGearAndExtendsTheCellByIt) {
   EXPECT_LT(evaluated.at("rms_mm").get<double>(), 0.04);
 }
 
+/// The shipped cell that may be measured in a small part of its ranges only.
+std::string narrow_cell(const test::TemporaryFolder& folder, const std::string& cell) {
+  std::string text = test::read_file(cell);
+  text = std::regex_replace(text, std::regex("joint_ranges_deg:.*"),
+                            "joint_ranges_deg: {q1: [-40, 40], q2: [-30, 30], q3: [-40, 30], q4: [-60, 60], "
+                            "q5: [-60, 60], q6: [-90, 90]}");
+  const std::string robot = std::filesystem::path(cell).parent_path() / "../models/abb_irb6640-205-275.yaml";
+  text = std::regex_replace(text, std::regex("robot: .*"), "robot: " + robot);
+  return folder.write("narrow.yaml", text);
+}
+
+TEST_F(CommandLine, WhatOneBatchLeavesOpenTheNextPosesDecide) {
+  std::string truth = test::read_file(kTruth);
+  truth.insert(truth.find("noise:"), "  encoder_eccentricity:3: {ecc_sin3_rad: 3.0e-4, ecc_cos3_rad: 3.0e-4}\n");
+  truth = folder_.write("eccentric.yaml", truth);
+  const auto simulated = [&](const std::string& plan, const std::string& seed, const std::string& batch) {
+    must({"simulate", "--cell", cell_, "--truth", truth, "--plan", plan, "--seed", seed, "-o", batch});
+    return batch;
+  };
+  must({"plan", "--cell", narrow_cell(folder_, cell_), "--count", "60", "-o", file("plan.csv")});
+  const std::string first = simulated(file("plan.csv"), "1", file("first.csv"));
+  must({"diagnose", "--cell", cell_, "--batch", first, "--json", file("first.json"), "--next-poses", file("next.csv")});
+  const json open = json::parse(test::read_file(file("first.json")));
+  ASSERT_EQ(open.at("verdict"), "ambiguous");
+  ASSERT_EQ(open.at("next_poses").size(), 10u);
+
+  must({"plan", "--cell", cell_, "--from", file("next.csv"), "-o", file("more.csv")});
+  EXPECT_EQ(CsvTable::parse(test::read_file(file("more.csv")), "more.csv").value().size(), 10u) << "all are taken";
+  const std::string second = simulated(file("more.csv"), "2", file("second.csv"));
+  must({"diagnose", "--cell", cell_, "--batch", first, "--batch", second, "--json", file("both.json")});
+  const json decided = json::parse(test::read_file(file("both.json")));
+  EXPECT_EQ(decided.at("verdict"), "named");
+  ASSERT_EQ(decided.at("findings").size(), 1u);
+  EXPECT_EQ(decided.at("findings").at(0).at("cause"), "encoder_eccentricity");
+  EXPECT_EQ(decided.at("findings").at(0).at("joint"), 3);
+}
+
 TEST_F(CommandLine, ADiagnosisThatNamesNothingExtendsNothing) {
   const Finished finished = trammel({"diagnose", "--cell", cell_, "--batch", measure("good", 80, 1), "--json",
                                      file("found.json"), "--apply", "--cell-out", file("out")});

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 #include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
@@ -142,6 +145,86 @@ TEST_F(Extend, BeginsWithTheNominalModelWhereTheCellListsNoSources) {
   const Extension extension = test::demand(extend(std::make_shared<const Cell>(nominal), batch_, diagnosis_, {}));
   EXPECT_TRUE(extension.before.parts().physics.sources.empty());
   EXPECT_EQ(extension.after.provenance().level, "base");
+}
+
+TEST_F(Extend, SaysWhatATrueCauseIsWorthOnAnotherDayWithAnInterval) {
+  diagnosis_.sources_after = {"base", kGear};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  ASSERT_TRUE(extension.day);
+  EXPECT_TRUE(extension.worthwhile());
+  EXPECT_EQ(extension.day->blocks, 5);
+  EXPECT_EQ(extension.day->gain.poses, 120);
+  const double by_random_rows = 1 - extension.gain.rms_after / extension.gain.rms_before;
+  EXPECT_NEAR(extension.day->share, by_random_rows, 0.05);
+  EXPECT_LT(extension.day->lower, extension.day->share);
+  EXPECT_GT(extension.day->upper, extension.day->share);
+  EXPECT_GT(extension.day->lower, 0.5);
+}
+
+/// The instrument drifts while it becomes warmer: growth of the arm goes with it in this batch, and on no other day.
+MeasurementBatch drifting_as_it_warms(MeasurementBatch batch) {
+  const auto rows = static_cast<double>(batch.measurements.size());
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    Measurement& m = batch.measurements[i];
+    const double share = static_cast<double>(i) / rows;
+    m.context.time = 3600 * share;
+    m.context.temperature = 20 + 5 * share;
+    m.p_W.z() += 1e-3 * share;
+  }
+  return batch;
+}
+
+TEST_F(Extend, ACauseThatFollowedTheClockOfThisBatchIsNotCarriedToAnotherDay) {
+  diagnosis_.sources_after = {"base", kGear, "thermal_growth"};
+  const Extension extension = test::demand(extend(cell_, drifting_as_it_warms(batch_), diagnosis_, {}));
+  EXPECT_EQ(extension.sources, (std::vector<std::string>{"base", kGear}));
+  ASSERT_EQ(extension.left_out.size(), 1U);
+  EXPECT_EQ(extension.left_out.front().source, "thermal_growth");
+  EXPECT_TRUE(extension.left_out.front().another_day) << "rows drawn at random speak for it";
+}
+
+TEST_F(Extend, IsNotWorthwhileWhereOnlyThisBatchGains) {
+  Cell known = *cell_;
+  known.model.error_sources = diagnosis_.sources_before = {"base", kGear};
+  diagnosis_.sources_after = {"base", kGear, "thermal_growth"};
+  const auto cell = std::make_shared<const Cell>(known);
+  Extension extension = test::demand(extend(cell, drifting_as_it_warms(batch_), diagnosis_, {}));
+  extension.gain.z_sum = 5;  // as rows drawn at random may say
+  extension.gain.rms_after = 0.9 * extension.gain.rms_before;
+  EXPECT_TRUE(extension.gain.beyond_chance());
+  ASSERT_TRUE(extension.day);
+  EXPECT_FALSE(extension.day->carries()) << to_string(*extension.day);
+  EXPECT_FALSE(extension.worthwhile());
+}
+
+TEST_F(Extend, WhatTheInstrumentDidIsNoGainOfAnotherDay) {
+  VirtualRobot robot{test::demand(make_physical_model(cell_, {"base", "tracker_moved@61"})), 20e-6, 60e-6, {}};
+  robot.truth.values(robot.truth.values.size() - 6) = 2e-3;
+  batch_ = test::with_held_out(test::demand(simulate(robot, test::demand(plan_poses(*cell_, {120, 1})), {})), 0.25, 1);
+  diagnosis_.sources_after = {"base", "tracker_moved@61"};
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_LT(extension.gain.rms_after, 0.1 * extension.gain.rms_before) << "in this batch it is all of the error";
+  ASSERT_TRUE(extension.day);
+  EXPECT_NEAR(extension.day->share, 0, 0.05) << to_string(*extension.day);
+}
+
+TEST(DayGain, IntervalHoldsTheTrueGainAsOftenAsItSays) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kRuns = 400;
+  int inside = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    Eigen::Matrix3Xd before(3, 200), after(3, 200);
+    for (Eigen::Index i = 0; i < before.size(); ++i) {
+      const double noise = normal(random);
+      after.data()[i] = noise;
+      before.data()[i] = noise + normal(random);
+    }
+    const DayGain day = day_gain(before, after);
+    const double truth = 1 - std::sqrt(0.5);
+    inside += day.lower <= truth && truth <= day.upper ? 1 : 0;
+  }
+  EXPECT_NEAR(inside / double{kRuns}, 0.94, 0.03);
 }
 
 TEST_F(Extend, IsRefusedWhereNothingWasNamed) {

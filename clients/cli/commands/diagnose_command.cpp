@@ -77,7 +77,12 @@ struct Applied {
   std::string why_not = {};
 };
 
-/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance.
+std::string why_not_worthwhile(const Extension& extension) {
+  return extension.gain.beyond_chance() ? to_string(*extension.day) : to_string(extension.gain);
+}
+
+/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance, and
+/// does not rise on blocks of time held out.
 Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                       const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
@@ -85,8 +90,8 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
   if (!extension) return tl::make_unexpected(extension.error());
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
-  if (!extension->gain.beyond_chance()) {
-    return Applied{{}, fmt::format("cell {}: with what was found {}", cell->name, to_string(extension->gain))};
+  if (!extension->worthwhile()) {
+    return Applied{{}, fmt::format("cell {}: with what was found {}", cell->name, why_not_worthwhile(*extension))};
   }
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());

@@ -260,16 +260,33 @@ std::string extension_text(const Extension& extension) {
          fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error, mm", "rms", "mean", "99.7 %", "max") +
          extended_line("before", extension.before) + extended_line("extended", extension.after) +
          fmt::format("  {}\n", to_string(extension.gain)) +
+         fmt::format("  {}\n",
+                     extension.day ? to_string(*extension.day) : "too few poses to say what another day gains by it") +
          (extension.left_out.empty() ? "" : fmt::format("  {}\n", to_string(extension.left_out)));
 }
+
+namespace {
+
+ordered_json another_day_json(const std::optional<DayGain>& day) {
+  if (!day) return nullptr;
+  return {{"blocks", day->blocks},
+          {"poses", day->gain.poses},
+          {"before_rms_mm", to_mm(day->gain.rms_before)},
+          {"after_rms_mm", to_mm(day->gain.rms_after)},
+          {"gain", day->share},
+          {"gain_95", {day->lower, day->upper}}};
+}
+
+}  // namespace
 
 ordered_json extension_json(const Extension& extension) {
   ordered_json left_out = ordered_json::array();
   for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
-  return {{"better", extension.gain.beyond_chance()},
+  return {{"better", extension.worthwhile()},
           {"z", extension.gain.z()},
           {"z_limit", PairedGain::kBeyondChance},
           {"judged_without", extension.gain.left_out},
+          {"another_day", another_day_json(extension.day)},
           {"error_sources", extension.sources},
           {"left_out", std::move(left_out)},
           {"of_the_cell", extension.lasting},

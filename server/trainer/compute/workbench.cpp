@@ -252,12 +252,20 @@ Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<st
   };
   auto extended = extended_model(task_.cell, own, batch, diagnosis, options);
   if (!extended) return tl::make_unexpected(extended.error());
+  if (extended->day && !extended->day->carries()) {
+    Made made;
+    made.outcome.verdict = JobVerdict::kNothingApplied;
+    made.outcome.why = to_string(*extended->day);
+    made.message = "nothing applied: " + made.outcome.why;
+    return made;
+  }
   auto found = batches_.sessions_of_diagnosis();
   if (!found) return tl::make_unexpected(found.error());
   MeasurementBatch& own_judges = found->sessions[found->own].judges;
   Judges judges = judges_of(diagnosis, std::move(own_judges));
   own_judges = std::move(judges.batch);
-  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)});
+  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)}) +
+                              (extended->day ? joined_by_semicolons({to_string(*extended->day)}) : "");
   return made(std::move(extended->model), remarks, std::move(found->sessions));
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "server/error_sources/catalogue.h"
 #include "server/trainer/pipeline/lasting_sources.h"
 
 namespace trammel {
@@ -30,6 +31,47 @@ Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const 
                                  const std::vector<std::string>& sources, TrainOptions options) {
   options.level = level_of(sources);
   return train(cell, batch, options);
+}
+
+std::vector<std::string> joined(std::vector<std::string> own, const std::vector<std::string>& found) {
+  own.insert(own.end(), found.begin(), found.end());
+  return own;
+}
+
+std::set<int> suspected_rows(const Diagnosis& diagnosis) {
+  std::set<int> rows;
+  for (const SuspectedPose& pose : diagnosis.suspects) rows.insert(pose.row);
+  return rows;
+}
+
+/// Where the base stands is found anew on another day.
+bool is_of_the_base(const std::string& source) {
+  const CauseRecord* cause = find_cause(source);
+  return cause != nullptr && cause->part == causes::Part::kBase;
+}
+
+/// Leaves out of `supported` what another day does as well without, and says what the rest is worth on it. Causes that
+/// go with the batch anyway, and the base, are not asked.
+std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
+                             const CheckedBatch& batch, const Diagnosis& diagnosis, Supported& supported) {
+  if (std::all_of(supported.sources.begin(), supported.sources.end(), is_of_the_base)) return std::nullopt;
+  const auto day = AnotherDay::make(cell, batch.rows(), joined(own, supported.sources), suspected_rows(diagnosis));
+  if (!day) return std::nullopt;
+  auto carried = supported_by(
+      {supported.sources,
+       [&](const std::vector<std::string>& some) { return day->left_by(joined(own, some)); },
+       [](const std::string& source) { return !is_of_the_base(source) && !lasting_sources({source}).empty(); },
+       {}});
+  if (!carried) return std::nullopt;
+  for (Unsupported& one : carried->left_out) one.another_day = true;
+  supported.sources = carried->sources;
+  supported.left_out.insert(supported.left_out.end(), carried->left_out.begin(), carried->left_out.end());
+  const auto before = day->left_by(own);
+  const auto after = day->left_by(joined(own, supported.sources));
+  if (!before || !after) return std::nullopt;
+  DayGain gain = day_gain(*before, *after);
+  gain.blocks = day->blocks();
+  return gain;
 }
 
 }  // namespace
@@ -67,11 +109,11 @@ Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, co
         return !options.progress || options.progress("asking of each cause what it is worth", kSupportShare * share);
       });
   if (!supported) return tl::make_unexpected(supported.error());
-  std::vector<std::string> sources = own;
-  sources.insert(sources.end(), supported->sources.begin(), supported->sources.end());
+  std::optional<DayGain> day = carry(cell, own, batch, diagnosis, *supported);
+  std::vector<std::string> sources = joined(own, supported->sources);
   auto model = trained(cell, batch, sources, as_part(options, kSupportShare, 1));
   if (!model) return tl::make_unexpected(model.error());
-  return ExtendedModel{std::move(*model), std::move(sources), std::move(supported->left_out)};
+  return ExtendedModel{std::move(*model), std::move(sources), std::move(supported->left_out), std::move(day)};
 }
 
 Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
@@ -102,8 +144,8 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedB
   PairedGain gain = paired_gain(*before, after->model, judges.batch);
   gain.left_out = std::move(judges.left_out);
   std::vector<std::string> lasting = lasting_sources(after->sources);
-  return Extension{std::move(after->sources), std::move(lasting), std::move(*before), std::move(after->model), gain,
-                   std::move(after->left_out)};
+  return Extension{std::move(after->sources),  std::move(lasting),   std::move(*before), std::move(after->model), gain,
+                   std::move(after->left_out), std::move(after->day)};
 }
 
 Error with_rows_set_aside(Error error, const CheckedBatch& batch) {

@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnosis.h"
+#include "server/trainer/pipeline/another_day.h"
 #include "server/trainer/pipeline/supported.h"
 #include "server/trainer/pipeline/train.h"
 
@@ -24,10 +26,11 @@ struct ExtendedModel {
   CompensatedModel model;
   std::vector<std::string> sources;   ///< all that it was trained with
   std::vector<Unsupported> left_out;  ///< found, but the poses held out do as well without
+  std::optional<DayGain> day;         ///< what the causes are worth on another day; empty: too few rows to tell
 };
 /// Trains on the training rows of `batch` with the sources in `own` and with those of the diagnosis that the rows held
-/// out speak for, cause by cause. `diagnosis` is of `batch` and `own`. Refuses a batch without rows held out, and what
-/// check_can_extend(), supported_by() and train() refuse.
+/// out speak for, cause by cause, first drawn at random, then in blocks of time. `diagnosis` is of `batch` and `own`.
+/// Refuses a batch without rows held out, and what check_can_extend(), supported_by() and train() refuse.
 [[nodiscard]] Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell,
                                                    const std::vector<std::string>& own, const CheckedBatch& batch,
                                                    const Diagnosis& diagnosis, const TrainOptions& options);
@@ -48,6 +51,10 @@ struct Extension {
   CompensatedModel before, after;     ///< both with figures on the same poses held out
   PairedGain gain;                    ///< of the one over the other
   std::vector<Unsupported> left_out;  ///< found, but the poses held out do as well without
+  std::optional<DayGain> day;         ///< what the causes are worth on another day; empty: too few rows to tell
+
+  /// Better beyond chance on the rows held out, and no worse where blocks of time were.
+  [[nodiscard]] bool worthwhile() const { return gain.beyond_chance() && (!day || day->carries()); }
 };
 /// extended_model() of the cell's own sources, beside a model of them alone. Refusals as there.
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,

@@ -36,9 +36,16 @@ std::vector<std::string> joined(std::vector<std::string> own, const std::vector<
 Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
                                const std::vector<std::string>& found, const MeasurementBatch& train,
                                const MeasurementBatch& judges, const std::function<bool(double share)>& progress) {
-  Supported supported{found, {}};
   const MeasurementBatch merged = merge_repeats(train, cell->tracker.sigma).batch;
-  auto with = left_by(cell, joined(own, found), merged, judges);
+  return supported_by(
+      {found, [&](const std::vector<std::string>& some) { return left_by(cell, joined(own, some), merged, judges); },
+       [](const std::string&) { return true; }, progress});
+}
+
+Result<Supported> supported_by(const SupportQuestion& question) {
+  const std::vector<std::string>& found = question.found;
+  Supported supported{found, {}};
+  auto with = question.left_by(found);
   if (!with) return tl::make_unexpected(with.error());
   while (supported.sources.size() > 1) {
     const auto asked = static_cast<double>(supported.left_out.size());
@@ -47,10 +54,12 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
     Eigen::Matrix3Xd left;
     for (std::size_t k = 0; k < supported.sources.size(); ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(supported.sources.size());
-      if (progress && !progress((asked + share) / static_cast<double>(found.size()))) return given_up();
+      if (question.progress && !question.progress((asked + share) / static_cast<double>(found.size())))
+        return given_up();
+      if (!question.may_be_dropped(supported.sources[k])) continue;
       std::vector<std::string> others = supported.sources;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      const auto without = left_by(cell, joined(own, others), merged, judges);
+      const auto without = question.left_by(others);
       if (!without) continue;  // the rest cannot do without it
       // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at which it does
       // nothing.
@@ -71,8 +80,9 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
 std::string to_string(const std::vector<Unsupported>& left_out) {
   std::vector<std::string> sentences;
   for (const Unsupported& one : left_out) {
-    sentences.push_back(fmt::format("{} is left out: the poses held out do as well without it (z {:.2f})",
-                                    in_words(one.source), one.z));
+    sentences.push_back(fmt::format("{} is left out: {} do as well without it (z {:.2f})", in_words(one.source),
+                                    one.another_day ? "poses held out in blocks of time" : "the poses held out",
+                                    one.z));
   }
   return fmt::format("{}", fmt::join(sentences, "; "));
 }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "server/base/result.h"
 #include "server/measurement/measurement.h"
 #include "server/robot/cell.h"
 
@@ -16,6 +18,7 @@ struct Unsupported {
   /// sum(d) / sqrt(sum(d²)), d the difference of a pose's squared errors without and with it (Efron, Student's t-test
   /// under symmetry conditions, JASA 64, 1969): not above 0.
   double z = 0;
+  bool another_day = false;  ///< it is rows held out in blocks of time that do without it
 };
 
 struct Supported {
@@ -32,6 +35,16 @@ struct Supported {
                                              const std::vector<std::string>& own, const std::vector<std::string>& found,
                                              const MeasurementBatch& train, const MeasurementBatch& judges,
                                              const std::function<bool(double share)>& progress);
+
+/// Asked of `found`: what all but one of them leave of the same poses.
+struct SupportQuestion {
+  std::vector<std::string> found;
+  std::function<Result<Eigen::Matrix3Xd>(const std::vector<std::string>& some)> left_by;  ///< 3 x N, m
+  std::function<bool(const std::string& source)> may_be_dropped;
+  std::function<bool(double share)> progress;  ///< false gives up
+};
+/// The same of any poses. Refuses what left_by refuses of all of them.
+[[nodiscard]] Result<Supported> supported_by(const SupportQuestion& question);
 
 /// `encoder_eccentricity:6 is left out: the poses held out do as well without it (z -0.40)`; empty for none.
 [[nodiscard]] std::string to_string(const std::vector<Unsupported>& left_out);
