@@ -64,6 +64,7 @@ TEST(Wording, SaysWithWhatTheRestChanges) {
   EXPECT_EQ(circumstances_in_words({"q2"}), "the position of joint 2");
   EXPECT_EQ(circumstances_in_words({"q2", "q3", "time"}), "the positions of joints 2 and 3, and time");
   EXPECT_EQ(circumstances_in_words({"q5", "dir5"}), "the position of joint 5 and the side of approach of joint 5");
+  EXPECT_EQ(circumstances_in_words({"dir1", "dir5"}), "the sides of approach of joints 1 and 5");
   EXPECT_EQ(circumstances_in_words({"torque", "temperature"}), "the torque and the temperature");
   Diagnosis unknown = with({});
   unknown.unexplained = {true, {"q2", "q3"}, 36e-6, 1e-6};

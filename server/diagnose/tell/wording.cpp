@@ -201,12 +201,12 @@ std::string circumstances_in_words(const std::vector<std::string>& on) {
       others.push_back(one == "time" ? one : "the " + one);
     }
   }
-  const auto of_joints = [](const char* what, const std::vector<std::string>& numbers) {
-    return numbers.size() > 1 ? fmt::format("the {}s of joints {}", what, listed(numbers))
-                              : fmt::format("the {} of joint {}", what, numbers.front());
+  const auto of_joints = [](const char* one, const char* several, const std::vector<std::string>& numbers) {
+    return numbers.size() > 1 ? fmt::format("the {} of joints {}", several, listed(numbers))
+                              : fmt::format("the {} of joint {}", one, numbers.front());
   };
-  if (!sides.empty()) others.insert(others.begin(), of_joints("side of approach", sides));
-  if (!joints.empty()) others.insert(others.begin(), of_joints("position", joints));
+  if (!sides.empty()) others.insert(others.begin(), of_joints("side of approach", "sides of approach", sides));
+  if (!joints.empty()) others.insert(others.begin(), of_joints("position", "positions", joints));
   return others.size() == 2 && joints.size() > 1 ? others[0] + ", and " + others[1] : listed(others);
 }
 
