@@ -201,6 +201,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   tell_verdict(diagnosis);
   tell_row_mistakes(explained, prepared->sorted ? batch.rows() : MeasurementBatch(), diagnosis);
   tell_sources(found, prepared->sorted, diagnosis);
+  tell_largest_first(diagnosis);
 
   std::vector<Step> steps;
   steps.push_back({"asking what could not have been seen", 0.72, [&] {

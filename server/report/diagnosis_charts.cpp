@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "server/base/units.h"
 
@@ -16,7 +17,10 @@ constexpr double kLeastLever = 0.2;        // of a joint's longest: shorter ones
 constexpr double kScaleQuantile = 0.98;    // of the errors before: the colour scale's end, so that one outlier does
                                            // not make all the others look alike
 
+constexpr int kPhaseStep = 5;  // degrees
+
 double to_um(double m) { return m * 1e6; }
+double to_urad(double rad) { return rad * 1e6; }
 double rounded(double value, double step) { return std::round(value / step) * step; }
 double tenth_of_um(double m) { return rounded(to_um(m), 0.1); }
 
@@ -42,6 +46,7 @@ class Arm {
   struct Levers {
     std::vector<Eigen::Index> poses;
     std::vector<Vector3> unit_B;
+    std::vector<double> length;  ///< m/rad (m/m)
   };
   [[nodiscard]] Levers levers(int joint) const {
     std::vector<Vector3> all;
@@ -56,6 +61,7 @@ class Arm {
       if (!(lever.norm() > kLeastLever * longest)) continue;
       kept.poses.push_back(i);
       kept.unit_B.push_back(lever.normalized());
+      kept.length.push_back(lever.norm());
     }
     return kept;
   }
@@ -114,26 +120,55 @@ ordered_json periodogram(const Periodogram& all, const std::vector<Finding>& fin
           {"limit", all.limit}};
 }
 
-/// Residual along the joint's motion against the phase of the gear's error.
-ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, double order) {
-  ordered_json phase = ordered_json::array(), before = ordered_json::array(), after = ordered_json::array();
+/// A gear's oscillation as it was found.
+struct Wave {
+  double order = 0, sine = 0, cosine = 0;  ///< cycles a turn; rad
+  /// rad, at `angle` of the oscillation itself
+  [[nodiscard]] double at(double angle) const { return sine * std::sin(angle) + cosine * std::cos(angle); }
+};
+
+std::optional<Wave> wave_of(const Finding& finding) {
+  if (!finding.cause.order || finding.cause.joint < 0) return std::nullopt;
+  std::optional<double> sine, cosine;
+  for (const Estimate& estimate : finding.parameters) {
+    if (estimate.name.starts_with("gear_sin")) sine = estimate.value;
+    if (estimate.name.starts_with("gear_cos")) cosine = estimate.value;
+  }
+  if (!sine || !cosine) return std::nullopt;
+  return Wave{*finding.cause.order, *sine, *cosine};
+}
+
+/// The oscillation over one cycle, for a line.
+ordered_json cycle_of(const Wave& wave) {
+  ordered_json phase = ordered_json::array(), urad = ordered_json::array();
+  for (int degrees = 0; degrees <= 360; degrees += kPhaseStep) {
+    phase.push_back(degrees);
+    urad.push_back(rounded(to_urad(wave.at(from_deg(degrees))), 0.1));
+  }
+  return {{"phase_deg", phase}, {"urad", urad}};
+}
+
+/// The joint's error against the phase of its gear's oscillation: with that alone, all that is left besides with it,
+/// and without it.
+ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, const Wave& wave) {
+  ordered_json phase = ordered_json::array(), alone = ordered_json::array(), after = ordered_json::array();
   const Arm::Levers levers = arm.levers(joint);
   for (std::size_t k = 0; k < levers.poses.size(); ++k) {
     const Eigen::Index i = levers.poses[k];
-    const double turns = order * arm.context(i).q(joint) / (2 * kPi);
-    phase.push_back(rounded(360 * (turns - std::floor(turns)), 0.1));
-    before.push_back(tenth_of_um(levers.unit_B[k].dot(diagnosis.residual_before_B.col(i))));
-    after.push_back(tenth_of_um(levers.unit_B[k].dot(diagnosis.residual_after_B.col(i))));
+    const double angle = wave.order * arm.context(i).q(joint);
+    const double left = levers.unit_B[k].dot(diagnosis.residual_after_B.col(i)) / levers.length[k];
+    phase.push_back(rounded(to_deg(angle - 2 * kPi * std::floor(angle / (2 * kPi))), 0.1));
+    alone.push_back(rounded(to_urad(left + wave.at(angle)), 0.1));
+    after.push_back(rounded(to_urad(left), 0.1));
   }
-  return {{"joint", joint + 1}, {"order", order}, {"phase_deg", phase}, {"before_um", before}, {"after_um", after}};
+  return {{"joint", joint + 1},  {"order", wave.order}, {"phase_deg", phase},
+          {"alone_urad", alone}, {"after_urad", after}, {"cycle", cycle_of(wave)}};
 }
 
 ordered_json folds(const Diagnosis& diagnosis, const Arm& arm) {
   ordered_json list = ordered_json::array();
   for (const Finding& finding : diagnosis.findings) {
-    if (finding.cause.order && finding.cause.joint >= 0) {
-      list.push_back(fold(diagnosis, arm, finding.cause.joint, *finding.cause.order));
-    }
+    if (const auto wave = wave_of(finding)) list.push_back(fold(diagnosis, arm, finding.cause.joint, *wave));
   }
   return list;
 }

@@ -62,7 +62,6 @@ ordered_json finding_json(const Finding& finding) {
   json["held_out_gain_mm"] = to_mm(finding.held_out_gain);
   json["strength"] = finding.strength;
   json["p_value"] = finding.p_value;
-  json["naming_frequency"] = finding.naming_frequency;
   json["could_also_be"] = causes_json(finding.could_also_be);
   json["whole"] = finding.whole;
   json["action"] = finding.action;

@@ -77,7 +77,7 @@ std::string beginning_of(const Finding& finding) {
 
 /// What else it could be, for people.
 std::string others_of(const Finding& finding) {
-  return finding.whole ? all_in_words(finding.could_also_be) : "more than this: the best known shape, not the whole";
+  return finding.whole ? all_in_words(finding.could_also_be) : "part of it only: more than noise is left";
 }
 
 HtmlRow finding_row(const Finding& finding) {
@@ -87,18 +87,13 @@ HtmlRow finding_row(const Finding& finding) {
                 estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
                 millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
                 fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
-                others.empty() ? "nothing" : "<span class=\"doubt\">" + html_text(others) + "</span>"},
+                others.empty() ? "no other known cause" : "<span class=\"doubt\">" + html_text(others) + "</span>"},
       .kind = "found"};
 }
 
-/// What to do about it, below its figures. How often repetitions name it says something only where nothing else is in
-/// question.
+/// What to do about it, below its figures.
 HtmlRow action_row(const Finding& finding) {
-  const std::string named =
-      finding.could_also_be.empty()
-          ? fmt::format(" Named by {:.0f}\u00a0% of the simulated repetitions.", 100 * finding.naming_frequency)
-          : "";
-  return {.cells = {"", "", html_text(as_sentence(finding.action) + beginning_of(finding)) + named},
+  return {.cells = {"", "", html_text(as_sentence(finding.action) + beginning_of(finding))},
           .kind = "action",
           .last_spans = 6};
 }
@@ -128,7 +123,9 @@ std::string tiles(const Diagnosis& diagnosis) {
   return tile("before", fmt::format("{:.4f} mm", to_mm(before.rms)), before_name) +
          tile("after", fmt::format("{:.4f} mm", to_mm(after.rms)), "with what was found") +
          tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)),
-              noise_name(diagnosis.noise, diagnosis.instrument).c_str());
+              html_text("noise, rms: what is left of a position when all that was found is corrected (" +
+                        diagnosis.noise_from + ")")
+                  .c_str());
 }
 
 HtmlRow figures_row(const char* name, const ErrorFigures& figures) {
@@ -153,9 +150,8 @@ std::string figures_table(const Diagnosis& diagnosis) {
 std::string unexplained_text(const Diagnosis& diagnosis) {
   const Unexplained& left = diagnosis.unexplained;
   if (!left.present) return "";
-  const std::string on =
-      left.depends_on.empty() ? "nothing known" : fmt::format("{}", fmt::join(left.depends_on, ", "));
-  return fmt::format("<p class=\"left\">Unexplained: {} rms that depend on {} (p{}). No known cause fits.</p>\n",
+  const std::string on = left.depends_on.empty() ? "no joint, torque or time" : circumstances_in_words(left.depends_on);
+  return fmt::format("<p class=\"left\">Unexplained: {} rms. It changes with {} (p{}). No known cause fits.</p>\n",
                      micrometres(left.rms), html_text(on), p_value_after_p(left.p_value));
 }
 
@@ -172,11 +168,12 @@ std::string leftover_text(const Diagnosis& diagnosis) {
 }
 
 std::string not_separable_text(const Diagnosis& diagnosis) {
-  if (diagnosis.not_separable.empty()) return "<p>These poses tell all causes that were looked for apart.</p>\n";
   std::vector<HtmlRow> rows;
   for (const Inseparable& group : diagnosis.not_separable) {
+    if (is_never_shown(diagnosis, group.causes.front())) continue;
     rows.push_back({{html_text(all_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
   }
+  if (rows.empty()) return "<p>These poses tell all causes apart that they show.</p>\n";
   return table({"confusion", {"look the same at these poses", "canonical correlation"}, rows});
 }
 
@@ -270,9 +267,9 @@ std::string smallest_table(std::vector<Unseen> unseen) {
                    [](const Unseen& a, const Unseen& b) { return *a.detectable > *b.detectable; });
   std::vector<HtmlRow> rows;
   std::transform(unseen.begin(), unseen.end(), std::back_inserter(rows), smallest_row);
-  return "<h3>Would have shown from this size on</h3>\n<div class=\"tall\">" +
+  return "<div class=\"screen\"><h3>Would have shown from this size on</h3>\n<div class=\"tall\">" +
          table({"unseen", {"cause", "joint", "noticed, µm rms", "named, µm rms", "its own share", "it needs"}, rows}) +
-         "</div>\n";
+         "</div></div>\n";
 }
 
 std::string unseen_text(const Diagnosis& diagnosis) {
@@ -302,8 +299,6 @@ std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
   add("batch", diagnosis.batch.id);
   add("batch hash (SHA-256)", diagnosis.batch_hash);
   add("poses", fmt::format("{} used, {} listed above", diagnosis.poses, diagnosis.suspects.size()));
-  add(noise_name(diagnosis.noise, diagnosis.instrument) + ", per axis",
-      fmt::format("{} ({})", micrometres(diagnosis.noise), diagnosis.noise_from));
   add("error sources before", causes_in_words(diagnosis.sources_before));
   add("error sources after", causes_in_words(diagnosis.sources_after));
   add("made by", fmt::format("trammel {}, seed {}", kProgramVersion, diagnosis.seed));

@@ -72,7 +72,10 @@ inline std::vector<Finding> made_up_findings(const Diagnosis& diagnosis) {
   Finding gear;
   gear.cause = {"gear_transmission", 2, "", "", kGearOrder};
   gear.source = "gear_transmission:3@48.5";
-  gear.parameters = {{"order", "cycles a turn", 48.503, 0.04}, {"amplitude", "arcsec", 10.31, 0.52}};
+  gear.parameters = {{"order", "cycles a turn", 48.503, 0.04},
+                     {"amplitude", "arcsec", 10.31, 0.52},
+                     {"gear_sin3", "rad", 5e-5 * std::cos(0.4), 2e-6},
+                     {"gear_cos3", "rad", 5e-5 * std::sin(0.4), 2e-6}};
   gear.effect_rms = 58e-6;
   gear.held_out_before = diagnosis.before;
   gear.held_out_after = diagnosis.after;

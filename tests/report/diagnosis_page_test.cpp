@@ -45,6 +45,11 @@ TEST_F(DiagnosisPage, CallsErrorSourcesByTheirPlainNames) {
   EXPECT_FALSE(has(page, "gear_transmission"));
 }
 
+TEST_F(DiagnosisPage, DoesNotSayHowOftenRepetitionsNameACause) {
+  EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "repetitions"));
+  EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "naming_frequency"));
+}
+
 TEST_F(DiagnosisPage, SpeaksOfOneKindOfIntervalOnly) {
   EXPECT_FALSE(has(diagnosis_page(diagnosis_, *cell_), "half its 95 % interval"));
 }
@@ -58,15 +63,22 @@ TEST_F(DiagnosisPage, OpensWithoutANetworkAndKeepsNamesFromFilesText) {
   EXPECT_TRUE(has(page, "made-up &lt;1&gt;"));
 }
 
-TEST_F(DiagnosisPage, FoldsAGearsResidualIntoOneOscillation) {
+TEST_F(DiagnosisPage, FoldsAGearsOscillationWithoutAnyOtherCause) {
+  diagnosis_.residual_before_B.array() += 1e-3;  // another cause, far larger
   const auto fold = diagnosis_charts(diagnosis_, *cell_).at("folds").at(0);
-  double rising = 0, falling = 0;  // means of the two halves of a cycle
+  ASSERT_GT(fold.at("phase_deg").size(), 50u);
   for (std::size_t i = 0; i < fold.at("phase_deg").size(); ++i) {
-    const double phase = fold.at("phase_deg")[i].get<double>() + to_deg(0.4);
-    (std::fmod(phase, 360.0) < 180 ? rising : falling) += fold.at("before_um")[i].get<double>();
+    const double wave = 50 * std::sin(from_deg(fold.at("phase_deg")[i].get<double>()) + 0.4);
+    const double noise = fold.at("after_urad")[i].get<double>();
+    EXPECT_NEAR(fold.at("alone_urad")[i].get<double>() - noise, wave, 0.5);
+    EXPECT_LT(std::abs(noise), 5 * 13 / 0.3) << "13 um at the end of a lever of 0.3 m or more";
   }
-  EXPECT_GT(rising, 1000);
-  EXPECT_LT(falling, -1000);
+  EXPECT_NEAR(fold.at("cycle").at("urad")[0].get<double>(), 50 * std::sin(0.4), 0.1);
+}
+
+TEST_F(DiagnosisPage, IsThreePagesOnPaperAtMost) {
+  if (!test::has_browser()) GTEST_SKIP() << test::kBrowser << " is not installed";
+  EXPECT_LE(test::pages_on_paper(diagnosis_page(diagnosis_, *cell_)), 3);
 }
 
 TEST_F(DiagnosisPage, ThinsAPeriodogramWithoutLosingItsPeak) {
@@ -107,18 +119,18 @@ TEST_F(DiagnosisPage, DoesNotCallUnseenWhatWasLookedForByTheOrderOfThePoses) {
   EXPECT_TRUE(has(page, "Would not have been named for certain"));
 }
 
-TEST_F(DiagnosisPage, CallsNoNoiseWhatIsBeyondTheInstrument) {
-  diagnosis_.instrument = 11e-6;
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>noise of one measurement</span>"));
-  diagnosis_.instrument = 2e-6;
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "<span>what stays unexplained of a pose</span>"));
+TEST_F(DiagnosisPage, SaysOneFigureOfNoiseAndWhatItIs) {
+  const std::string page = diagnosis_page(diagnosis_, *cell_);
+  EXPECT_TRUE(has(page, "<b>0.0225 mm</b><span>noise, rms: what is left of a position when all that was found"));
+  EXPECT_FALSE(has(page, "per axis")) << "one figure";
 }
 
 TEST_F(DiagnosisPage, AChanceThatIsSmallerThanAnythingKnownIsNoEquality) {
   diagnosis_.unexplained = {true, {"q4"}, 5e-5, 1e-6, ""};
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms that depend on q4 (p &lt;\u00a010⁻⁶)."));
+  EXPECT_TRUE(
+      has(diagnosis_page(diagnosis_, *cell_), "rms. It changes with the position of joint 4 (p &lt;\u00a010⁻⁶)."));
   diagnosis_.unexplained.p_value = 0.02;
-  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms that depend on q4 (p = 0.02)."));
+  EXPECT_TRUE(has(diagnosis_page(diagnosis_, *cell_), "rms. It changes with the position of joint 4 (p = 0.02)."));
 }
 
 TEST_F(DiagnosisPage, DrawsOnlyWhatWasRecorded) {

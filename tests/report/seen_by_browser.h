@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <sstream>
 #include <string>
@@ -58,6 +60,21 @@ inline std::map<std::string, int> seen_by_browser(std::string page, int width) {
   std::string name;
   for (int number = 0; text >> name >> number;) seen[name] = number;
   return seen;
+}
+
+/// Sheets of paper that the page takes.
+inline int pages_on_paper(const std::string& page) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("page.html", page), pdf = folder.file("page.pdf");
+  const Finished browser =
+      run({kBrowser, "--headless", "--no-sandbox", "--disable-gpu", "--user-data-dir=" + folder.file("profile"),
+           "--print-to-pdf=" + pdf, "file://" + file});
+  std::ifstream in(pdf, std::ios::binary);
+  const std::string all{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_FALSE(all.empty()) << browser.err;
+  int pages = 0;
+  for (auto at = all.find("/Type /Page\n"); at != std::string::npos; at = all.find("/Type /Page\n", at + 1)) ++pages;
+  return pages;
 }
 
 }  // namespace trammel::test

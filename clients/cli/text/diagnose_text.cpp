@@ -1,5 +1,8 @@
 #include "clients/cli/text/diagnose_text.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "server/base/units.h"
 #include "server/diagnose/diagnosis.h"
 #include "server/diagnose/tell/wording.h"
@@ -30,12 +33,6 @@ std::string cause_text(const ordered_json& cause) { return in_words(cause_of(cau
 std::string causes_text(const ordered_json& causes) {
   std::string text;
   for (const ordered_json& cause : causes) text += (text.empty() ? "" : ", ") + cause_text(cause);
-  return text;
-}
-
-std::string words_text(const ordered_json& words, const char* between) {
-  std::string text;
-  for (const ordered_json& word : words) text += (text.empty() ? "" : between) + word.get<std::string>();
   return text;
 }
 
@@ -81,7 +78,7 @@ std::string finding_lines(const ordered_json& finding, std::size_t width) {
     text += beginning_line(finding.at("may_begin_at"));
   }
   if (!finding.value("whole", true)) {
-    text += "      the best known shape of it, not the whole: more than noise is left\n";
+    text += "      explains part of it only: more than noise is left\n";
   } else if (!finding.at("could_also_be").empty()) {
     text += fmt::format("      could also be: {}\n", causes_text(finding.at("could_also_be")));
   }
@@ -125,9 +122,10 @@ std::string figures_table(const ordered_json& diagnosis) {
 
 std::string unexplained_text(const ordered_json& unexplained) {
   if (!unexplained.at("present").get<bool>()) return "";
-  const auto& on = unexplained.at("depends_on");
-  return fmt::format("\nUnexplained: {} rms that depend on {} (p {})\n", micrometres(unexplained.at("rms_mm")),
-                     on.empty() ? "nothing known" : words_text(on, ", "), p_text(unexplained.at("p_value")));
+  const auto on = unexplained.at("depends_on").get<std::vector<std::string>>();
+  return fmt::format("\nUnexplained: {} rms. It changes with {} (p {}).\n", micrometres(unexplained.at("rms_mm")),
+                     on.empty() ? "no joint, torque or time" : circumstances_in_words(on),
+                     p_text(unexplained.at("p_value")));
 }
 
 std::string suspects_text(const ordered_json& suspects) {
@@ -183,10 +181,19 @@ std::string need_of(const ordered_json& unseen, const std::string& name) {
   return "";
 }
 
+/// Whether nothing at all of the cause shows, which is said elsewhere.
+bool is_never_shown(const ordered_json& unseen, const std::string& name) {
+  return std::any_of(unseen.begin(), unseen.end(), [&](const ordered_json& one) {
+    const std::string joint = one.at("joint").is_null() ? "" : fmt::format(":{}", one.at("joint").get<int>());
+    return one.at("smallest_mm").is_null() && one.at("cause").get<std::string>() + joint == name;
+  });
+}
+
 /// A line a cause: all that looks like it, and what it needs.
 std::string not_separable_lines(const ordered_json& diagnosis) {
   std::vector<Saying> sayings;
   for (const ordered_json& group : diagnosis.at("not_separable")) {
+    if (is_never_shown(diagnosis.at("could_not_have_seen"), group.front())) continue;
     std::vector<std::string> others;
     for (std::size_t k = 1; k < group.size(); ++k) others.push_back(in_words(group[k].get<std::string>()));
     say(sayings, group.front(), fmt::format("{}", fmt::join(others, ", ")), ", ");
@@ -222,6 +229,14 @@ std::string next_poses_text(const ordered_json& diagnosis) {
   return text;
 }
 
+/// What is left of a pose, as one length: it stands beside the other errors.
+std::string noise_line(const ordered_json& diagnosis) {
+  const double noise = diagnosis.at("noise_mm"), root = std::sqrt(3.0);
+  return fmt::format("{} poses. Noise: {} rms, what is left of a position when all that was found is corrected ({}).\n",
+                     diagnosis.at("poses").get<int>(), micrometres(root * noise),
+                     diagnosis.at("noise_from").get<std::string>());
+}
+
 std::string extended_line(const char* name, const CompensatedModel& model) {
   return figures_line(name, figures_json(model.parts().validation->compensated));
 }
@@ -229,12 +244,9 @@ std::string extended_line(const char* name, const CompensatedModel& model) {
 }  // namespace
 
 std::string diagnosis_text(const ordered_json& diagnosis) {
-  const double noise = diagnosis.at("noise_mm");
-  return fmt::format("{}: {}\n{} poses, {} {} per axis ({})\n", diagnosis.at("verdict").get<std::string>(),
-                     diagnosis.at("sentence").get<std::string>(), diagnosis.at("poses").get<int>(),
-                     noise_name(noise, diagnosis.value("instrument_mm", noise)), micrometres(noise),
-                     diagnosis.at("noise_from").get<std::string>()) +
-         findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
+  return fmt::format("{}: {}\n", diagnosis.at("verdict").get<std::string>(),
+                     diagnosis.at("sentence").get<std::string>()) +
+         noise_line(diagnosis) + findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
          unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
          limits_text(diagnosis) + next_poses_text(diagnosis);
 }

@@ -50,18 +50,19 @@ std::vector<const CauseRecord*> examples() {
 }
 
 /// For people; empty where nothing does.
-std::string what_moves_slowly(const std::vector<Unnamed>& unnamed) {
+std::string what_moves_slowly(const std::vector<Unnamed>& unnamed, const Surrogates& unrecorded) {
   std::vector<std::string> wanderers;
   for (const Unnamed& one : unnamed) {
     if (!one.wanderer.empty() && std::find(wanderers.begin(), wanderers.end(), one.wanderer) == wanderers.end())
       wanderers.push_back(one.wanderer);
   }
   if (wanderers.empty()) return "";
-  return fmt::format("{} moved slowly in the course of the batch, as it does with the temperature; {}",
-                     fmt::join(wanderers, " and "), what_slow_changes_need());
+  return fmt::format("{} moved slowly while the batch was measured, as parts do that warm up; {}",
+                     fmt::join(wanderers, " and "), what_slow_changes_need(unrecorded));
 }
 
-Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all) {
+Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all,
+                           const Surrogates& unrecorded) {
   if (found.unnamed.empty()) return {};
   const Unnamed& strongest = *std::max_element(found.unnamed.begin(), found.unnamed.end(),
                                                [](const Unnamed& a, const Unnamed& b) { return a.score < b.score; });
@@ -77,7 +78,7 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
                                     [](const Accepted& one) { return is_play(one.cause); });
     unexplained.hint = what_negative_play_may_be(found.negative_play, every);
   }
-  const std::string slow = what_moves_slowly(found.unnamed);
+  const std::string slow = what_moves_slowly(found.unnamed, unrecorded);
   unexplained.hint += (unexplained.hint.empty() || slow.empty() ? "" : ". ") + slow;
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
@@ -139,13 +140,12 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
   diagnosis.noise = after.noise();
   diagnosis.instrument = after.instrument();
   diagnosis.noise_from =
-      fmt::format("{}{:.1f} um stated for a pose, {:.1f} um beyond it",
+      fmt::format("{}the tracker's stated sigma alone gives {:.1f} um",
                   prepared.repeats.degrees_of_freedom > 0
-                      ? fmt::format("one measurement {:.1f} um by {} poses measured repeatedly; ",
-                                    1e6 * prepared.repeats.sigma, prepared.repeats.groups)
+                      ? fmt::format("{} poses measured repeatedly scatter by {:.1f} um; ", prepared.repeats.groups,
+                                    1e6 * std::sqrt(3.0) * prepared.repeats.sigma)
                       : "",
-                  1e6 * after.instrument(),
-                  1e6 * std::sqrt(std::max(0.0, std::pow(after.noise(), 2) - std::pow(after.instrument(), 2))));
+                  1e6 * std::sqrt(3.0) * after.instrument());
   const LinearProblem& before = explained.before;
   const LinearProblem& served = explained.served;
   diagnosis.before = figures_of(before.positions(before.residual()));
@@ -159,7 +159,7 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
 void tell_findings(const Explained& explained, const PreparedBatch& prepared, const MeasurementBatch& recorded,
                    const Remainder& remainder, Diagnosis& diagnosis) {
   const SearchResult& found = explained.found;
-  diagnosis.unexplained = unexplained_of(found, explained.after, explained.all);
+  diagnosis.unexplained = unexplained_of(found, explained.after, explained.all, prepared.surrogates);
   const double left = std::max(remainder.rms, diagnosis.unexplained.rms);
   diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded,
                                    {remainder.more_than_noise, left});
@@ -180,6 +180,12 @@ void tell_verdict(Diagnosis& diagnosis) {
   const bool doubt = std::any_of(findings.begin(), findings.end(),
                                  [](const Finding& finding) { return !finding.could_also_be.empty(); });
   diagnosis.verdict = doubt ? Verdict::kAmbiguous : Verdict::kNamed;
+}
+
+void tell_largest_first(Diagnosis& diagnosis) {
+  std::stable_sort(diagnosis.findings.begin(), diagnosis.findings.end(), [](const Finding& a, const Finding& b) {
+    return std::pair(is_outlier(a), -a.effect_rms) < std::pair(is_outlier(b), -b.effect_rms);
+  });
 }
 
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis) {

@@ -42,6 +42,8 @@ void tell_findings(const Explained& explained, const PreparedBatch& prepared, co
 void tell_verdict(Diagnosis& diagnosis);
 /// The sources before and those that the model could be extended to: what was found and is beyond doubt.
 void tell_sources(const SearchResult& found, bool sorted, Diagnosis& diagnosis);
+/// The findings by the size of their effects, single poses at the end.
+void tell_largest_first(Diagnosis& diagnosis);
 /// Errors on poses held out: the validation rows, or folds where there are none. Adds suspects among them.
 void tell_held_out(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis);
 /// What these poses could not have told apart or shown.

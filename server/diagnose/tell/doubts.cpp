@@ -165,8 +165,9 @@ std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) con
   if (!many.empty())
     return fmt::format("measure more poses over the range of joint {}: its error has no single order", cause.joint + 1);
   if (dwarfed) return "find first what is unknown here: it is several times larger";
-  if (again) return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need();
-  if (slow) return "something moves slowly as well, of which it may be part: " + what_slow_changes_need();
+  if (again)
+    return "it changes more than once, as something that moves slowly does: " + what_slow_changes_need(surrogates);
+  if (slow) return "something moves slowly as well, of which it may be part: " + what_slow_changes_need(surrogates);
   if (unlikely)
     return "it is larger than robots have it: measure with another known payload, which the arm's own weight does not "
            "follow";

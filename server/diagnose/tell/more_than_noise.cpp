@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
 
 namespace trammel::cause_search {
@@ -23,33 +24,41 @@ double deviations(const LeftOver& left) {
 LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
 
 std::string micrometres(double m) { return fmt::format("{:.3g} um", 1e6 * m); }
-std::string degrees(double rad) { return fmt::format("{:.2g} deg", to_deg(rad)); }
 
-/// "41 um an axis of the positions where 13 um are stated".
+/// "1.7 times the stated noise in position and 1.6 times in orientation".
 std::string figures(const LeftOver& position, const LeftOver& rotation, NoiseVerdict least) {
   std::string text;
-  const auto add = [&](const LeftOver& left, const char* of, std::string (*words)(double)) {
+  const auto add = [&](const LeftOver& left, const char* of) {
     if (judge_noise(left) < least) return;
-    text += fmt::format("{}{} an axis are left of the {} where {} are stated ({:.1f} times)", text.empty() ? "" : ", ",
-                        words(left.left), of, words(left.stated), ratio_of(left));
+    text += text.empty() ? fmt::format("{:.1f} times the stated noise in {}", ratio_of(left), of)
+                         : fmt::format(" and {:.1f} times in {}", ratio_of(left), of);
   };
-  add(position, "positions", micrometres);
-  add(rotation, "orientations", degrees);
+  add(position, "position");
+  add(rotation, "orientation");
   return text;
+}
+
+/// ", with times and approach directions,"; empty where all was recorded.
+std::string with_what_was_not_recorded(const Surrogates& unrecorded) {
+  std::vector<std::string> all;
+  if (unrecorded.time) all.emplace_back("times");
+  if (unrecorded.temperature) all.emplace_back("temperatures");
+  if (unrecorded.direction) all.emplace_back("approach directions");
+  return all.empty() ? "" : fmt::format(", with {},", fmt::join(all, " and "));
 }
 
 /// What would show more, given what repeated poses say.
 std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& position) {
   if (prepared.repeats.degrees_of_freedom == 0)
-    return "measure some poses repeatedly, which tells a noisy measurement from something that the model lacks, and "
-           "see that the cell's tracker sigma is right";
+    return "measure some poses repeatedly, which tells a noisy measurement from something that the simulation "
+           "lacks, and check the tracker's sigma in the cell file";
   if (prepared.repeats.sigma > thresholds::kMoreThanNoise * position.stated)
-    return fmt::format("poses measured repeatedly scatter by {} as well: the measurement is noisier than the cell says",
-                       micrometres(prepared.repeats.sigma));
+    return fmt::format(
+        "poses measured repeatedly scatter by {} an axis as well: the measurement is noisier than the cell file says",
+        micrometres(prepared.repeats.sigma));
   return fmt::format(
-      "poses measured repeatedly scatter by {} only: the model lacks something that more poses, with "
-      "times, temperatures and approach directions, may show",
-      micrometres(prepared.repeats.sigma));
+      "poses measured repeatedly scatter by {} an axis only: the simulation lacks something that more poses{} may show",
+      micrometres(prepared.repeats.sigma), with_what_was_not_recorded(prepared.surrogates));
 }
 
 /// m, of the three axes: what is left beyond what is stated.
@@ -99,8 +108,8 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   if (worst == NoiseVerdict::kAsStated) return;
   const std::string more = what_shows_more(prepared, position);
   if (worst == NoiseVerdict::kLarger) {
-    diagnosis.limits.push_back(
-        fmt::format("a little more than noise: {}; {}", figures(position, rotation, NoiseVerdict::kLarger), more));
+    diagnosis.limits.push_back(fmt::format("a little more than noise: what is left is {}; {}",
+                                           figures(position, rotation, NoiseVerdict::kLarger), more));
     return;
   }
   const std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
@@ -112,7 +121,8 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   unexplained.present = true;
   unexplained.rms = rms_beyond(position);
   unexplained.p_value = std::min(chance_of_noise(position), chance_of_noise(rotation));
-  unexplained.hint = fmt::format("more than noise: {}, and it depends on nothing I know; {}", what, more);
+  unexplained.hint =
+      fmt::format("more than noise is left: {}. It changes with no joint, torque or time. {}", what, as_sentence(more));
 }
 
 }  // namespace trammel::cause_search

@@ -11,7 +11,7 @@ namespace trammel {
 
 namespace {
 
-constexpr std::size_t kMostDoubtful = 4;  // in a sentence; the findings list them all
+constexpr std::size_t kMostNamed = 4;  // in a sentence; the findings list them all
 
 std::string listed(const std::vector<std::string>& words) {
   std::string all;
@@ -37,15 +37,35 @@ std::string beginning_said(const Finding& finding) {
 
 bool is_single_pose(const Finding& finding) { return record_of(finding.cause).search == causes::SearchFamily::kPose; }
 
+std::string name_of(const Finding& finding) {
+  const std::string order = finding.cause.order ? fmt::format(", {:.2f} cycles a turn", *finding.cause.order) : "";
+  return in_words(finding.cause) + beginning_said(finding) + order;
+}
+
+std::string size_of(const Finding& finding) { return fmt::format("{:.0f} um rms", 1e6 * finding.effect_rms); }
+
 std::string said(const Finding& finding) {
   if (is_single_pose(finding))
     return fmt::format("pose {} ({:.2f} mm)", finding.cause.pose_id, to_mm(finding.effect_rms));
-  std::vector<std::string> names = {in_words(finding.cause) + beginning_said(finding)};
-  if (finding.cause.order) names.front() += fmt::format(" ({:.2f} cycles a turn)", *finding.cause.order);
-  names.front() += fmt::format(" ({:.0f} um rms)", to_mm(finding.effect_rms) * 1e3);
-  if (!finding.whole) return names.front();
-  for (const Cause& other : finding.could_also_be) names.push_back(in_words(other));
-  return fmt::format("{}", fmt::join(names, ", or "));
+  return fmt::format("{} ({})", name_of(finding), size_of(finding));
+}
+
+/// The known causes of which a finding in doubt may be one, itself first.
+std::vector<Cause> candidates_of(const Finding& finding) {
+  std::vector<Cause> all = {finding.cause};
+  for (const Cause& other : finding.could_also_be) {
+    if (other.cause != unknown_cause().cause) all.push_back(other);
+  }
+  return all;
+}
+
+/// `tracker drift or thermal growth (20 um rms)`, `perhaps tracker drift (20 um rms)` where no other cause is known.
+std::string said_in_doubt(const Finding& finding) {
+  std::vector<std::string> names = {name_of(finding)};
+  for (const Cause& other : candidates_of(finding)) {
+    if (!(other == finding.cause)) names.push_back(in_words(other));
+  }
+  return fmt::format("{}{} ({})", names.size() > 1 ? "" : "perhaps ", fmt::join(names, " or "), size_of(finding));
 }
 
 }  // namespace
@@ -61,8 +81,18 @@ bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded) {
   return !unseen.detectable && cause_search::is_by_surrogate(cause_search::put_in_surrogates(recorded), unseen.cause);
 }
 
-std::string what_slow_changes_need() {
-  return "measure some reference poses again and again over the day, with time_s and temperature_c";
+std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded) {
+  std::vector<std::string> columns;
+  if (unrecorded.time) columns.emplace_back("time_s");
+  if (unrecorded.temperature) columns.emplace_back("temperature_c");
+  return "measure some reference poses again and again over the day" +
+         (columns.empty() ? "" : ", and record " + listed(columns));
+}
+
+bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause) {
+  const auto& unseen = diagnosis.could_not_have_seen;
+  return std::any_of(unseen.begin(), unseen.end(),
+                     [&](const Unseen& one) { return one.cause == cause && !one.detectable && !one.needs.empty(); });
 }
 
 std::string noise_name(double noise, double instrument) {
@@ -80,31 +110,72 @@ std::string why_no_next_poses(const std::vector<Finding>& findings) {
 
 namespace {
 
-/// The findings as clauses, by how sure they are.
-struct Said {
-  std::vector<std::string> sure, parts, doubtful, bad_poses;
+/// The findings by how sure they are; of those in doubt that may be the same causes the first only.
+struct Told {
+  std::vector<const Finding*> sure, parts, doubtful, bad_poses;
 };
 
-Said said(const std::vector<Finding>& findings) {
-  Said all;
+bool are_the_same_doubt(const Finding& one, const Finding& other) {
+  const std::vector<Cause> a = candidates_of(one), b = candidates_of(other);
+  return std::is_permutation(a.begin(), a.end(), b.begin(), b.end());
+}
+
+Told told(const std::vector<Finding>& findings) {
+  Told all;
   for (const Finding& finding : findings) {
-    (is_single_pose(finding)         ? all.bad_poses
-     : !finding.whole                ? all.parts
-     : finding.could_also_be.empty() ? all.sure
-                                     : all.doubtful)
-        .push_back(said(finding));
-  }
-  if (const std::size_t count = all.doubtful.size(); count > kMostDoubtful) {
-    all.doubtful.resize(kMostDoubtful - 1);
-    all.doubtful.push_back(fmt::format("{} more, which the findings list", count - all.doubtful.size()));
+    auto& group = is_single_pose(finding)         ? all.bad_poses
+                  : !finding.whole                ? all.parts
+                  : finding.could_also_be.empty() ? all.sure
+                                                  : all.doubtful;
+    const bool again = &group == &all.doubtful && std::any_of(group.begin(), group.end(), [&](const Finding* other) {
+      return are_the_same_doubt(*other, finding);
+    });
+    if (!again) group.push_back(&finding);
   }
   return all;
 }
 
-std::string bad_poses_said(const std::vector<std::string>& poses) {
-  return poses.size() > 1
-             ? listed(poses) + " are outliers: single poses, cause not separable; repeat them and their neighbours"
-             : poses.front() + " is an outlier: single pose, cause not separable; repeat it and its neighbours";
+/// The first few, and how many more there are.
+std::vector<std::string> clauses_of(const std::vector<const Finding*>& findings, std::string (*words)(const Finding&)) {
+  const bool too_many = findings.size() > kMostNamed;
+  std::vector<std::string> clauses;
+  for (std::size_t k = 0; k < (too_many ? kMostNamed - 1 : findings.size()); ++k)
+    clauses.push_back(words(*findings[k]));
+  if (too_many)
+    clauses.push_back(fmt::format("{} smaller ones, which the findings list", findings.size() - clauses.size()));
+  return clauses;
+}
+
+std::string bad_poses_said(const std::vector<const Finding*>& findings) {
+  std::vector<std::string> poses;
+  for (const Finding* finding : findings) poses.push_back(said(*finding));
+  return listed(poses) + (poses.size() > 1
+                              ? " fit none of the others, and single poses do not tell why: measure them and their "
+                                "neighbours again"
+                              : " fits none of the others, and a single pose does not tell why: measure it and its "
+                                "neighbours again");
+}
+
+/// What the error is before and after all that goes into the model; empty where that is nothing.
+std::string gain_said(const Diagnosis& d, const Told& all) {
+  if (all.sure.empty() && all.parts.empty()) return "";
+  if (!(d.after.rms < d.before.rms)) return "";
+  return fmt::format("With that corrected, the error falls from {:.0f} to {:.0f} um rms", 1e6 * d.before.rms,
+                     1e6 * d.after.rms);
+}
+
+/// What is done about the largest finding.
+std::string advice_said(const Diagnosis& d) {
+  const auto first = std::find_if(d.findings.begin(), d.findings.end(),
+                                  [](const Finding& finding) { return !is_single_pose(finding); });
+  if (first == d.findings.end() || first->action.empty()) return "";
+  return fmt::format("What to do about {}: {}", in_words(first->cause), first->action);
+}
+
+std::string unexplained_said(const Unexplained& left, bool beside_findings) {
+  if (!left.present || left.depends_on.empty()) return "";
+  return fmt::format("{} error changes with {} ({:.0f} um rms), as it would by no known cause",
+                     beside_findings ? "Besides, the" : "The", circumstances_in_words(left.depends_on), 1e6 * left.rms);
 }
 
 /// Poses held out that fit neither model; empty where there are none.
@@ -119,29 +190,47 @@ std::string held_out_said(const std::vector<SuspectedPose>& suspects) {
 
 }  // namespace
 
+std::string circumstances_in_words(const std::vector<std::string>& on) {
+  std::vector<std::string> joints, sides, others;
+  for (const std::string& one : on) {
+    if (one.starts_with("q")) {
+      joints.push_back(one.substr(1));
+    } else if (one.starts_with("dir")) {
+      sides.push_back(one.substr(3));
+    } else {
+      others.push_back(one == "time" ? one : "the " + one);
+    }
+  }
+  const auto of_joints = [](const char* one, const char* several, const std::vector<std::string>& numbers) {
+    return numbers.size() > 1 ? fmt::format("the {} of joints {}", several, listed(numbers))
+                              : fmt::format("the {} of joint {}", one, numbers.front());
+  };
+  if (!sides.empty()) others.insert(others.begin(), of_joints("side of approach", "sides of approach", sides));
+  if (!joints.empty()) others.insert(others.begin(), of_joints("position", "positions", joints));
+  return others.size() == 2 && joints.size() > 1 ? others[0] + ", and " + others[1] : listed(others);
+}
+
 std::string sentence_for(const Diagnosis& d) {
-  const Said all = said(d.findings);
-  const Unexplained& left = d.unexplained;
+  const Told all = told(d.findings);
+  const bool found = !all.sure.empty() || !all.parts.empty() || !all.doubtful.empty();
   std::string text;
   const auto add = [&](const std::string& sentence) {
     if (!sentence.empty()) text += (text.empty() ? "" : " ") + as_sentence(sentence);
   };
-  if (!all.sure.empty()) add("Missing from the simulation: " + listed_clauses(all.sure));
+  if (!all.sure.empty()) add("Missing from the simulation: " + listed_clauses(clauses_of(all.sure, said)));
   if (!all.parts.empty())
-    add("Missing from the simulation, in the best known shape, which is not the whole of it: " +
-        listed_clauses(all.parts));
-  if (!all.doubtful.empty()) add("Missing, but these poses do not tell which it is: " + listed_clauses(all.doubtful));
+    add("These known causes explain part of the error, not all of it: " + listed_clauses(clauses_of(all.parts, said)));
+  if (!all.doubtful.empty())
+    add("Found, but these poses leave open what it is: " + listed_clauses(clauses_of(all.doubtful, said_in_doubt)));
+  add(gain_said(d, all));
   if (!all.bad_poses.empty()) add(bad_poses_said(all.bad_poses));
-  if (left.present && !left.depends_on.empty()) {
-    add(fmt::format("Something{} depends on {} ({:.0f} um rms), and none of the known causes fits it",
-                    text.empty() ? "" : " else", listed(left.depends_on), 1e6 * left.rms));
-  }
-  add(left.hint);
+  add(unexplained_said(d.unexplained, found || !all.bad_poses.empty()));
+  add(d.unexplained.hint);
   add(held_out_said(d.suspects));
-  if (all.sure.empty() && all.parts.empty() && all.doubtful.empty() && !left.present) {
-    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left", all.bad_poses.empty() ? "was" : "else was",
-                    d.poses, 1e6 * d.after.rms));
-  }
+  if (!found && !d.unexplained.present)
+    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left, which looks like noise",
+                    all.bad_poses.empty() ? "was" : "else was", d.poses, 1e6 * d.after.rms));
+  add(advice_said(d));
   return text;
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "server/diagnose/diagnosis.h"
+#include "server/diagnose/search/surrogates.h"
 
 namespace trammel {
 
@@ -13,13 +14,17 @@ namespace trammel {
 /// Whether a cause that could not have been seen was looked for all the same, by the order of the poses: it would have
 /// been found, but never named for certain. `recorded`: the batch without surrogates.
 [[nodiscard]] bool is_looked_for_by_order(const Unseen& unseen, MeasurementBatch recorded);
-/// What would tell a slow change from a sudden one.
-[[nodiscard]] std::string what_slow_changes_need();
+/// What would tell a slow change from a sudden one. Asks for no column that the batch has.
+[[nodiscard]] std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded);
+/// Of what changes with the circumstances `q2`, `q3`, `time`: `the positions of joints 2 and 3, and time`.
+[[nodiscard]] std::string circumstances_in_words(const std::vector<std::string>& on);
+/// Whether the batch shows nothing at all of the cause, which is then not worth telling from others.
+[[nodiscard]] bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause);
 /// What `noise` is of, m per axis: one measurement, or more than what is stated for the `instrument`.
 [[nodiscard]] std::string noise_name(double noise, double instrument);
 /// Why no poses are suggested to measure next, after no others than `findings`.
 [[nodiscard]] std::string why_no_next_poses(const std::vector<Finding>& findings);
-/// The verdict for people.
+/// The verdict for people: what is missing, the largest first; how much of the error it is; what to do first.
 [[nodiscard]] std::string sentence_for(const Diagnosis& diagnosis);
 /// Begins with a capital and ends with a full stop.
 [[nodiscard]] std::string as_sentence(std::string text);
