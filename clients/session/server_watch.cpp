@@ -120,7 +120,7 @@ void ServerWatch::was_slow(const std::string& server) {
 
 const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid, bool to_change,
                                        const std::function<bool(const KnownServer&)>& reachable) const {
-  const auto merit = [&](const KnownServer& server) {
+  const auto merit = [&](const KnownServer& server) TRAMMEL_REQUIRES(mutex_) {
     const auto replica = replicas_.find(server.id());
     const bool writes = replica != replicas_.end() && replica->second.second.role() == wire::REPLICA_WRITER;
     const std::uint64_t epoch = to_change && writes ? replica->second.second.epoch() : 0;

@@ -89,6 +89,8 @@ std::string what_would_give_way() {
 void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto& added = source->cause().added_by_data;
+    // One session shows no warmth that training adds.
+    if (source->cause().needs.temperature && parts.sessions.empty()) continue;
     if (added && !added->is_known(*parts.physics.cell)) notes.emplace_back(added->note);
   }
 }

@@ -58,10 +58,6 @@ class JointCoupling final : public JointError {
 };
 
 Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
-  if (spec.at.empty() && spec.joint < 2) {
-    return failure(ErrorCode::kUsage, "error source '{}': the first two joints are driven past no other", spec.text)
-        .next(fmt::format("say which one, {}@3", spec.text));
-  }
   return other_joint(spec, cell.robot).map([&](int other) -> ErrorSourcePtr {
     return std::make_shared<JointCoupling>(spec, other);
   });

@@ -26,8 +26,9 @@ void BatchCopies::answered(const std::string&, std::uint64_t number, const Statu
 std::map<std::string, Error> BatchCopies::wait(const std::map<std::string, std::uint64_t>& numbers, Time until) {
   MutexLock lock(mutex_);
   changed_.wait_until(lock, until, [&]() TRAMMEL_REQUIRES(mutex_) {
-    return std::all_of(numbers.begin(), numbers.end(),
-                       [&](const auto& entry) { return waiting_.at(entry.second).has_value(); });
+    return std::all_of(numbers.begin(), numbers.end(), [&](const auto& entry) TRAMMEL_REQUIRES(mutex_) {
+      return waiting_.at(entry.second).has_value();
+    });
   });
   std::map<std::string, Error> wrong;
   for (const auto& [follower, number] : numbers) {

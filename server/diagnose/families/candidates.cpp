@@ -218,6 +218,8 @@ std::vector<std::string> candidate_sources(const Cell& cell, const MeasurementBa
   std::vector<std::string> sources;
   for_each_cause(cell.robot, [&](const CauseRecord& record, int joint) {
     if (!has_own_columns(record)) return;
+    // What is driven past another joint is so from the third joint on, past the one before.
+    if (record.takes_numbers && joint >= 0 && joint < 2) return;
     const std::string lacks = lacking(record.needs, cell, batch, joint);
     const std::string spec = always_acting(record, joint);
     if (lacks.empty()) {
