@@ -145,7 +145,7 @@ void tell(const YearScore& score) {
   std::vector<double> ratios;
   std::vector<WeekOfArm> relied_on;
   for (const WeekOfArm& week : score.weeks) {
-    if (week.warned) continue;
+    if (week.warned || week.holes == 0) continue;
     relied_on.push_back(week);
     ratios.push_back(week.holes / week.oracle);
   }

@@ -171,15 +171,18 @@ double CellYear::oracle_error(int week) {
 void CellYear::drill(int week, YearScore& score) {
   const std::vector<Hole> holes = driller_.drill(week, kHoles, static_cast<std::uint64_t>(300 + week));
   double sum = 0;
+  int drilled = 0;
   for (const Hole& hole : holes) {
     const bool warned = hole.warned || !trusted_, out = hole.error > kTolerance;
     ++score.holes;
     score.holes_warned += warned ? 1 : 0;
     score.out += out ? 1 : 0;
     score.out_without_warning += out && !warned ? 1 : 0;
+    if (hole.warned) continue;
     sum += hole.error * hole.error;
+    ++drilled;
   }
-  const double rms = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, holes.size())));
+  const double rms = std::sqrt(sum / std::max(1, drilled));
   score.weeks.push_back({arm_.cell()->name, week, rms, driller_.error_in_force(week).value_or(0), oracle_error(week),
                          without_physics_ ? driller_.error_of(*without_physics_, week) : 0, !trusted_});
 }

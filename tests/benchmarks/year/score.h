@@ -10,7 +10,7 @@ namespace trammel::year {
 struct WeekOfArm {
   std::string cell;
   int week = 0;
-  double holes = 0;            ///< of the holes that were drilled as the service said
+  double holes = 0;            ///< of the holes that the service corrected without a warning
   double in_force = 0;         ///< of the model in force
   double oracle = 0;           ///< of a model of a fresh batch of the arm as it is
   double without_physics = 0;  ///< of a Gaussian process on the drawing, from the batches that were measured
