@@ -76,6 +76,7 @@ void CellYear::measure(int week, int poses) {
 void CellYear::begin() { measure(0, kFirstPoses); }
 
 void CellYear::live(int week, YearScore& score) {
+  lived_ = week;
   for (const Event& event : arm_.events())
     if (event.week == week) tell(week, "(truth) " + event.what);
   const Said said = metrologist_.check(week);
@@ -188,7 +189,8 @@ void CellYear::drill(int week, YearScore& score) {
 }
 
 void CellYear::finish(YearScore& score) const {
-  for (const auto& [what, event] : told_) score.events.push_back(event);
+  for (const auto& [what, event] : told_)
+    if (event.week <= lived_) score.events.push_back(event);
 }
 
 }  // namespace trammel::year

@@ -41,6 +41,7 @@ class CellYear {
   Metrologist metrologist_;
   Driller driller_;
   bool trusted_ = true;
+  int lived_ = 0;     // the last week
   int modelled_ = 0;  // week of the last batch that went in force
   std::optional<CompensatedModel> oracle_, without_physics_;
   std::map<std::string, EventOfYear> told_;
