@@ -58,7 +58,7 @@ class Library : public testing::Test {
   }
 
   void SetUp() override {
-    if (!is_built()) GTEST_SKIP() << "libtrammel is not in this build (-DTRAMMEL_LIBRARY=ON)";
+    if (!is_built()) GTEST_SKIP() << "libtrammel is not in this build";
   }
 
   static bool is_built() { return fs::exists(TRAMMEL_BINARY_DIR "/clients/library/libtrammel.so"); }
