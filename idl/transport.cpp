@@ -34,6 +34,9 @@ constexpr std::uint32_t kSocketBuffer = 4u << 20;
 constexpr std::uint32_t kDatagramOfALine = 1400;
 constexpr std::uint32_t kSecuredDatagramOfALine = 16384;
 constexpr int kReplicaDepth = 16;
+constexpr std::uint32_t kPortTries = 2000;
+// Until a reader has confirmed everything: a lost reply is to be missed at once. A state has readers in every client.
+constexpr std::chrono::milliseconds kHeartbeat{10}, kStateHeartbeat{200};
 
 Duration_t to_duration(std::chrono::milliseconds time) {
   return {static_cast<std::int32_t>(time.count() / 1000), static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
@@ -133,9 +136,10 @@ void set_state_history(Qos& qos, int depth) {
   qos.resource_limits().max_instances = 0;
 }
 
-void set_writer_times(dds::DataWriterQos& qos) {
+/// As long as one reader has not confirmed everything, each heartbeat goes to all readers, and all of them answer.
+void set_writer_times(dds::DataWriterQos& qos, std::chrono::milliseconds heartbeat) {
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
-  qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(std::chrono::milliseconds(10));
+  qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(heartbeat);
   qos.reliable_writer_qos().times.nackResponseDelay = to_duration(std::chrono::milliseconds(0));
 }
 
@@ -173,6 +177,8 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = to_duration(kLease);
   builtin.discovery_config.leaseDuration_announcementperiod = to_duration(kAnnouncement);
+  // Each participant of a host takes the next free ports. With the library's 100 tries the 125th has none, and is deaf.
+  builtin.mutation_tries = kPortTries;
   // A list of its own, even without a port, keeps the participant from joining the default multicast group.
   builtin.metatrafficUnicastLocatorList.push_back(locator(options.address, options.listen_port));
   for (const std::uint16_t port : options.peer_ports)
@@ -209,7 +215,7 @@ dds::SubscriberQos subscriber_qos(const std::string& partition) {
 dds::DataWriterQos call_writer_qos(int depth) {
   dds::DataWriterQos qos;
   set_call_history(qos, depth);
-  set_writer_times(qos);
+  set_writer_times(qos, kHeartbeat);
   return qos;
 }
 
@@ -223,7 +229,7 @@ dds::DataReaderQos call_reader_qos(int depth) {
 dds::DataWriterQos state_writer_qos() {
   dds::DataWriterQos qos;
   set_state_history(qos, 1);
-  set_writer_times(qos);
+  set_writer_times(qos, kStateHeartbeat);
   return qos;
 }
 

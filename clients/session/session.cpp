@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <random>
+#include <tuple>
 #include <utility>
 
 #include "clients/session/caller.h"
@@ -11,6 +12,7 @@
 #include "clients/session/server_watch.h"
 #include "idl/limits.h"
 #include "idl/quiet_library.h"
+#include "server/base/mutex.h"
 
 namespace trammel::client {
 namespace {
@@ -60,18 +62,13 @@ std::optional<std::string> writer_named(const wire::ReplyHeader& header) {
 
 bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled"; }
 
-template <typename Caller>
-Status open_caller(std::unique_ptr<Caller>& caller, wire::dds::DomainParticipant& participant,
-                   wire::dds::Publisher& publisher, wire::dds::Subscriber& subscriber, const std::string& partition,
-                   ServerWatch& watch, bool may_be_forbidden) {
-  std::optional<wire::QuietLibrary> quiet;
-  if (may_be_forbidden) quiet.emplace();
-  auto opened = Caller::open(participant, publisher, subscriber, partition, watch);
-  if (!opened && may_be_forbidden) return {};
-  if (!opened) return tl::make_unexpected(opened.error());
-  caller = std::move(*opened);
-  return {};
-}
+/// An operation's endpoints, made when it is first called: every client hears of every endpoint that the server has for
+/// another one.
+template <typename Operation>
+struct Endpoints {
+  Mutex mutex;
+  std::unique_ptr<Caller<Operation>> caller TRAMMEL_GUARDED_BY(mutex);
+};
 
 /// The same options with every server as a place, and the address of this host that leads there.
 Result<SessionOptions> completed(SessionOptions options) {
@@ -106,15 +103,13 @@ struct Session::Participant {
   SessionOptions options;
   wire::ParticipantPtr participant;
   std::unique_ptr<ServerWatch> watch;
-  std::unique_ptr<Caller<wire::PredictError>> predict_error;
-  std::unique_ptr<Caller<wire::CorrectTarget>> correct_target;
-  std::unique_ptr<Caller<wire::SubmitMeasurements>> submit_measurements;
-  std::unique_ptr<Caller<wire::Train>> train;
-  std::unique_ptr<Caller<wire::Diagnose>> diagnose;
-  std::unique_ptr<Caller<wire::CheckHealth>> check_health;
-  std::unique_ptr<Caller<wire::ReadModels>> read_models;
-  std::unique_ptr<Caller<wire::ManageModels>> manage_models;
-  std::unique_ptr<Caller<wire::ReleaseBatches>> release_batches;
+  std::string partition;
+  wire::dds::Publisher* request_publisher = nullptr;
+  wire::dds::Subscriber* reply_subscriber = nullptr;
+  std::tuple<Endpoints<wire::PredictError>, Endpoints<wire::CorrectTarget>, Endpoints<wire::SubmitMeasurements>,
+             Endpoints<wire::Train>, Endpoints<wire::Diagnose>, Endpoints<wire::CheckHealth>,
+             Endpoints<wire::ReadModels>, Endpoints<wire::ManageModels>, Endpoints<wire::ReleaseBatches>>
+      endpoints;
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
@@ -137,18 +132,34 @@ struct Session::Participant {
     return reply;
   }
 
+  /// Refused where the permissions do not allow it.
+  template <typename Operation>
+  [[nodiscard]] Result<Caller<Operation>*> caller_of() {
+    auto& made = std::get<Endpoints<Operation>>(endpoints);
+    const MutexLock lock(made.mutex);
+    if (made.caller) return made.caller.get();
+    const bool may_be_forbidden = !options.security.empty();
+    std::optional<wire::QuietLibrary> quiet;
+    if (may_be_forbidden) quiet.emplace();
+    auto opened = Caller<Operation>::open(*participant, *request_publisher, *reply_subscriber, partition, *watch);
+    if (!opened && may_be_forbidden) return not_allowed(Operation::kName);
+    if (!opened) return tl::make_unexpected(opened.error());
+    made.caller = std::move(*opened);
+    return made.caller.get();
+  }
+
   /// Sends one request. A server that follows another one names it, and that one is asked. A server that is busy has
   /// not done it and is asked again when it says, until the deadline; a change keeps its id.
   template <typename Operation>
-  [[nodiscard]] Result<typename Operation::Reply::type> call(const std::unique_ptr<Caller<Operation>>& caller,
-                                                             const typename Operation::Request::type& request,
+  [[nodiscard]] Result<typename Operation::Reply::type> call(const typename Operation::Request::type& request,
                                                              Route route) {
-    if (!caller) return not_allowed(Operation::kName);
+    const auto caller = caller_of<Operation>();
+    if (!caller) return tl::make_unexpected(caller.error());
     const auto until = deadline();
     std::optional<typename Operation::Reply::type> referral;
     int referrals = 0;
     while (true) {
-      auto reply = caller->call(request, route, until);
+      auto reply = (*caller)->call(request, route, until);
       if (const auto writer = reply ? writer_named(reply->header()) : std::nullopt;
           writer && ++referrals < kReferrals) {
         route.server = *writer;
@@ -172,7 +183,7 @@ struct Session::Participant {
     request.action(action);
     request.change(to_wire(change));
     request.reason(change.reason);
-    return call<wire::ManageModels>(manage_models, request, {cell, {}, true});
+    return call<wire::ManageModels>(request, {cell, {}, true});
   }
 
   [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -181,7 +192,7 @@ struct Session::Participant {
     request.batch_ids(batch_ids);
     request.change(to_wire(change));
     request.reason(change.reason);
-    const auto reply = call<wire::ReleaseBatches>(release_batches, request, {cell, {}, true});
+    const auto reply = call<wire::ReleaseBatches>(request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
@@ -191,7 +202,7 @@ struct Session::Participant {
                                                    wire::ReadKind what, wire::ReadModelsRequest request = {}) {
     request.about().cell(cell);
     request.what(what);
-    return call<wire::ReadModels>(read_models, request, {cell, server, false});
+    return call<wire::ReadModels>(request, {cell, server, false});
   }
 
   /// From every server.
@@ -243,14 +254,13 @@ struct Session::Participant {
 
   /// Sends `items` in parts, all to be answered by one model.
   template <typename Operation, typename Item, typename Wire, typename Put, typename Get>
-  [[nodiscard]] Result<Answer<Item>> call_in_parts(const std::unique_ptr<Caller<Operation>>& caller,
-                                                   const CallContext& context, const std::vector<Wire>& items,
+  [[nodiscard]] Result<Answer<Item>> call_in_parts(const CallContext& context, const std::vector<Wire>& items,
                                                    const ShareListener& progress, const Put& put, const Get& get) {
     const AskPart<Item> ask = [&](std::size_t first, std::size_t count) -> Result<Answer<Item>> {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const auto reply = call(caller, request, {context.cell, {}, false});
+      const auto reply = call<Operation>(request, {context.cell, {}, false});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),
@@ -280,29 +290,16 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
   if (!participant) return tl::make_unexpected(participant.error());
   inside->participant = std::move(*participant);
 
-  const std::string partition = make_name("client");
-  wire::dds::Publisher* requests = inside->participant->create_publisher(wire::publisher_qos({}));
-  wire::dds::Subscriber* replies = inside->participant->create_subscriber(wire::subscriber_qos(partition));
+  inside->partition = make_name("client");
+  inside->request_publisher = inside->participant->create_publisher(wire::publisher_qos({}));
+  inside->reply_subscriber = inside->participant->create_subscriber(wire::subscriber_qos(inside->partition));
   wire::dds::Subscriber* states = inside->participant->create_subscriber(wire::subscriber_qos({}));
-  if (requests == nullptr || replies == nullptr || states == nullptr) {
+  if (inside->request_publisher == nullptr || inside->reply_subscriber == nullptr || states == nullptr) {
     return failure(ErrorCode::kInternal, "cannot create the publisher and the subscribers of a session");
   }
   auto watch = ServerWatch::open(*inside->participant, *states);
   if (!watch) return tl::make_unexpected(watch.error());
   inside->watch = std::move(*watch);
-  const bool secured = !inside->options.security.empty();
-  const auto open_all = [&](auto&... callers) {
-    Status opened;
-    ((opened = opened
-                   ? open_caller(callers, *inside->participant, *requests, *replies, partition, *inside->watch, secured)
-                   : opened),
-     ...);
-    return opened;
-  };
-  const Status opened = open_all(inside->predict_error, inside->correct_target, inside->submit_measurements,
-                                 inside->train, inside->diagnose, inside->check_health, inside->read_models,
-                                 inside->manage_models, inside->release_batches);
-  if (!opened) return tl::make_unexpected(opened.error());
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
 
@@ -326,8 +323,7 @@ Result<Answer<PredictedError>> Session::predict_error_at(const CallContext& cont
   items.reserve(poses.size());
   for (const CommandedJoints& pose : poses) items.push_back(to_wire(pose));
   return participant_->call_in_parts<wire::PredictError, PredictedError>(
-      participant_->predict_error, context, items, progress,
-      [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
+      context, items, progress, [](wire::PredictErrorRequest & request) -> auto& { return request.poses(); },
       [](const wire::PredictErrorReply& reply) -> const auto& { return reply.predictions(); });
 }
 
@@ -338,8 +334,7 @@ Result<Answer<CorrectedTarget>> Session::correct_targets(const CallContext& cont
   items.reserve(targets.size());
   for (const TargetMm& target : targets) items.push_back(to_wire(target));
   return participant_->call_in_parts<wire::CorrectTarget, CorrectedTarget>(
-      participant_->correct_target, context, items, progress,
-      [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
+      context, items, progress, [](wire::CorrectTargetRequest & request) -> auto& { return request.targets(); },
       [](const wire::CorrectTargetReply& reply) -> const auto& { return reply.corrections(); });
 }
 
@@ -351,8 +346,7 @@ Result<std::int64_t> Session::submit_measurements(const std::string& cell, const
   request.about().cell(cell);
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::SubmitMeasurements>(participant_->submit_measurements, std::move(request),
-                                                                  {cell, {}, true});
+  const auto reply = participant_->call<wire::SubmitMeasurements>(std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -365,7 +359,7 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   request.batch_ids(batch_ids);
   request.level(level);
   request.bias(bias);
-  const auto reply = participant_->call<wire::Train>(participant_->train, std::move(request), {cell, {}, true});
+  const auto reply = participant_->call<wire::Train>(std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -390,8 +384,7 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
   const Route route{cell, {}, true};
   if (apply) {
-    const auto reply =
-        participant_->call<wire::Train>(participant_->train, training_of_diagnosis(cell, batch_id, csv, change), route);
+    const auto reply = participant_->call<wire::Train>(training_of_diagnosis(cell, batch_id, csv, change), route);
     if (!reply) return tl::make_unexpected(reply.error());
     return reply->job();
   }
@@ -400,7 +393,7 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   request.change_id(change_id(change));
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::Diagnose>(participant_->diagnose, std::move(request), route);
+  const auto reply = participant_->call<wire::Diagnose>(std::move(request), route);
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }
@@ -414,8 +407,7 @@ Result<std::int64_t> Session::check_health(const std::string& cell, const std::s
   request.batch_id(batch_id);
   request.csv(csv);
   request.tolerance_mm(tolerance_mm);
-  const auto reply =
-      participant_->call<wire::CheckHealth>(participant_->check_health, std::move(request), Route{cell, {}, true});
+  const auto reply = participant_->call<wire::CheckHealth>(std::move(request), Route{cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->job();
 }

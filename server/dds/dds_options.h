@@ -34,7 +34,7 @@ struct DdsOptions {
   std::string server_id = "trammel";      ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
   int compute_workers = 2;     ///< threads for PredictError, and as many for CorrectTarget
-  int max_clients = 128;       ///< reply channels at a time; when more clients come, those take turns that do nothing
+  int max_clients = 256;       ///< reply channels at a time; when more clients come, those take turns that do nothing
   int client_requests = 64;    ///< requests of one client that may wait: predictions, corrections, others
   int client_mb = 64;          ///< memory that they may take, all together
   int queued_requests = 4096;  ///< requests of all clients that may wait, likewise

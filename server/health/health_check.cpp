@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <numeric>
 
 #include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
@@ -30,6 +31,7 @@ using health::Sifted;
 
 constexpr int kMostCauses = 3;       // that a check may name
 constexpr double kAlike = 6;         // of scores: odds of e^3
+constexpr double kCredible = 0.99;   // of all single causes' odds: those that could be it have it together
 constexpr double kUnlinear = 0.003;  // of an effect
 constexpr double kDoubtful = 0.02;   // chance from which on nothing is said for certain
 constexpr double kNearlySeen = 10;   // times the limit: a cause that is named where the whole is beyond chance
@@ -105,6 +107,7 @@ class Examination {
   void found(std::size_t hypothesis, const CheckTests& tests, double chance, const std::vector<double>& scores);
   void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
                    SeenChange& change) const;
+  [[nodiscard]] std::vector<bool> credible(const std::vector<double>& scores) const;
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
   void tell_rms(const RefittedRows& refitted);
   void tell_due(const RefittedRows& refitted, const CheckTimes& times);
@@ -187,7 +190,7 @@ bool Examination::look_once(const CheckTests& tests) {
   const bool fits = questions_.causes > 0 && scores[best] > 0 && tests.p_value(best, left) < kNearlySeen * limit;
   if (fits) {
     found(best, tests, chance, scores);
-  } else if (check_.changed.empty()) {
+  } else if (check_.changed.empty() && tests.whole_p(left) < limit) {
     unknown_found(chance, left, tests.rows().freedom());
   }
   return fits;
@@ -222,6 +225,25 @@ void Examination::found(std::size_t hypothesis, const CheckTests& tests, double 
   nuisance_ = joined(nuisance_, one.columns);
 }
 
+/// The most likely single causes that together have kCredible of the odds: many that are each unlikely may hold the
+/// true one.
+std::vector<bool> Examination::credible(const std::vector<double>& scores) const {
+  std::vector<std::size_t> order(questions_.causes);
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
+  const auto odds = [&](std::size_t h) { return std::exp(0.5 * (scores[h] - scores[order.front()])); };
+  double left = 0;
+  for (const std::size_t h : order) left += odds(h);
+  const double missed = (1 - kCredible) * left;
+  std::vector<bool> likely(questions_.causes, false);
+  for (const std::size_t h : order) {
+    if (left < missed) break;
+    likely[h] = true;
+    left -= odds(h);
+  }
+  return likely;
+}
+
 void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
                               SeenChange& change) const {
   // What a cause explains whatever it costs: one with more numbers may be the true one all the same.
@@ -232,10 +254,11 @@ void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, c
     const bool known = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), same);
     if (!known && !same(change.cause)) change.could_also_be.push_back(other);
   };
+  const std::vector<bool> likely = credible(scores);
   for (std::size_t h = 0; h < questions_.causes; ++h) {
     const SingleCause& other = effects_.causes()[questions_.hypotheses[h].cause].cause;
     const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
-    if (as_much || scores[h] > scores[hypothesis] - kAlike) add(other);
+    if (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike) add(other);
   }
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {

@@ -58,8 +58,12 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
   using Request = typename Operation::Request::type;
   using Reply = typename Operation::Reply::type;
 
-  RawClient(std::uint32_t domain, std::uint16_t port, std::string partition) : partition_(std::move(partition)) {
-    participant_ = wire::make_participant({"raw client", domain, "127.0.0.1", 0, {port}}).value();
+  /// `security`: the folder of its certificate; empty: none.
+  RawClient(std::uint32_t domain, std::uint16_t port, std::string partition, const std::string& security = "")
+      : partition_(std::move(partition)) {
+    wire::ParticipantOptions options{"raw client", domain, "127.0.0.1", 0, {port}};
+    if (!security.empty()) options.security = wire::read_security(security).value();
+    participant_ = wire::make_participant(options).value();
     wire::dds::TypeSupport type(new AnyBytesType(typename Operation::Request().getName()));
     type.register_type(participant_.get());
     auto* requests = participant_->create_topic(wire::topic_name(Operation::kName, "_Request"), type.get_type_name(),

@@ -82,6 +82,29 @@ TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
   EXPECT_EQ(forbidden.exit_code, 3) << forbidden.out << forbidden.err;
 }
 
+TEST_F(NetworkTest, WhatSomebodyOnTheLineSendsAgainHappensOnce) {
+  const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder_.file("plant");
+  ASSERT_EQ(test::run({keys, "init", plant}).exit_code, 0);
+  ASSERT_EQ(test::run({keys, "issue", plant, "replica", "line-3"}).exit_code, 0);
+  ASSERT_EQ(test::run({keys, "issue", plant, "engineer", "office"}).exit_code, 0);
+  start("security: " + plant + "/participants/line-3");
+  const std::string office = plant + "/participants/office";
+  for (const char* id : {"first", "second"}) {
+    const std::string batch = folder_.write(std::string(id) + ".csv", test::virtual_batch_csv(80, id[0]));
+    const auto submitted =
+        elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--id", id, "--watch", "--security", office});
+    ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
+  }
+  const auto changes = [&] {
+    return elsewhere({"audit", "--cell", "cell-7", "--security", office, "--json", "-"}).out;
+  };
+  const std::string before = changes();
+  ASSERT_NE(before.find("second"), std::string::npos) << before;
+  for (int i = 0; i < 3; ++i) EXPECT_GT(hosts_.repeat_from(1), 100U);
+  EXPECT_EQ(changes(), before);
+  EXPECT_EQ(elsewhere({"status", "--security", office}).exit_code, 0);
+}
+
 /// Holes beside each other on the shipped panel.
 std::string many_targets(int count) {
   std::string text = "hole,x_mm,y_mm,z_mm,qw,qx,qy,qz,conf\n";

@@ -2,12 +2,15 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <set>
 
+#include "idl/topics.h"
 #include "server/base/text_file.h"
+#include "tests/dds/raw_client.h"
 #include "tests/support/daemon.h"
 #include "tests/support/http_client.h"
 #include "tests/support/virtual_cell.h"
@@ -30,6 +33,10 @@ class Keys {
     const std::string path = folder_.file("participants/" + name);
     if (!fs::exists(path)) keys({"issue", folder_.path().string(), role, name, "--days", days});
     return path;
+  }
+  std::string until(const std::string& time, const std::string& role, const std::string& name) {
+    keys({"issue", folder_.path().string(), role, name, "--until", time});
+    return folder_.file("participants/" + name);
   }
   void revoke(const std::string& name) { keys({"revoke", folder_.path().string(), name}); }
   [[nodiscard]] std::string authority() const { return folder_.file("authority"); }
@@ -120,6 +127,7 @@ const Calls& calls() {
 }
 
 const std::map<std::string, std::set<std::string>> kMay = {
+    {"replica", {}},  // it answers
     {"observer", {"ReadModels"}},
     {"cam", {"ReadModels", "PredictError", "CorrectTarget"}},
     {"metrologist", {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth"}},
@@ -133,7 +141,7 @@ TEST_F(SecurityTest, EachRoleMayDoWhatItsPermissionsSayAndNothingElse) {
   for (const auto& [role, may] : kMay) {
     const auto opened = session(keys().of(role, role + "-1"));
     ASSERT_TRUE(opened) << opened.error().message;
-    ASSERT_TRUE((*opened)->servers()) << role;
+    ASSERT_TRUE(may.empty() || (*opened)->servers()) << role;
     for (const auto& [operation, call] : calls()) {
       const Error error = call(**opened);
       const bool forbidden = error.message.starts_with("these permissions do not allow");
@@ -179,6 +187,50 @@ TEST_F(SecurityTest, WhoHasNoRightCertificateIsRefusedAndCounted) {
   const auto opened = session(keys().of("cam", "cam-1"));
   ASSERT_TRUE(opened) << opened.error().message;
   EXPECT_TRUE((*opened)->servers());
+}
+
+TEST_F(SecurityTest, WhoseCertificateHasEndedMeanwhileIsNotLetInAgain) {
+  const std::int64_t ends = std::time(nullptr) + 5;
+  const std::string visitor = keys().until(fmt::format("@{}", ends), "engineer", "visitor");
+  daemon_.start();
+  client::SessionOptions options = daemon_.session_options();
+  options.security = visitor;
+  options.timeout = kInVain;
+  const auto opened = client::Session::open(options);
+  ASSERT_TRUE(opened) << opened.error().message;
+  ASSERT_TRUE((*opened)->servers()) << "it is good until then";
+  while (client::check_security(visitor) || std::time(nullptr) < ends + 2) {
+    ASSERT_FALSE(daemon_.process().wait(std::chrono::milliseconds(100)));
+    ASSERT_LT(std::time(nullptr), ends + 4);
+  }
+  daemon_.kill();
+  daemon_.start();
+  const auto models = (*opened)->models("cell-7");
+  ASSERT_FALSE(models);
+  EXPECT_EQ(models.error().code, ErrorCode::kUnreachable);
+  EXPECT_GT(refused_handshakes(), 0);
+  const auto other = session(keys().of("cam", "cam-1"));
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_TRUE((*other)->servers()) << "others are served";
+}
+
+TEST_F(SecurityTest, AnswersDoNotGoToAPartitionOfSomebodyElseWhateverTheCertificateAllows) {
+  daemon_.start();
+  using Read = wire::ReadModels;
+  const std::string cam = keys().of("cam", "cam-1"), spy = keys().of("engineer", "engineer-1");
+  test::RawClient<Read> victim(daemon_.domain(), daemon_.port(), "of-cam", cam),
+      thief(daemon_.domain(), daemon_.port(), "of-thief", spy);
+  ASSERT_TRUE(victim.wait_until_matched());
+  ASSERT_TRUE(thief.wait_until_matched());
+  wire::ReadModelsRequest request;
+  request.what(wire::READ_MODELS);
+  request.about().cell("cell-7");
+  thief.send_for("of-cam", request, 1);
+  thief.send(request, 2);
+  EXPECT_EQ(thief.wait_for_replies(1).size(), 1U);
+  victim.send(request, 1);
+  EXPECT_EQ(victim.wait_for_replies(1).size(), 1U) << "its own answer, and none to the other's question";
+  EXPECT_EQ(victim.replies(), 1U);
 }
 
 TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <deque>
 #include <map>
 #include <random>
 #include <thread>
@@ -26,7 +27,8 @@ using std::chrono::milliseconds;
 
 constexpr const char* kInterface = "cable";
 constexpr std::size_t kLargestFrame = 65536;
-constexpr int kIdleMs = 20;  // the longest wait, after which it is seen whether to stop
+constexpr std::size_t kRemembered = 20000;  // frames
+constexpr int kIdleMs = 20;                 // the longest wait, after which it is seen whether to stop
 
 bool ip(std::vector<std::string> words) {
   words.insert(words.begin(), "/usr/sbin/ip");
@@ -76,6 +78,11 @@ class TwoHosts::Line {
     cut_until_ = until.time_since_epoch().count();
     return until;
   }
+  std::size_t repeat_to(std::size_t end) {
+    to_repeat_ = static_cast<int>(end);
+    to_repeat_.wait(static_cast<int>(end));
+    return repeated_;
+  }
   [[nodiscard]] std::uint64_t carried() const { return carried_; }
   void wait_until_carried(std::uint64_t frames) const {
     for (std::uint64_t seen = carried_; seen < frames; seen = carried_) carried_.wait(seen);
@@ -95,6 +102,7 @@ class TwoHosts::Line {
         if (ready.at(i).revents != 0) take_from(ends_.at(i), ends_.at(1 - i));
       }
       deliver();
+      if (to_repeat_ >= 0) repeat();
     }
   }
 
@@ -117,21 +125,35 @@ class TwoHosts::Line {
 
   void deliver() {
     while (!underway_.empty() && underway_.begin()->first <= Clock::now()) {
-      const Frame& frame = underway_.begin()->second;
+      Frame& frame = underway_.begin()->second;
       // An interface that is down takes nothing: such a frame is lost.
       if (::write(frame.to, frame.bytes.data(), frame.bytes.size()) > 0) {
         ++carried_;
         carried_.notify_all();
+        past_.push_back(std::move(frame));
+        if (past_.size() > kRemembered) past_.pop_front();
       }
       underway_.erase(underway_.begin());
     }
   }
 
+  void repeat() {
+    const int to = ends_.at(static_cast<std::size_t>(to_repeat_.load()));
+    repeated_ = 0;
+    for (const Frame& frame : past_)
+      if (frame.to == to && ::write(to, frame.bytes.data(), frame.bytes.size()) > 0) ++repeated_;
+    to_repeat_ = -1;
+    to_repeat_.notify_all();
+  }
+
   std::array<int, 2> ends_;
   const LineFaults faults_;
+  std::atomic<int> to_repeat_{-1};  // the end that is to get again what it got; -1: none
+  std::atomic<std::size_t> repeated_{0};
   std::atomic<Clock::rep> cut_until_{0};
   std::atomic<std::uint64_t> carried_{0};
   std::multimap<Clock::time_point, Frame> underway_;  // by when they arrive; of the thread, as all that follows
+  std::deque<Frame> past_;                            // as they were carried
   std::vector<char> buffer_ = std::vector<char>(kLargestFrame);
   std::mt19937_64 random_{1};
   std::uniform_real_distribution<double> uniform_{0, 1};
@@ -175,6 +197,8 @@ bool TwoHosts::set_interface(std::size_t host, bool up) const {
 }
 
 Clock::time_point TwoHosts::cut_for(milliseconds time) { return line_->cut_for(time); }
+
+std::size_t TwoHosts::repeat_from(std::size_t host) { return line_->repeat_to(1 - host); }
 
 std::uint64_t TwoHosts::carried() const { return line_->carried(); }
 

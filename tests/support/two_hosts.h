@@ -35,6 +35,9 @@ class TwoHosts {
   /// Frames that came through, both ways.
   [[nodiscard]] std::uint64_t carried() const;
   void wait_until_carried(std::uint64_t frames) const;
+  /// All frames that came from that host so far (the last 20,000) once more, as somebody on the line can send them; how
+  /// many these were.
+  std::size_t repeat_from(std::size_t host);
   /// The same command on that host.
   [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const;
 

@@ -234,6 +234,8 @@ void ReplicaLink::step() {
   look_for_divergence(there, *view);
   tell_troubles();
   publish(*view);
+  // After clients can know it: whoever reads this line and asks at once is to reach the right server.
+  if (const auto news = std::exchange(new_part_, std::nullopt); news && listener_) listener_(*news);
 }
 
 RoleDecision ReplicaLink::decide(const ReplicaRecord& record, const std::vector<OtherReplica>& others) {
@@ -250,11 +252,11 @@ void ReplicaLink::take_on(const RoleDecision& decision, const ReplicaRecord& bef
   if (!decision.record.writes) set_may_change(false);
   if (decision.record != before) {
     if (const Status kept = store_.keep_replica_record(decision.record, decision.why); !kept) return;
-    if (decision.record.writes != before.writes && listener_)
-      listener_({"replica_role",
-                 fmt::format("{} {} from now on: {}", server_,
-                             decision.record.writes ? "writes" : "follows " + decision.record.follows, decision.why),
-                 true});
+    if (decision.record.writes != before.writes)
+      new_part_ = {"replica_role",
+                   fmt::format("{} {} from now on: {}", server_,
+                               decision.record.writes ? "writes" : "follows " + decision.record.follows, decision.why),
+                   true};
   }
   if (decision.record.writes) set_may_change(true);
 }

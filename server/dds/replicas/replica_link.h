@@ -139,6 +139,7 @@ class ReplicaLink {
   bool begun_ = false;
   std::map<std::string, std::pair<std::string, Error>> not_followed_;  // by cell: the hash, and why
   std::map<std::string, Clock::time_point> awaited_since_;             // models, by cell and hash
+  std::optional<ReplicaNews> new_part_;                                // not told yet
   std::map<std::string, Clock::time_point> divergent_since_;           // by server and cell
   std::vector<std::string> told_;
   std::optional<wire::ReplicaStatus> published_;

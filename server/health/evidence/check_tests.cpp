@@ -42,9 +42,13 @@ double CheckTests::p_value(std::size_t hypothesis, const Eigen::VectorXd& left) 
   return own.cols() == 0 ? 1 : chi_square_tail((own.transpose() * left).squaredNorm(), static_cast<int>(own.cols()));
 }
 
+double CheckTests::whole_p(const Eigen::VectorXd& left) const {
+  return rows_.freedom() < 1 ? 1 : chi_square_tail(left.squaredNorm(), rows_.freedom());
+}
+
 double CheckTests::smallest_p(const Eigen::VectorXd& left) const {
   if (rows_.freedom() < 1) return 1;
-  double smallest = chi_square_tail(left.squaredNorm(), rows_.freedom());
+  double smallest = whole_p(left);
   for (std::size_t h = 0; h < causes_; ++h) smallest = std::min(smallest, p_value(h, left));
   return smallest;
 }

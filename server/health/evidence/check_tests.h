@@ -24,6 +24,8 @@ class CheckTests {
   [[nodiscard]] int freedom(std::size_t hypothesis) const { return static_cast<int>(directions_[hypothesis].cols()); }
   /// Chance of explaining as much of `left` (R, whitened, refitted) where nothing is.
   [[nodiscard]] double p_value(std::size_t hypothesis, const Eigen::VectorXd& left) const;
+  /// Of everything together.
+  [[nodiscard]] double whole_p(const Eigen::VectorXd& left) const;
   /// The smallest of all causes and of the whole.
   [[nodiscard]] double smallest_p(const Eigen::VectorXd& left) const;
   /// What each hypothesis explains, less Schwarz's price of its numbers.
