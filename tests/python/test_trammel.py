@@ -152,6 +152,24 @@ class Offline(unittest.TestCase):
         self.assertEqual(len(self.model.correct(joints_deg=self.planned.joints_deg[:2]).frame()), 2)
         self.assertEqual(len(self.batch.frame()), 60)
 
+    def test_frames_of_files_are_asked_by_their_columns(self):
+        try:
+            import pandas
+        except ImportError:
+            self.skipTest("no pandas here")
+        plan = pandas.read_csv(io.StringIO(self.planned.csv), comment="#").iloc[:, ::-1]  # whatever the order
+        self.assertIn("pose_id", plan.columns)
+        np.testing.assert_allclose(self.model.predict(plan).error_mm, self.model.predict(self.planned.joints_deg).error_mm,
+                                   atol=1e-6)
+        nominal = self.model.predict(plan[:3]).nominal
+        targets = pandas.DataFrame({"pose_id": ["a", "b", "c"], **dict(zip(("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"), nominal.T))})
+        joints = plan[:3].reset_index(drop=True)
+        by_frame = self.model.correct(pandas.concat([targets, joints.drop(columns="pose_id")], axis=1))
+        np.testing.assert_allclose(by_frame.joints_deg, self.model.correct(nominal, joints_deg=joints).joints_deg, atol=1e-9)
+        np.testing.assert_allclose(by_frame.joints_deg, self.model.correct(joints).joints_deg, atol=1e-5)
+        by_branch = self.model.correct(targets.assign(conf=0))
+        np.testing.assert_allclose(by_branch.joints_deg, self.model.correct(nominal, conf=0).joints_deg, equal_nan=True)
+
     def test_parameters_have_a_covariance_in_their_units(self):
         u95 = np.array([parameter["u95"] for parameter in self.model.parameters])
         np.testing.assert_allclose(2 * np.sqrt(np.diag(self.model.parameter_covariance)), u95, rtol=1e-6)
@@ -212,6 +230,13 @@ class Refusals(unittest.TestCase):
         with self.assertRaises(trammel.Usage):
             self.model.correct(np.zeros((2, 7)), conf=[0, 0, 0])
         self.assertEqual(self.model.predict(np.zeros((0, 6))).error_mm.shape, (0, 3))
+
+    def test_arrays_of_no_numbers(self):
+        for wrong in ("joints", [["a"] * 6], None, [[0] * 6, [0] * 5]):
+            with self.assertRaises(trammel.Usage):
+                self.model.predict(wrong)
+        with self.assertRaises(trammel.Usage):
+            self.model.correct([["x"] * 7], conf=0)
 
     def test_a_tool_that_the_cell_has_not(self):
         with self.assertRaises(trammel.Refused) as raised:
