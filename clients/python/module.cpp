@@ -322,8 +322,8 @@ py::array_t<double> covariance_of(const api::Model& model) {
   return py::array_t<double>({size, size}, flat.data());
 }
 
-void add_model_file(py::class_<api::Model>& model) {
-  model
+void add_model_file(py::class_<api::Model>& type) {
+  type
       .def_static(
           "load",
           [](const std::string& path) { return value_or_raise(unlocked([&] { return api::Model::load(path); })); },
@@ -348,8 +348,8 @@ void add_model_file(py::class_<api::Model>& model) {
       .def("figures", [](const api::Model& model) { return to_python(model.figures()); });
 }
 
-void add_model_work(py::class_<api::Model>& model) {
-  model
+void add_model_work(py::class_<api::Model>& type) {
+  type
       .def(
           "predict",
           [](const api::Model& model, const Numbers& joints_deg, std::string tool, std::string payload,
